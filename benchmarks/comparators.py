@@ -122,7 +122,7 @@ def _summed(costs: list[Facts]) -> Facts:
 def _known(name: str, threads: int, settings: Settings) -> Known:
     entry = ROBOTS[name]
     robot = entry.robot()
-    reality = draw_reality(robot, seed=0, level=GAP, structure=False)
+    reality = draw_reality(robot, seed=0, level=GAP)
     gaits = [gait(BANK, name, number) for number in range(HEALTHY_TRIALS)]
 
     def trial(stage: Stage, truth: str, number: int, controller: Controller) -> Trial:

@@ -25,7 +25,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.database import Journal, RunTrial
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.repair.paper_repair import RepairSearch

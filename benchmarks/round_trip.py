@@ -20,7 +20,7 @@ from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials

@@ -15,7 +15,7 @@ from selfmodel.logs import read_log
 from selfmodel.logs.mcap.contents import read_contents
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import TrialWriter
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

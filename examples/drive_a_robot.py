@@ -18,8 +18,8 @@ from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.environment_robot import EnvironmentRobot
-from selfmodel.physical.safety_limits import joint_limits, tilt_limit
+from selfmodel.physical.environment import EnvironmentRobot
+from selfmodel.physical.safety import joint_limits, tilt_limit
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

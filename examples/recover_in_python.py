@@ -11,7 +11,7 @@ from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import recover
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -9,7 +9,7 @@ from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
-from selfmodel.physical.watchdog import HangError
+from selfmodel.physical.safety import HangError
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import Stage, Trial, TrialPlan

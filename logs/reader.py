@@ -182,9 +182,8 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
     For scoring only: no code of a diagnosis may call this function.
 
     Returns:
-        Attributes of a ``selfmodel.physical.reality_gap.RealityGap``, and under ``structure`` those
-        of a ``selfmodel.physical.structural_mismatch.StructuralMismatch`` or None; None without a
-        gap.
+        Attributes of a ``selfmodel.simulation.reality_gap.RealityGap``, and under ``structure``
+        None, or the structural mismatch that version 0.1 could add; None without a gap.
 
     Raises:
         LogError: The file is damaged, or its gap is invalid.

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.physical.initial_pose import randomize_joint_angles, start_spread
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.simulation.initial_pose import randomize_joint_angles, start_spread
 from selfmodel.tasks.randomness import next_seed
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """Noise of the initial pose of an episode."""
 
 from selfmodel.errors import InputError
-from selfmodel.physical.initial_pose import ANGLE_DEVIATION
+from selfmodel.simulation.initial_pose import ANGLE_DEVIATION
 from selfmodel.tasks.arguments import check_number
 
 MAX_START_NOISE = 1.0

@@ -13,8 +13,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.environment_robot import EnvironmentRobot
-from selfmodel.physical.simulated_robot import OWN_SEED
+from selfmodel.physical.environment import EnvironmentRobot
+from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.embodiment import Embodiment

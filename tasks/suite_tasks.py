@@ -11,11 +11,11 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.sensors import SILENT_NEURON
-from selfmodel.physical.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import read_anatomy
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
+from selfmodel.simulation.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers

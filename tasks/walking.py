@@ -14,16 +14,15 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.debris import detached_limbs, place_debris
-from selfmodel.physical.initial_pose import randomize_initial_pose, start_spread
-from selfmodel.physical.measurement_noise import ExactMeasurement, Measurement, NoisyMeasurement
-from selfmodel.physical.reality_gap import RealityGap, draw_gap
-from selfmodel.physical.simulated_robot import physical_embodiment
+from selfmodel.physical.gap import Measurement, NoisyMeasurement, draw_gap
+from selfmodel.physical.simulated import detached_limbs, physical_embodiment, place_debris
 from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import current_value, observed_fields
+from selfmodel.simulation.initial_pose import randomize_initial_pose, start_spread
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
 from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
 from selfmodel.tasks.start_noise import start_level
@@ -151,7 +150,7 @@ class Walk(base.Task):
         """Starts the random number streams and the delay line of an episode."""
         embodiment = dataclasses.replace(self._embodiment, seed=int(rng.integers(2**32)))
         self._reader = SensorReader(embodiment.model, self._robot.anatomy, [embodiment])
-        self._measurement: Measurement = ExactMeasurement()
+        self._measurement = Measurement()
         delay = int(self._robot.control_delay)
         delay += added_steps(delay, float(embodiment.added_delay[0]))
         if self._gap is not None:

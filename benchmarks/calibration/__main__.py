@@ -21,14 +21,15 @@ from benchmarks.onboard import without_base
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate, prediction_error
+from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect

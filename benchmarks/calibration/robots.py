@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.experiments.ablation.bank import gait
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_contacts
 from selfmodel.trials.behaviour import collect

@@ -12,7 +12,7 @@ from benchmarks.other_engine.damage import Damage
 from benchmarks.other_engine.measurements import Measurements
 from benchmarks.other_engine.reality import SUBSTEP, Reality
 from benchmarks.other_engine.servos import Servos, motors_of
-from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.robot.robot import Robot
 
 

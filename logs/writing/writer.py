@@ -16,8 +16,8 @@ from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, check
 from selfmodel.logs.writing.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.writing.logfile import LogFile
 from selfmodel.logs.writing.preamble import write_preamble
-from selfmodel.physical.cleanup import Cleanup
-from selfmodel.physical.stop_signals import (
+from selfmodel.physical.safety import (
+    cleanup,
     handle_stop_signals,
     hold_stop_signals,
     release_stop_signals,
@@ -64,7 +64,7 @@ def write_trial(
         handle_stop_signals(),
         hold_stop_signals(),
         TrialWriter(path, robot, plan, header) as writer,
-        Cleanup(getattr(samples, "close", lambda: None)),
+        cleanup(getattr(samples, "close", lambda: None)),
     ):
         while (sample := _next(iterator)) is not None:
             writer.add(sample)

@@ -27,7 +27,6 @@ from selfmodel.cli.arguments.options import (
     RobotName,
     Seed,
     Steps,
-    Structural,
     Threads,
     Trials,
 )
@@ -72,7 +71,6 @@ def recover(
     comparator: ComparatorName = AUTO,
     calibrate: Calibrated = True,
     gap: GapLevel = 0.0,
-    structure: Structural = False,
     kinds: KindNames = DEFAULT_KIND_NAMES,
     next_trial: NextTrialName = "repair",
     controller: ControllerKind = "network",
@@ -154,7 +152,6 @@ def recover(
         threads=thread_count(threads),
         folder=out or _new_folder(made.name),
         gap=gap,
-        structure=structure,
         next_trial=plugins.next_trial(next_trial),
         design=design,
         gait=chosen.gait,

@@ -19,7 +19,6 @@ from selfmodel.cli.arguments.options import (
     Seed,
     StageName,
     Steps,
-    Structural,
 )
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
@@ -45,7 +44,6 @@ def trial(
     controller: ControllerSource = None,
     neurons: Neurons = None,
     gap: GapLevel = 0.0,
-    structure: Structural = False,
     steps: Steps = 1000,
     stage: StageName = "single",
     seed: Seed = 0,
@@ -58,7 +56,7 @@ def trial(
     hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
         "intact" if damage is None else damage
     )
-    reality = draw_reality(made, seed, gap, structure=structure)
+    reality = draw_reality(made, seed, gap)
     if kind in DESIGNS:
         design = plugins.design(kind, made, neurons)
         driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
@@ -79,7 +77,7 @@ def trial(
         "robot": made.name,
         "truth": str(hidden),
         "gap": gap,
-        "structure": structure,
+        "structure": False,  # readers of 0.1 expect the key
         "seed": seed,
         "steps": logged.behaviour.steps,
         "displacement": logged.displacement if math.isfinite(logged.displacement) else None,

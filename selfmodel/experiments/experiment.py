@@ -44,7 +44,6 @@ class Experiment:
         folder: Folder of the run.
         gait: Controller before the failure; None to evolve one.
         gap: Level of the reality gap.
-        structure: Whether the physical robot has structural mismatches.
         kinds: Fault kinds to search.
         calibrated: Whether the self-model is fitted to the trials before the failure.
         next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
@@ -54,7 +53,7 @@ class Experiment:
         search: Name of the search of the repair; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
         physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
-            the model; unused with a reality gap or structural mismatches.
+            the model; unused with a reality gap.
     """
 
     robot: Robot
@@ -67,7 +66,6 @@ class Experiment:
     folder: Path
     gait: Controller | None = None
     gap: float = 0.0
-    structure: bool = False
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
     next_trial: str = "repair"
@@ -101,7 +99,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     start = perf_counter()
     robot, truth = experiment.robot, experiment.truth
     simulator = Simulator(robot, experiment.threads)
-    reality = draw_reality(robot, experiment.seed, experiment.gap, structure=experiment.structure)
+    reality = draw_reality(robot, experiment.seed, experiment.gap)
     if experiment.physical is not None and reality.text is None:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
     else:

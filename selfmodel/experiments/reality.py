@@ -1,16 +1,16 @@
-"""Reality gap and structural mismatch of a simulated physical robot, drawn from a seed."""
+"""Reality gap of a simulated physical robot, drawn from a seed."""
 
 import json
 from dataclasses import dataclass
 
 from selfmodel.experiments.arguments import RobotSource, check_seed, hypothesis_of, robot_of
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.physical.reality_gap import RealityGap, draw_gap, perturbed_model
-from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.physical.structural_mismatch import StructuralMismatch, draw_structural_mismatch
-from selfmodel.recovery.random_streams import gap_stream, structure_stream
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 
 
 @dataclass(frozen=True)
@@ -19,19 +19,16 @@ class Reality:
 
     Attributes:
         gap: The reality gap; level 0 is none.
-        structure: Structural mismatches; None without any.
     """
 
     gap: RealityGap
-    structure: StructuralMismatch | None
 
     @property
     def text(self) -> str | None:
         """Hidden record of a trial log, as JSON; None if the robot equals its model."""
-        if self.gap.level == 0 and self.structure is None:
+        if self.gap.level == 0:
             return None
-        structure = None if self.structure is None else self.structure.as_dict()
-        return json.dumps({**self.gap.as_dict(), "structure": structure}, allow_nan=False)
+        return json.dumps({**self.gap.as_dict(), "structure": None}, allow_nan=False)
 
     def hidden_model(self, robot: Robot) -> Robot:
         """Returns a robot whose model has the factors and the delay of the gap, for an oracle."""
@@ -40,7 +37,7 @@ class Reality:
 
     def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
         """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""
-        return SimulatedRobot(robot, hidden, self.gap, self.structure, stream)
+        return SimulatedRobot(robot, hidden, self.gap, stream)
 
 
 def simulated_robot(
@@ -48,7 +45,6 @@ def simulated_robot(
     hypothesis: Hypothesis | str = INTACT,
     *,
     gap: float = 0.0,
-    structure: bool = False,
     seed: int = 0,
 ) -> SimulatedRobot:
     """Returns a physical robot in simulation, with hidden faults and a reality gap.
@@ -64,8 +60,7 @@ def simulated_robot(
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         hypothesis: The faults of the physical robot, or their notation.
         gap: Level of the reality gap, the relative standard deviation of its factors; 0 is none.
-        structure: Whether the physical robot also differs in structure from its model.
-        seed: Seed of the gap, the structure and the noise.
+        seed: Seed of the gap and of the noise.
 
     Raises:
         InputError: The level is out of range, the seed is negative, the robot is unknown, or the
@@ -75,22 +70,18 @@ def simulated_robot(
     robot = robot_of(robot)
     hidden = hypothesis_of(hypothesis, robot)
     stream = 1 if hidden.faults else 0
-    return draw_reality(robot, seed, gap, structure=structure).robot(robot, hidden, stream)
+    return draw_reality(robot, seed, gap).robot(robot, hidden, stream)
 
 
-def draw_reality(robot: Robot, seed: int, level: float, *, structure: bool) -> Reality:
-    """Returns the reality gap and the structural mismatch of a physical robot.
+def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
+    """Returns the reality gap of a physical robot.
 
     Args:
         robot: The nominal robot.
         seed: Seed; a search with the same seed draws other numbers.
         level: Level of the reality gap.
-        structure: Whether structural mismatches are drawn.
 
     Raises:
         InputError: The level is out of range.
     """
-    return Reality(
-        gap=draw_gap(robot, level, gap_stream(seed)),
-        structure=draw_structural_mismatch(robot, structure_stream(seed)) if structure else None,
-    )
+    return Reality(draw_gap(robot, level, gap_stream(seed)))

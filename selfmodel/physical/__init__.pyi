@@ -1,6 +1,11 @@
-from .environment_robot import EnvironmentRobot as EnvironmentRobot
+from .environment import EnvironmentRobot as EnvironmentRobot
+from .gap import draw_gap as draw_gap
 from .interface import PhysicalRobot as PhysicalRobot, TimedRobot as TimedRobot
-from .reality_gap import draw_gap as draw_gap
-from .safety_limits import Limit as Limit, joint_limits as joint_limits, tilt_limit as tilt_limit
-from .simulated_robot import SimulatedRobot as SimulatedRobot
-from .stop_signals import Terminated as Terminated, handle_stop_signals as handle_stop_signals
+from .safety import (
+    Limit as Limit,
+    Terminated as Terminated,
+    handle_stop_signals as handle_stop_signals,
+    joint_limits as joint_limits,
+    tilt_limit as tilt_limit,
+)
+from .simulated import SimulatedRobot as SimulatedRobot

@@ -32,11 +32,6 @@ def gap_stream(seed: int) -> np.random.Generator:
     return _stream(seed, _PHYSICAL)
 
 
-def structure_stream(seed: int) -> np.random.Generator:
-    """Returns the stream of the structural mismatch of a simulated physical robot."""
-    return _stream(seed, _PHYSICAL + 1)
-
-
 _CHOICES = 2**30
 """First key of the streams of choices, above the keys of any number of searches."""
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.initial_pose import StartSpread, start_spread
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.initial_pose import StartSpread, start_spread
 from selfmodel.simulation.model_distribution import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

@@ -1,8 +1,7 @@
 """Batches of MuJoCo simulations that continue when some of them diverge."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -14,7 +13,6 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import observed_fields
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 
 
@@ -46,22 +44,8 @@ def live_signals(
     }
 
 
-@dataclass(frozen=True)
-class EarlyStop:
-    """Runs that are stopped before their end, such as those that a search will reject.
-
-    Attributes:
-        steps: Numbers of finished steps after which runs are chosen.
-        chosen: Function from the behaviour so far, ``(runs, steps, width)`` per signal, and a mask
-            of the runs that diverged, ``(runs,)``, to a mask of the runs to stop, ``(runs,)``.
-    """
-
-    steps: tuple[int, ...]
-    chosen: Callable[[Behaviour, BoolArray], BoolArray]
-
-
 class LiveBatch:
-    """Batch that steps only the simulations that were not stopped and have no MuJoCo error.
+    """Batch that steps only the simulations that have no MuJoCo error.
 
     It records divergence: a simulation with a warning is recorded as diverged, so its users do not
     count MuJoCo's warnings.
@@ -74,21 +58,11 @@ class LiveBatch:
         self._batch = batch
         self._ids: IndexArray | None = None
         self._failed = np.zeros(batch.nsim, dtype=bool)
-        self._stopped = np.zeros(batch.nsim, dtype=bool)
 
     @property
     def running(self) -> int:
         """Number of simulations that are stepped."""
         return self._batch.nsim if self._ids is None else len(self._ids)
-
-    def stop(self, chosen: BoolArray) -> None:
-        """Steps some simulations no longer; their state remains.
-
-        Args:
-            chosen: Mask of the simulations, ``(n,)``.
-        """
-        self._stopped |= chosen
-        self._ids = np.flatnonzero(~(self._failed | self._stopped))
 
     def reset(self, stage: mujoco.mjtStage) -> None:
         """Resets all simulations to the reference pose.
@@ -115,7 +89,7 @@ class LiveBatch:
             yield
         except SimulationError as error:
             self._failed[error.ids] = True
-            self._ids = np.flatnonzero(~(self._failed | self._stopped))
+            self._ids = np.flatnonzero(~self._failed)
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""

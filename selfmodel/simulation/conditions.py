@@ -15,9 +15,10 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.initial_pose import StartSpread, randomize_initial_pose
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.initial_pose import StartSpread, randomize_initial_pose
 from selfmodel.simulation.model_distribution import ModelDistribution, ModelDraw
 
 _SEEDS = 2**63
@@ -135,14 +136,20 @@ class ReadingNoise:
     The noise of a condition is the same in all its runs (common random numbers).
 
     Args:
+        anatomy: Parts of the robot.
+        embodiments: The robot under each condition; its dead sensors have no noise.
         conditions: The conditions, whose runs are in turn in each group of adjacent rows.
         uncertainty: Distribution of the noise.
-        silent: Sensors without any signal, whose readings have no noise, ``(conditions, sensors)``.
     """
 
     def __init__(
-        self, conditions: Sequence[Condition], uncertainty: Uncertainty, silent: BoolArray
+        self,
+        anatomy: Anatomy,
+        embodiments: Sequence[Embodiment],
+        conditions: Sequence[Condition],
+        uncertainty: Uncertainty,
     ) -> None:
+        silent = np.array([dead_sensors(anatomy, own) for own in embodiments])
         self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
         self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
         self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
@@ -156,3 +163,18 @@ class ReadingNoise:
         by_condition += self._deviations * normal
         wrong = uniform < self._wrong
         by_condition[:, wrong] = 1 - by_condition[:, wrong]
+
+
+def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
+    """Returns a mask of the sensors without any signal, ``(sensors,)``.
+
+    The sensor of a joint that is welded at 0 reads 0 too, but is not dead.
+    """
+    model = embodiment.model
+    welded = [
+        bool(sensor.hinge)
+        and bool(model.dof_armature[model.joint(sensor.hinge).dofadr[0]] == WELD_ARMATURE)
+        for sensor in anatomy.sensors
+    ]
+    silent = (embodiment.gain == 0) & (embodiment.offset == 0)
+    return np.asarray(silent & ~np.array(welded, dtype=bool))

@@ -1,25 +1,18 @@
 """Simulator: batches of closed-loop rollouts, short predictions and ensembles of the self-model."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
-from time import perf_counter
 
-import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.controller import CommandSource, make_batch
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.measurement_noise import dead_sensors
-from selfmodel.physical.reality_gap import perturbed_models
-from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.simulation.batch import EarlyStop, LiveBatch, live_signals, new_batch
 from selfmodel.simulation.batch_memory import batch_bytes
 from selfmodel.simulation.conditions import (
     Condition,
@@ -30,7 +23,9 @@ from selfmodel.simulation.conditions import (
 from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
+from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
+from selfmodel.simulation.rollout import Rollout
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
@@ -185,8 +180,6 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
-        *,
-        early_stop: EarlyStop | None = None,
     ) -> SimulationResult:
         """Simulates each driver under each condition.
 
@@ -196,8 +189,6 @@ class Simulator:
             drivers: Sources of the commands, at least one.
             steps: Control steps, and rows of every signal.
             record: Signals to record.
-            early_stop: Runs to stop before the end, each of which then has its last row in all
-                later rows of its state; none by default.
 
         Returns:
             Signals of ``(drivers, conditions, steps, width)``, and a mask of
@@ -205,7 +196,6 @@ class Simulator:
         """
         robot, count = self.robot, len(drivers)
         embodiments = [condition.embodiment(robot) for condition in conditions]
-        silent = np.array([dead_sensors(robot.anatomy, own) for own in embodiments])
         start = initial_positions(robot, embodiments, conditions, uncertainty.start)
         flat = self._run(
             [*embodiments] * count,
@@ -213,8 +203,7 @@ class Simulator:
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            noise=ReadingNoise(conditions, uncertainty, silent),
-            early_stop=early_stop,
+            disturb=ReadingNoise(robot.anatomy, embodiments, conditions, uncertainty).add,
         )
         return flat.grouped(count, len(conditions))
 
@@ -227,97 +216,31 @@ class Simulator:
         record: Sequence[Signal],
         *,
         start: FloatArray | None = None,
-        noise: ReadingNoise | None = None,
-        early_stop: EarlyStop | None = None,
+        disturb: Callable[[FloatArray], None] = lambda _: None,
     ) -> SimulationResult:
-        robot, n, substeps = self.robot, len(embodiments), self.robot.substeps
-        batch = new_batch(robot.model, embodiments, self.threads)
-        reader = SensorReader(robot.model, robot.anatomy, embodiments)
-        controllers = make_batch(
+        robot, n = self.robot, len(embodiments)
+        rollout = Rollout(
+            robot,
+            embodiments,
             drivers,
-            [embodiment.silent_neurons for embodiment in embodiments],
-            len(robot.anatomy.sensors),
+            record,
+            threads=self.threads,
+            stats=self.stats,
+            start=start,
+            disturb=disturb,
         )
-        sensordata, qpos, ctrl = (batch.bind(field) for field in ("sensordata", "qpos", "ctrl"))
-        whole, part = split_delay(robot.control_delay, substeps)
-        added = [
-            added_steps(robot.control_delay, float(embodiment.added_delay[0]))
-            for embodiment in embodiments
-        ]
-        motors = _DelayLine(ctrl, whole + bool(part) + np.array(added, dtype=np.intp))
-        live = live_signals(robot, batch, embodiments, record)
-        live |= {"sensors": lambda: controllers.readings, "commands": lambda: motors.inlet}
         # Steps first during the run, so that each step is written to contiguous memory.
         kept = {
             signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
         }
-        # After all bindings: a field that is bound later remains zero until the next step.
-        alive = LiveBatch(batch)
-        alive.reset(mujoco.mjtStage.mjSTAGE_ACC)
-        if start is not None:
-            qpos[:] = start
-            alive.forward()
-        for k in range(steps):
-            reader.read(sensordata, qpos, controllers.readings)
-            if noise is not None:
-                noise.add(controllers.readings)
-            controllers.step(motors.inlet)
-            motors.advance()
+        for k in rollout.steps(steps):
             for signal, rows in kept.items():
-                rows[k] = live[signal]()
-            if early_stop is not None and k + 1 in early_stop.steps:
-                alive.stop(early_stop.chosen(_behaviour(robot, kept, k + 1), alive.diverged()))
-            self.stats.steps += alive.running
-            if k + 1 < steps:
-                clock = perf_counter()
-                if part:
-                    alive.step(part)
-                    motors.release()
-                alive.step(substeps - part)
-                self.stats.physics_seconds += perf_counter() - clock
-        diverged = alive.diverged()
+                rows[k] = rollout.live[signal]()
+        diverged = rollout.diverged()
         self.stats.runs += n
         self.stats.diverged += int(diverged.sum())
-        return SimulationResult(_behaviour(robot, kept, steps), diverged)
-
-
-def _behaviour(robot: Robot, kept: Mapping[Signal, FloatArray], steps: int) -> Behaviour:
-    """Returns the behaviour of the first steps from rows of ``(steps, n, width)`` per signal."""
-    signals = {
-        signal: np.ascontiguousarray(rows[:steps].swapaxes(0, 1)) for signal, rows in kept.items()
-    }
-    time = np.arange(steps, dtype=np.float64) * robot.control_timestep
-    return Behaviour(robot.anatomy.names, time, signals)
-
-
-class _DelayLine:
-    """Delay line of the commands; the motors' commands are 0 until the first arrives.
-
-    Args:
-        outlet: Commands at the motors, ``(n, motors)``; written.
-        delays: Control delay of each run, control steps, rounded up, ``(n,)``.
-    """
-
-    def __init__(self, outlet: FloatArray, delays: IndexArray) -> None:
-        self._outlet, self._delays = outlet, delays
-        longest = int(delays.max())
-        self._line = np.zeros((longest + 1, *outlet.shape))
-        self._rows = np.arange(len(outlet))
-        self._step = 0
-        self._delayed = longest > 0
-        self.inlet = np.zeros(outlet.shape) if self._delayed else outlet
-        """Next commands, ``(n, motors)``; the outlet itself without a delay."""
-
-    def advance(self) -> None:
-        """Moves the commands of the inlet into the line, and the delayed ones to the outlet."""
-        if self._delayed:
-            self._step += 1
-            self._line[self._step % len(self._line)] = self.inlet
-            self._send(self._delays)
-
-    def release(self) -> None:
-        """Moves those commands to the outlet that would be there a step later."""
-        self._send(self._delays - 1)
-
-    def _send(self, delays: IndexArray) -> None:
-        self._outlet[:] = self._line[(self._step - delays) % len(self._line), self._rows]
+        signals = {
+            signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
+        }
+        time = np.arange(steps, dtype=np.float64) * robot.control_timestep
+        return SimulationResult(Behaviour(robot.anatomy.names, time, signals), diverged)

@@ -10,8 +10,8 @@ import pytest
 from selfmodel.controllers.playback import played_back
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.reality_gap import draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

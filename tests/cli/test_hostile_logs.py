@@ -10,7 +10,7 @@ import pytest
 
 from selfmodel.logs.records import MODEL_FILE, TRIAL, TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample

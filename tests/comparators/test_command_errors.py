@@ -9,7 +9,7 @@ from selfmodel.comparators.command_errors import command_errors, command_spans
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour

@@ -11,7 +11,7 @@ from selfmodel.diagnosis.comparator import PreparedTrial, TrialRefusedError
 from selfmodel.diagnosis.comparator_choice import best_comparator, given_comparator
 from selfmodel.diagnosis.preparation import refusals
 from selfmodel.errors import InputError
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal

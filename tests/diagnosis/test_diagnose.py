@@ -26,7 +26,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -16,7 +16,7 @@ DATA = ("text", "toml", "xml")
 """Languages of output and of files."""
 
 SEARCH = re.compile(
-    r"selfmodel (recover|diagnose|calibrate|ablate|suite run|paper|render|trial .*--structure)"
+    r"selfmodel (recover|diagnose|calibrate|ablate|suite run|paper|render)"
     r"|\b(recover|diagnose|evolve_controller)\("
 )
 """Commands and calls that run an evolutionary algorithm, a calibration or that draw for seconds."""

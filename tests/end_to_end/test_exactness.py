@@ -14,7 +14,7 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.experiments import robots
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import calibrate

@@ -21,7 +21,7 @@ STEPS = 1000
 TAPPED = """
 import mmap, sys
 from selfmodel.cli import main
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 
 counter = open(sys.argv.pop(1), "r+b")
 page = mmap.mmap(counter.fileno(), 8)

@@ -19,7 +19,7 @@ from benchmarks.other_engine.servos import Servos, motors_of
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS

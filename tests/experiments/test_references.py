@@ -9,7 +9,7 @@ from selfmodel.errors import InputError
 from selfmodel.experiments.references import read_reference, simulated_reference
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.scores.tracking import Reference
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import TrialPlan

@@ -6,7 +6,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -9,7 +9,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import ENCODER_OFFSET, ENCODER_SLIP
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator

@@ -8,7 +8,7 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, collect

@@ -12,7 +12,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, read_log
-from selfmodel.logs.messages.signals import topics
+from selfmodel.logs.messages.topics import topics
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.salvage.rescue import rescue
 from selfmodel.logs.writing import logfile

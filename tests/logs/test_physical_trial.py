@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import IncompleteError, read_log
 from selfmodel.logs.physical_trial import MIN_STEPS, TrialRunner, run_trial
 from selfmodel.logs.records import TrialHeader
-from selfmodel.physical.watchdog import HangError
+from selfmodel.physical.safety import HangError
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample

@@ -23,7 +23,7 @@ from selfmodel.logs import read_truth, reader
 from selfmodel.logs.journal import FolderJournal, create_journal
 from selfmodel.logs.mcap.contents import Contents
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
 from selfmodel.recovery.recover import recover

@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.errors import InputError
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import recover
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

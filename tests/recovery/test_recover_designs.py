@@ -10,7 +10,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.next_trial import by_repair, candidates, discriminating_controller
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery

@@ -13,7 +13,7 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery import recover as module
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.repair.candidate_controller import CandidateController

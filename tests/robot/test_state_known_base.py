@@ -5,7 +5,7 @@ import numpy as np
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS, with_known_base
 from selfmodel.simulation.calibration import calibrate

@@ -12,8 +12,8 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
-from selfmodel.physical.reality_gap import draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import calibration

@@ -7,8 +7,8 @@ import pytest
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.physical.reality_gap import draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.simulation.calibration_segments import (
     HORIZON,
     MAX_SEGMENTS,

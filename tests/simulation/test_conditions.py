@@ -8,10 +8,10 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.initial_pose import StartSpread
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.conditions import ReadingNoise, Uncertainty, draw_conditions
+from selfmodel.simulation.conditions import Uncertainty, draw_conditions
+from selfmodel.simulation.initial_pose import StartSpread
 from selfmodel.simulation.model_distribution import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
@@ -119,14 +119,16 @@ def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robo
 
 
 def test_a_robot_without_sensors_has_conditions(quadruped: Robot):
-    noise = ReadingNoise(
-        draw_conditions((INTACT,), certain(quadruped), 2, np.random.default_rng(0)),
-        dataclasses.replace(
-            certain(quadruped), reading_noise=np.zeros(0), wrong_touches=np.zeros(0)
-        ),
-        np.zeros((2, 0), dtype=bool),
+    spec = quadruped.specification()
+    for sensor in list(spec.sensors):
+        spec.delete(sensor)
+    bare = Robot("bare", spec.to_xml(), quadruped.control_timestep)
+    drawn = draw_conditions((INTACT,), uncertain(bare), 2, np.random.default_rng(0))
+    outcome = Simulator(bare, 1).run_under(
+        drawn, uncertain(bare), random_controllers(bare, 1), STEPS, ("sensors",)
     )
-    noise.add(np.zeros((4, 0)))
+
+    assert outcome.behaviour["sensors"].shape == (1, 2, STEPS, 0)
 
 
 def test_hypotheses_that_cannot_be_told_apart_are_simulated_in_turn(quadruped: Robot):

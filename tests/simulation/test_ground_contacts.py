@@ -19,7 +19,7 @@ from selfmodel.faults.terrain import (
     estimated_heights,
     unit_heights,
 )
-from selfmodel.physical.simulated_robot import OWN_SEED, SimulatedRobot
+from selfmodel.physical.simulated import OWN_SEED, SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.ground_contacts import ground_contact_points

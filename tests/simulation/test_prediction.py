@@ -14,8 +14,8 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.physical.reality_gap import draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationStats

@@ -8,7 +8,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.interface import TimedRobot
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.repair.paper_repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

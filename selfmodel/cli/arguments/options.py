@@ -99,15 +99,6 @@ GapLevels = Annotated[
         rich_help_panel=PHYSICAL,
     ),
 ]
-Structural = Annotated[
-    bool,
-    typer.Option(
-        "--structure",
-        help="Add structural mismatch: backlash, a soft limb, a foot of another size, a weak "
-        "motor.",
-        rich_help_panel=PHYSICAL,
-    ),
-]
 
 ControllerKind = Annotated[
     str,

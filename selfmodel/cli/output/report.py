@@ -85,8 +85,7 @@ def _no_recovery(found: dict[str, Any]) -> list[str]:
 
 def _reality(found: dict[str, Any]) -> str:
     """Returns the reality gap of the physical robot as a clause."""
-    gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
-    return gap + (", with structural mismatch" if found["structure"] else "")
+    return f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
 
 
 def result_file(experiment: Experiment, found: dict[str, Any], logs: Sequence[Path]) -> bytes:
@@ -122,7 +121,7 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
         "comparator_reason": recovery.comparator.reason,
         "kinds": [kind.name for kind in experiment.kinds],
         "gap": experiment.gap,
-        "structure": experiment.structure,
+        "structure": False,  # readers of 0.1 expect the key
         "next_trial": experiment.next_trial,
         "repair": experiment.repair,
         "search": plugins.search_name(experiment.repair, experiment.search, gaits),

@@ -26,7 +26,6 @@ from selfmodel.cli.arguments.options import (
     Population,
     Seeds,
     Steps,
-    Structural,
     StudyFolder,
     Workers,
 )
@@ -67,7 +66,6 @@ def ablate(
     kinds: KindNames = DEFAULT_KIND_NAMES,
     comparators: ComparatorNames = "all",
     gaps: GapLevels = "0",
-    structure: Structural = False,
     seeds: Seeds = 1,
     seed: FirstSeed = 0,
     next_trial: Annotated[
@@ -125,7 +123,6 @@ def ablate(
         cases=None if cases == "all" else numbers,
         damages=[damage.strip() for damage in damages.split(",") if damage.strip()],
         kinds=kind_names(kinds),
-        structure=structure,
         comparators=inputs.texts("--comparator", comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", gaps),
         seeds=range(seed, seed + seeds),

@@ -21,8 +21,8 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
-from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
+from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 
 BANK = "bank"
 NEXT_TRIAL = (BANK, "repair", "disagreement")
@@ -59,7 +59,6 @@ class Ablation:
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, as in ``--kinds``.
-        structure: Whether the physical robots have structural mismatches.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: Name of the fitness of the repair; None for that of the repair.
@@ -76,7 +75,6 @@ class Ablation:
     settings: Settings = Settings()  # noqa: RUF009  # a frozen dataclass
     damages: Sequence[str] = ()
     kinds: str = ",".join(kind.name for kind in DEFAULT_KINDS)
-    structure: bool = False
     next_trial: str = BANK
     bank: Path | None = None
     score: str | None = None
@@ -270,7 +268,6 @@ def _shared(ablation: Ablation) -> dict[str, Any]:
     return {
         "settings": dataclasses.asdict(ablation.settings),
         "kinds": ablation.kinds,
-        "structure": ablation.structure,
         "next_trial": ablation.next_trial,
         "bank": ablation.bank is not None,
         "score": score_name(ablation.repair, ablation.score),

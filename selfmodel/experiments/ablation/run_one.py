@@ -138,7 +138,6 @@ def recover(cell: Cell, needs: Mapping[str, Path], folder: Path) -> list[dict[st
         folder=folder / "recovery",
         gait=gait,
         gap=setting.gap,
-        structure=setting.shared["structure"],
         kinds=plugins.kinds(setting.shared["kinds"]),
         next_trial=setting.shared["next_trial"],
         score=score,

@@ -113,8 +113,7 @@ def calibrated_robot(robot: Robot, folder: Path) -> Robot:
 
 def _run(setting: Setting, plan: TrialPlan, number: int, folder: Path) -> Trial:
     hidden = INTACT if plan.stage == "before" else setting.truth
-    structure = setting.shared["structure"]
-    reality = draw_reality(setting.robot, setting.seed, setting.gap, structure=structure)
+    reality = draw_reality(setting.robot, setting.seed, setting.gap)
     # Noise differs between trials and is the same for every comparator.
     physical = reality.robot(setting.robot, hidden, stream=number)
     header = TrialHeader(setting.settings, hidden=str(hidden), gap=reality.text)

@@ -13,9 +13,9 @@ from selfmodel.experiments import robots
 from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.planned_robots import planned
-from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.recovery.baselines.problem import BaselineSettings
 from selfmodel.recovery.baselines.registry import BASELINES, ORACLE
+from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 
 ORACLE_TRIALS = 6
 """Physical trials whose mean is the value of the oracle."""

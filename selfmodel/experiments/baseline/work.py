@@ -19,7 +19,6 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
-from selfmodel.physical.reality_gap import RealityGap
 from selfmodel.recovery.baselines.genome_search import genome_search
 from selfmodel.recovery.baselines.measurement import Track
 from selfmodel.recovery.baselines.problem import Fitness, Problem
@@ -32,6 +31,7 @@ from selfmodel.recovery.scores.upright import UPRIGHT
 from selfmodel.recovery.uncertainty import noise_of_gap
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.simulator import Simulator
 
 FILE = "repertoire.npz"
@@ -88,7 +88,7 @@ def problem_of(cell: Cell, needs: Mapping[str, Path]) -> tuple[Simulator, Proble
     parameters = cell.parameters
     robot, steps = planned_entry(parameters).robot(), parameters["shared"]["steps"]
     truth = parse(parameters["truth"], robot.anatomy)
-    reality = draw_reality(robot, cell.seed, parameters["gap"], structure=False)
+    reality = draw_reality(robot, cell.seed, parameters["gap"])
     simulator = Simulator(robot, threads=1)
     track = Track(reality.robot(robot, truth, PHYSICAL), robot, build(robot, truth).normal, steps)
     return simulator, Problem(

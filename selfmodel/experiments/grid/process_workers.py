@@ -17,7 +17,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, TypeVar
 
 from selfmodel.experiments.grid.workers import Workers
-from selfmodel.physical.stop_signals import STOP_SIGNALS
+from selfmodel.physical.safety import STOP_SIGNALS
 
 Answer = TypeVar("Answer")
 

@@ -19,8 +19,8 @@ from selfmodel.experiments.study.repairs import check_repair, repair_parameters,
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.faults.sensors import silent_neurons
-from selfmodel.physical.reality_gap import MAX_GAP_LEVEL
 from selfmodel.settings import Settings
+from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.tasks import Entry
 
 RECOVER = "selfmodel.experiments.suite.work:recover"
@@ -43,7 +43,6 @@ class Study:
         comparator: Name of the comparator, ``package.module:object``, or ``auto``.
         kinds: Fault kinds to search, as in ``--kinds``.
         gap: Level of the reality gap.
-        structure: Whether the physical robots have structural mismatches.
         neurons: Number of hidden neurons; None for the design's default.
         repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
         search: Name of its search; None for that of the repair.
@@ -59,7 +58,6 @@ class Study:
     comparator: str
     kinds: str = ",".join(kind.name for kind in PAPER_KINDS)
     gap: float = 0.0
-    structure: bool = False
     neurons: int | None = None
     repair: str = plugins.PAPER
     search: str | None = None
@@ -151,7 +149,7 @@ def _applies(study: Study, entry: Entry, case: int) -> bool:
 
 def _shared(study: Study) -> dict[str, Any]:
     """Returns the parameters that all runs of one results table share."""
-    names = ("controller", "comparator", "kinds", "gap", "structure", "neurons")
+    names = ("controller", "comparator", "kinds", "gap", "neurons")
     return {
         "settings": dataclasses.asdict(study.settings),
         "score": score_name(study.repair, study.score),

@@ -42,7 +42,6 @@ def recover(cell: Cell, needs: Mapping[str, Path], folder: Path) -> list[dict[st
         choose_comparator=comparator_choice(shared["comparator"]),
         kinds=plugins.kinds(shared["kinds"]),
         gap=shared["gap"],
-        structure=shared["structure"],
         settings=settings,
         seed=cell.seed,
         threads=1,

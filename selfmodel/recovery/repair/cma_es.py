@@ -110,13 +110,8 @@ class CmaEs:
 
     @property
     def rollouts(self) -> Rollouts:
-        """Rollouts that the generation needs: a run recombines the better half of its genomes."""
-        return "raced" if self._runs else "short"
-
-    @property
-    def groups(self) -> int:
-        """Number of runs whose genomes ``ask`` returns one after the other; 1 for random ones."""
-        return max(1, len(self._runs))
+        """Rollouts that the generation needs."""
+        return "whole" if self._runs else "short"
 
     def _started(self, fitness: FloatArray) -> list["_Run"]:
         """Returns the runs from the best seeds and the best random genomes."""

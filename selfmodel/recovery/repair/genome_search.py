@@ -9,9 +9,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.evolution import Draw
 from selfmodel.settings import Settings
 
-Rollouts = Literal["short", "raced", "whole"]
-"""Rollouts of a generation: short ones of ``SHORT_STEPS``, as of a random sample; ones of which
-only the leaders of each group go on to the end; or ones of which all do."""
+Rollouts = Literal["short", "whole"]
+"""Rollouts of a generation: short ones of ``SHORT_STEPS``, as of a random sample, or whole ones."""
 
 
 SHORT_STEPS = 200
@@ -30,11 +29,6 @@ class GenomeSearch(Protocol):
     @property
     def rollouts(self) -> Rollouts:
         """Rollouts that the generation needs."""
-        ...
-
-    @property
-    def groups(self) -> int:
-        """Number of groups of equal size, one after the other, of which a generation consists."""
         ...
 
     def ask(self) -> FloatArray:

@@ -26,7 +26,6 @@ class NoisyEa:
     """
 
     rollouts: ClassVar[Rollouts] = "whole"
-    groups: ClassVar[int] = 1
 
     def __init__(
         self,

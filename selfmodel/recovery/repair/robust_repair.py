@@ -218,7 +218,5 @@ def _scores(
     rng: np.random.Generator,
 ) -> FloatArray:
     """Returns the scores of a generation, ``(controllers,)``, with the rollouts that it needs."""
-    if search.rollouts == "raced":
-        return fitness.race(controllers, search.groups, steps, rng)
     horizon = min(SHORT_STEPS, steps) if search.rollouts == "short" else steps
     return fitness(controllers, 1, horizon, rng)[:, 0]

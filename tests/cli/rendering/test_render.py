@@ -27,7 +27,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import POSE
 from selfmodel.settings import Settings

@@ -9,7 +9,7 @@ import pytest
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.sequential_diagnosis import simulated_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -8,7 +8,7 @@ import pytest
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -7,7 +7,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.verdicts.contradiction import CONTRADICTION, contradiction_losses
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour, collect
 from tests.helpers.drivers import random_controllers

@@ -74,7 +74,7 @@ def test_of_what_would_have_done_harm_nothing_else_is_asked(quadruped: Robot):
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
     """A trial across a small reality gap, on slippery ground before and after the failure."""
-    reality = draw_reality(robot, 3, 0.02, structure=False)
+    reality = draw_reality(robot, 3, 0.02)
     hidden = parse("+".join({truth, SLIPPERY} - {"intact"}), robot.anatomy)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return in_memory(robot)(reality.robot(robot, hidden, stream=number), plan)

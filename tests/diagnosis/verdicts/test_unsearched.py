@@ -135,7 +135,7 @@ def test_with_all_kinds_considered_nothing_is_outside(quadruped: Robot):
 
 def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
     """A trial across a small reality gap."""
-    reality = draw_reality(robot, 3, 0.03, structure=False)
+    reality = draw_reality(robot, 3, 0.03)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return in_memory(robot)(physical, plan)

@@ -22,7 +22,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -20,8 +20,8 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writing.kinematics import Kinematics, body_names
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.reality_gap import draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.scores.falls import first_falls
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters

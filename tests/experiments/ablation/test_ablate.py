@@ -306,7 +306,6 @@ def otherwise(tmp_path_factory: pytest.TempPathFactory, done: Path) -> Path:
         cases=[9],
         damages=["friction=0.4+break:back_left_knee", "motor:front_left_knee=0.5"],
         kinds="break,friction",
-        structure=True,
         settings=Settings(steps=60, generations=2, trials=2).scaled(6),
         comparators=["segment-prediction"],
     )
@@ -358,13 +357,10 @@ def test_every_trial_of_a_robot_built_differently_hides_how(otherwise: Path, don
     logs = sorted(otherwise.glob("trials/*/*.mcap"))
 
     assert len(logs) == 3 * 4
-    assert all(read_gap(log)["structure"] for log in logs)
     assert all(read_gap(log) is None for log in done.glob("trials/*/*.mcap"))
 
 
-@pytest.mark.parametrize(
-    "changes", [{"structure": True}, {"kinds": "break,jam"}], ids=["structure", "kinds"]
-)
+@pytest.mark.parametrize("changes", [{"kinds": "break,jam"}], ids=["kinds"])
 def test_what_is_not_of_one_table_does_not_go_into_one_folder(done: Path, changes: dict):
     with pytest.raises(InputError, match="contains an ablation with other settings"):
         run(small(done, cases=[2], **changes))

@@ -24,7 +24,7 @@ from selfmodel.experiments.grid import (
     run_grid,
 )
 from selfmodel.logs import result_files
-from selfmodel.physical.stop_signals import STOP_SIGNALS
+from selfmodel.physical.safety import STOP_SIGNALS
 from tests.helpers.grids import calls, note_call
 
 ROOT = Path(__file__).parents[3]

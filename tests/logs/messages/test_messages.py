@@ -18,7 +18,7 @@ from selfmodel.logs.messages.topics import Topic, description, topics, transform
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.kinematics import body_names
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import Names

@@ -17,7 +17,7 @@ from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.recordings.importer import import_recording
 from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
 from selfmodel.logs.recordings.mapping.suggest import suggest
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

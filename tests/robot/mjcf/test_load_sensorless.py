@@ -9,7 +9,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings

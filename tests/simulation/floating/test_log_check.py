@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.parameters import nominal
 from selfmodel.simulation.calibration_segments import calibration_segments_of
 from selfmodel.simulation.floating.log_check import Suspicion, suspicion

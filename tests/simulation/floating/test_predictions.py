@@ -2,7 +2,7 @@
 
 import pytest
 
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.simulation.calibration_segments import calibration_segments_of
 from selfmodel.simulation.floating.predictions import Predictions
 from selfmodel.tasks import ROBOTS

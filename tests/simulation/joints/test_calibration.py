@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import played_back
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.joint_parameters import (
     JointParameters,
     joint_parameters,

@@ -15,11 +15,11 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
-from selfmodel.physical.measurement_noise import NoisyMeasurement
-from selfmodel.physical.reality_gap import RealityGap, draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import NoisyMeasurement, draw_gap
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS
@@ -245,21 +245,13 @@ def test_a_trial_across_a_gap_from_the_command_line(tmp_path: Path):
         return json.loads(done.stdout)
 
     plain, zero = trial("plain.mcap"), trial("zero.mcap", "--gap", "0")
-    wide, both = (
-        trial("wide.mcap", "--gap", "0.1"),
-        trial("both.mcap", "--gap", "0.1", "--structure"),
-    )
+    wide = trial("wide.mcap", "--gap", "0.1")
 
     assert (tmp_path / "plain.mcap").read_bytes() == (tmp_path / "zero.mcap").read_bytes()
     assert read_gap(tmp_path / "plain.mcap") is None
-    assert (plain["gap"], plain["structure"]) == (zero["gap"], zero["structure"]) == (0, False)
-    hidden = [read_gap(tmp_path / name) for name in ("wide.mcap", "both.mcap")]
-    assert hidden[0] | {"structure": 1} == hidden[1] | {"structure": 1}
-    assert hidden[0]["level"] == wide["gap"] == both["gap"] == 0.1
-    assert hidden[0]["structure"] is None
-    assert both["structure"]
-    assert hidden[1]["structure"]["saturation"] == 0.6
-    assert len({told["displacement"] for told in (plain, wide, both)}) == 3
+    assert (plain["gap"], zero["gap"], wide["gap"]) == (0, 0, 0.1)
+    assert read_gap(tmp_path / "wide.mcap")["level"] == 0.1
+    assert plain["displacement"] == zero["displacement"] != wide["displacement"]
 
 
 @pytest.mark.parametrize("command", ["trial", "recover"])
@@ -281,14 +273,14 @@ def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_pat
     done = selfmodel(
         "recover", "quadruped", "--damage", "intact", *SMALL, "--steps", "100", "--trials", "1",
         "--no-calibrate", "--comparator", "forward-displacement", "--kinds", "paper",
-        "--gap", "0.1", "--structure", "--out", "run", "--json", cwd=tmp_path,
+        "--gap", "0.1", "--out", "run", "--json", cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     paths = [tmp_path / trial["log"] for trial in told["trials"]]
     hidden = [read_gap(path) for path in paths]
 
-    assert (told["gap"], told["structure"]) == (0.1, True)
+    assert told["gap"] == 0.1
     assert len(paths) == 3
     assert hidden[0] == hidden[1] == hidden[2]
     assert hidden[0]["level"] == 0.1

@@ -1,19 +1,21 @@
 """What is done at the end of a block is done, and what ended the block is what is told."""
 
+from contextlib import AbstractContextManager
+
 import pytest
 
 from selfmodel.errors import WorkError, describe
-from selfmodel.physical.cleanup import Cleanup
+from selfmodel.physical.safety import cleanup
 
 FAILURES = (OSError("the port is gone"), WorkError("the robot does not answer"))
 REASONS = (KeyboardInterrupt("Ctrl-C"), ZeroDivisionError("a bug"))
 
 
-def failing(failure: Exception) -> Cleanup:
+def failing(failure: Exception) -> AbstractContextManager[None]:
     def end() -> None:
         raise failure
 
-    return Cleanup(end)
+    return cleanup(end)
 
 
 @pytest.mark.parametrize("failure", FAILURES, ids=repr)
@@ -41,6 +43,6 @@ def test_a_bug_at_the_end_is_not_hidden_in_a_note():
 
 def test_the_end_comes_once_and_after_the_block():
     done: list[str] = []
-    with Cleanup(lambda: done.append("end")):
+    with cleanup(lambda: done.append("end")):
         done.append("block")
     assert done == ["block", "end"]

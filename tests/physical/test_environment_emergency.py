@@ -14,8 +14,8 @@ from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.verify import verify
 from selfmodel.logs.writing.writer import TrialWriter, write_trial
-from selfmodel.physical.environment_robot import EnvironmentRobot
-from selfmodel.physical.safety_limits import Limit, joint_limits, tilt_limit
+from selfmodel.physical.environment import EnvironmentRobot
+from selfmodel.physical.safety import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample

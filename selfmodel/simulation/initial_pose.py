@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from selfmodel.physical.measurement_noise import rotated_by_vector
+from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE
 from selfmodel.robot.robot import Robot
@@ -105,3 +105,12 @@ def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData)
     # The world and the robot, in either order.
     depths = -data.contact.dist[(roots == root).any(axis=1) & (roots == 0).any(axis=1)]
     return float(depths.max(initial=-np.inf)) if len(depths) else 0.0
+
+
+def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray:
+    """Returns an orientation (w x y z) rotated by a rotation vector in the body frame, rad."""
+    rotation, result = np.array([1.0, 0, 0, 0]), np.empty(4)
+    mujoco.mju_quatIntegrate(rotation, vector, 1.0)
+    mujoco.mju_mulQuat(result, orientation, rotation)
+    mujoco.mju_normalize4(result)
+    return result

@@ -18,10 +18,9 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.physical.environment_robot import EnvironmentRobot
+from selfmodel.physical.environment import EnvironmentRobot, StepTimer
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
-from selfmodel.physical.simulated_robot import SimulatedRobot
-from selfmodel.physical.step_timing import StepTimer
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.robot.robot import Robot

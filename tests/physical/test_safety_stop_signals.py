@@ -18,8 +18,7 @@ import pytest
 
 import selfmodel
 from selfmodel.logs.verify import verify
-from selfmodel.physical import stop_signals
-from selfmodel.physical.stop_signals import (
+from selfmodel.physical.safety import (
     STOP_SIGNALS,
     HeldIterator,
     Terminated,
@@ -81,25 +80,6 @@ def test_a_held_signal_is_raised_before_code_that_may_block():
     assert done == []
 
 
-def test_a_signal_at_the_very_beginning_of_code_that_may_block_is_raised_before_it(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    done = []
-    original = stop_signals._Handler.raise_waiting
-
-    def raise_waiting(handler: stop_signals._Handler) -> None:
-        original(handler)
-        monkeypatch.undo()
-        signal.raise_signal(signal.SIGTERM)
-
-    with pytest.raises(Terminated), handle_stop_signals(), hold_stop_signals():  # noqa: PT012  # all of it is the promise
-        monkeypatch.setattr(stop_signals._Handler, "raise_waiting", raise_waiting)
-        with release_stop_signals():
-            done.append("driver")
-
-    assert done == []
-
-
 def test_a_signal_that_a_driver_catches_is_raised_after_it():
     done = []
     with pytest.raises(Terminated), handle_stop_signals(), hold_stop_signals():  # noqa: PT012  # all of it is the promise
@@ -131,7 +111,7 @@ def test_a_repetition_within_milliseconds_is_the_same_signal():
 def test_a_second_signal_ends_the_process_at_once(number: signal.Signals):
     code = (
         "import signal, time\n"
-        "from selfmodel.physical.stop_signals import handle_stop_signals\n"
+        "from selfmodel.physical.safety import handle_stop_signals\n"
         "with handle_stop_signals():\n"
         "    try:\n"
         f"        signal.raise_signal({number.value})\n"

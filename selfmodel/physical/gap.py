@@ -1,42 +1,47 @@
-"""Measurement noise of a physical robot: on the controller's readings and on logged signals."""
+"""Reality gap of a physical robot: its draw, and the noise of measurements.
 
-from typing import Protocol
+``simulation.reality_gap`` has the model with the factors of a gap, which ensembles of self-models
+share, and ``simulation.initial_pose`` the random initial poses.
+"""
 
-import mujoco
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy_reader import joint_limits
-from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.conditions import dead_sensors
+from selfmodel.simulation.initial_pose import rotated_by_vector
+from selfmodel.simulation.reality_gap import RealityGap, draw_gap_of
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, Signal
 
 
-class Measurement(Protocol):
-    """Measurement model: from true values to received readings and logged signals."""
+def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
+    """Returns a random reality gap for a robot; see ``draw_gap_of``.
+
+    Args:
+        robot: The robot as its model describes it.
+        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
+        rng: Random numbers of the gap.
+
+    Raises:
+        InputError: The level is out of range.
+    """
+    return draw_gap_of(robot.model, robot.anatomy, level, rng)
+
+
+class Measurement:
+    """Measurements without noise, from true values to received readings and logged signals."""
 
     def corrupt_readings(self, readings: FloatArray) -> None:
         """Replaces true readings, ``(sensors,)``, by the readings that the controller receives."""
-        ...
-
-    def measure(self, signal: Signal, values: FloatArray) -> FloatArray:
-        """Returns the logged row of a signal, ``(width,)``; it may be ``values`` itself."""
-        ...
-
-
-class ExactMeasurement:
-    """Noise-free measurements."""
-
-    def corrupt_readings(self, readings: FloatArray) -> None:
-        """Leaves the readings unchanged."""
 
     def measure(self, _signal: Signal, values: FloatArray) -> FloatArray:
-        """Returns the values unchanged."""
+        """Returns the logged row of a signal, ``(width,)``; it may be ``values`` itself."""
         return values
 
 
-class NoisyMeasurement:
+class NoisyMeasurement(Measurement):
     """Measurements with white noise in proportion to the full scale of each signal.
 
     An angle reading has normal noise with a standard deviation of ``level`` (half of the range is a
@@ -80,27 +85,3 @@ class NoisyMeasurement:
         joints = signal == "joint_positions"
         scale = self._half_ranges if joints else MEASUREMENT_FULL_SCALES[signal]
         return np.asarray(values + self._level * scale * self._rng.standard_normal(values.shape))
-
-
-def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
-    """Returns a mask of the sensors without any signal, ``(sensors,)``.
-
-    The sensor of a joint that is welded at 0 reads 0 too, but is not dead.
-    """
-    model = embodiment.model
-    welded = [
-        bool(sensor.hinge)
-        and bool(model.dof_armature[model.joint(sensor.hinge).dofadr[0]] == WELD_ARMATURE)
-        for sensor in anatomy.sensors
-    ]
-    silent = (embodiment.gain == 0) & (embodiment.offset == 0)
-    return np.asarray(silent & ~np.array(welded, dtype=bool))
-
-
-def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray:
-    """Returns an orientation (w x y z) rotated by a rotation vector in the body frame, rad."""
-    rotation, result = np.array([1.0, 0, 0, 0]), np.empty(4)
-    mujoco.mju_quatIntegrate(rotation, vector, 1.0)
-    mujoco.mju_mulQuat(result, orientation, rotation)
-    mujoco.mju_normalize4(result)
-    return result

@@ -12,9 +12,8 @@ import pytest
 
 from selfmodel.errors import InputError, TrialError
 from selfmodel.logs.verify import verify
-from selfmodel.physical.environment_robot import EnvironmentRobot
-from selfmodel.physical.stop_signals import Terminated
-from selfmodel.physical.watchdog import Watchdog
+from selfmodel.physical.environment import EnvironmentRobot
+from selfmodel.physical.safety import Terminated, Watchdog
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.bench import CONTROLLER, QUADRUPED, STEPS, Bench, bench_robot, driven, logged
 

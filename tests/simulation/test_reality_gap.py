@@ -11,16 +11,16 @@ from hypothesis import given, settings, strategies as st
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.notation import parse
-from selfmodel.physical.reality_gap import (
+from selfmodel.physical.gap import draw_gap
+from selfmodel.recovery.random_streams import gap_stream
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.reality_gap import (
     MAX_EXTRA_DELAY,
     MAX_GAP_LEVEL,
     MIN_FACTOR,
     RealityGap,
-    draw_gap,
     perturbed_model,
 )
-from selfmodel.recovery.random_streams import gap_stream
-from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_controllers

@@ -59,20 +59,6 @@ class RealityGap:
         return dataclasses.asdict(self)
 
 
-def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
-    """Returns a random reality gap for a robot; see ``draw_gap_of``.
-
-    Args:
-        robot: The robot as its model describes it.
-        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
-        rng: Random numbers of the gap.
-
-    Raises:
-        InputError: The level is out of range.
-    """
-    return draw_gap_of(robot.model, robot.anatomy, level, rng)
-
-
 def draw_gap_of(
     model: mujoco.MjModel, anatomy: Anatomy, level: float, rng: np.random.Generator
 ) -> RealityGap:
@@ -162,7 +148,10 @@ def perturbed_models(
         level: Level of the gaps.
     """
     rng, model = np.random.default_rng(members), compile_model(robot, spec_part)
-    return tuple(perturbed_model(model, draw_gap(robot, level, rng)) for _ in range(members))
+    return tuple(
+        perturbed_model(model, draw_gap_of(robot.model, robot.anatomy, level, rng))
+        for _ in range(members)
+    )
 
 
 def _factor(spread: float, normal: FloatArray) -> FloatArray:

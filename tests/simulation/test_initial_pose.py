@@ -8,14 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.physical.initial_pose import (
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import signal_fields
+from selfmodel.simulation.initial_pose import (
     ANGLE_DEVIATION,
     TILT_DEVIATION,
     randomize_initial_pose,
     start_spread,
 )
-from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import signal_fields
 from selfmodel.tasks import ROBOTS
 
 QUADRUPED = ROBOTS["quadruped"].robot()

@@ -1,5 +1,6 @@
 """Physical robot behind a ``dm_env.Environment``, such as real hardware."""
 
+import math
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -13,19 +14,25 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
-from selfmodel.physical.cleanup import Cleanup
-from selfmodel.physical.safety_limits import Limit
-from selfmodel.physical.step_timing import TIMESTAMP, StepTimer
-from selfmodel.physical.stop_signals import HeldIterator, release_stop_signals
-from selfmodel.physical.watchdog import HangError, Watchdog
+from selfmodel.physical.safety import (
+    HangError,
+    HeldIterator,
+    Limit,
+    Watchdog,
+    cleanup,
+    release_stop_signals,
+)
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.behaviour import Sample, StepTiming
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an
 optional ``time``. Absent signals and NaN count as not observed; None if there is no observation."""
+
+TIMESTAMP = "time"
+"""Optional key of an observation, beside the signals: its time by the robot's clock, s."""
 
 Call = Callable[[str, Callable[[], Any]], Any]
 """Function that calls a named function of the driver, and returns its result."""
@@ -79,7 +86,7 @@ class EnvironmentRobot:
             Before ``reset`` and after the last step of an episode, a ``dm_env`` environment ignores
             the targets and resets, so the robot then moves to its initial pose.
         safe: Safe motor targets, ``(motors,)``; by default 0, clipped to the range of each motor.
-        limits: Safety limits, such as those of ``physical.safety_limits``. Their signals are
+        limits: Safety limits, such as ``joint_limits`` and ``tilt_limit``. Their signals are
             required, as the controller's readings are.
         critical: Signals that must not be NaN in an observation that arrived.
         patience: Consecutive steps for which a required signal may be missing.
@@ -157,7 +164,7 @@ class EnvironmentRobot:
 
     def _run(self, controller: CommandSource, steps: int) -> Generator[Sample, None, None]:
         # The safe command comes before the watchdog waits for a driver that hangs.
-        with self._driver() as call, Cleanup(self._make_safe):  # after programming errors too
+        with self._driver() as call, cleanup(self._make_safe):  # after programming errors too
             self._make_safe()
             yield from self._steps(call, controller, steps)
 
@@ -181,7 +188,7 @@ class EnvironmentRobot:
             self._send_safe()
         except (KeyboardInterrupt, SystemExit):
             # From the caller's own handler of a signal: it must not prevent the safe command.
-            with Cleanup(self._send_safe):
+            with cleanup(self._send_safe):
                 raise
 
     def _send_safe(self) -> None:
@@ -319,3 +326,52 @@ def _rows(names: Names, observation: Mapping[str, Any]) -> dict[Signal, FloatArr
 
 def _type_and_message(error: Exception) -> str:
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+class StepTimer:
+    """Computes the timing of each control step.
+
+    If the first observation has a timestamp, all times are timestamps of observations; otherwise
+    all times are readings of the clock.
+
+    Args:
+        timestep: Control time step, s.
+        tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
+    """
+
+    def __init__(self, timestep: float, tolerance: float) -> None:
+        self._timestep, self._tolerance = timestep, tolerance
+        self._origin = self._last_elapsed = math.nan
+        self._steps_since_last = 0
+        self._has_timestamps = False
+
+    def update(self, now: float, observation: Mapping[str, Any] | None) -> StepTiming:
+        """Returns the timing of the next step.
+
+        An observation that is not newer than the previous observation is a repetition, and counts
+        as missing.
+
+        Args:
+            now: Reading of the clock, s.
+            observation: The observation; None if there is no observation.
+        """
+        timestamp = float("nan" if observation is None else observation.get(TIMESTAMP, "nan"))
+        if math.isinf(timestamp):  # a log cannot contain an infinite time
+            timestamp = math.nan
+        if math.isnan(self._origin):
+            self._has_timestamps = not math.isnan(timestamp)
+            self._origin = timestamp if self._has_timestamps else now
+        elapsed = (timestamp if self._has_timestamps else now) - self._origin
+        self._steps_since_last += 1
+        if math.isnan(elapsed) or (self._has_timestamps and elapsed <= self._last_elapsed):
+            # The time of an observation without a timestamp is unknown.
+            unknown = math.isnan(elapsed) and observation is not None
+            return StepTiming(math.nan, late=unknown, missing=not unknown)
+        deviation = abs(elapsed - self._last_elapsed - self._steps_since_last * self._timestep)
+        self._last_elapsed, self._steps_since_last = elapsed, 0
+        # The deviation of the first step is NaN, which is never late.
+        return StepTiming(
+            elapsed,
+            late=deviation > self._tolerance * self._timestep,
+            missing=observation is None,
+        )

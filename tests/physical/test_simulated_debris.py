@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.notation import parse
-from selfmodel.physical.debris import place_debris
-from selfmodel.physical.reality_gap import DEBRIS_PREFIX, draw_gap
-from selfmodel.physical.simulated_robot import SimulatedRobot
+from selfmodel.physical.gap import draw_gap
+from selfmodel.physical.simulated import SimulatedRobot, place_debris
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields
+from selfmodel.simulation.reality_gap import DEBRIS_PREFIX
 from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_controllers
 
@@ -146,12 +146,13 @@ def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
         place_debris(model, data, limbs)
         starts.append(data)
 
-    monkeypatch.setattr("selfmodel.physical.simulated_robot.place_debris", watched)
+    monkeypatch.setattr("selfmodel.physical.simulated.place_debris", watched)
     physical = broken(quadruped, "break:front_left_shoulder", 0.3)
     (controller,) = random_controllers(quadruped, 1)
     next(iter(physical.run(controller, 3)))
+    mujoco.mj_forward(physical._embodiment.model, starts[-1])
     for body in ("front_left_upper", "front_left_lower"):
-        lost, left = starts[0].body(DEBRIS_PREFIX + body), starts[0].body(body)
+        lost, left = starts[-1].body(DEBRIS_PREFIX + body), starts[-1].body(body)
         np.testing.assert_allclose(lost.xpos, left.xpos, atol=1e-9)
         np.testing.assert_allclose(lost.xmat, left.xmat, atol=1e-9)
-    assert starts[0].joint("front_left_knee").qpos[0] != 0
+    assert starts[-1].joint("front_left_knee").qpos[0] != 0

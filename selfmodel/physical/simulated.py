@@ -1,0 +1,222 @@
+"""Simulated physical robot: hidden faults, a reality gap, and debris of its detached limbs."""
+
+import dataclasses
+from collections.abc import Iterator
+from functools import partial
+
+import mujoco
+import numpy as np
+
+from selfmodel.controllers.controller import CommandSource
+from selfmodel.errors import TrialError
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.joints import BROKEN
+from selfmodel.physical.gap import Measurement, NoisyMeasurement
+from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import BASE_SIGNALS
+from selfmodel.simulation.initial_pose import randomize_initial_pose, start_spread
+from selfmodel.simulation.reality_gap import DEBRIS_PREFIX, RealityGap, perturbed_model
+from selfmodel.simulation.rollout import Rollout
+from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.signals import SIGNALS
+
+OWN_SEED = 1
+"""Seed of the randomness of a fault, such as terrain, in a physical robot without a gap; the
+self-model's seed is 0."""
+
+CONTACT_MEMORY = 4 * 2**20
+"""Size of MuJoCo's arena for the contacts of a robot with its debris, bytes."""
+
+
+class SimulatedRobot:
+    """Simulated physical robot with a hidden fault.
+
+    Args:
+        robot: The robot as its model describes it.
+        hidden: Hidden faults of the physical robot, as a hypothesis.
+        gap: Reality gap; None or a level of 0 for no gap.
+        stream: Number of the robot's random number stream among those of the gap's seed. Robots
+            that share a gap, such as one robot before and after its failure, have different
+            streams.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        hidden: Hypothesis = INTACT,
+        gap: RealityGap | None = None,
+        stream: int = 0,
+    ) -> None:
+        self._robot = robot
+        self._gap = gap if gap is not None and gap.level > 0 else None
+        self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
+        seed = gap.seed if gap else OWN_SEED
+        self._embodiment = physical_embodiment(robot, hidden, seed, self._gap)
+        self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
+
+    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
+        """Runs a controller; see ``PhysicalRobot``.
+
+        Without a gap, the samples are bit-identical to the ``Simulator``'s, unless the fault is
+        random, such as terrain, which differs from the self-model's. With a gap, each run has the
+        next random number stream: two runs differ, and the n-th runs of two robots with the same
+        seed are bit-identical.
+
+        Raises:
+            TrialError: The simulation diverged.
+            InputError: MuJoCo cannot simulate the model.
+        """
+        (child,) = self._noise.spawn(1)
+        return self._run(child, controller, steps)
+
+    def _run(
+        self, child: np.random.SeedSequence, controller: CommandSource, steps: int
+    ) -> Iterator[Sample]:
+        robot, embodiment, gap = self._robot, self._embodiment, self._gap
+        measurement, start = Measurement(), None
+        if gap is not None:
+            (own,) = child.spawn(1)
+            embodiment = dataclasses.replace(embodiment, seed=int(own.generate_state(1)[0]))
+            rng = np.random.default_rng(child)
+            measurement = NoisyMeasurement(gap.level, robot, embodiment, rng)
+            data = mujoco.MjData(embodiment.model)
+            spread = start_spread(gap.level)
+            randomize_initial_pose(robot, embodiment.model, data, spread, rng)
+            place_debris(embodiment.model, data, self._limbs)
+            start = data.qpos[np.newaxis]
+        rollout = Rollout(
+            robot,
+            [embodiment],
+            [controller],
+            SIGNALS,
+            start=start,
+            disturb=lambda readings: measurement.corrupt_readings(readings[0]),
+            added_delay=0 if gap is None else gap.delay,
+        )
+        # The pose of a fixed base is known, so no sensor measures it.
+        known = BASE_SIGNALS if robot.has_fixed_base else ()
+        for k in rollout.steps(steps):
+            if rollout.diverged()[0]:
+                raise TrialError(
+                    f"the simulation of the physical robot diverged after step {max(0, k - 1)}: "
+                    f"its model is unstable under this controller; try a smaller physics time step"
+                )
+            true = {signal: rollout.live[signal]()[0] for signal in SIGNALS}
+            yield Sample(
+                time=k * robot.control_timestep,
+                values={
+                    signal: (row if signal in known else measurement.measure(signal, row)).copy()
+                    for signal, row in true.items()
+                },
+            )
+
+
+def physical_embodiment(
+    robot: Robot, hidden: Hypothesis, seed: int, gap: RealityGap | None = None
+) -> Embodiment:
+    """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
+
+    Args:
+        robot: The robot as its model describes it.
+        hidden: Hidden faults of the physical robot, as a hypothesis.
+        seed: Seed of the random parts of the faults.
+        gap: Reality gap with a level above 0; None for no gap.
+    """
+    if gap is None:
+        return build(robot, hidden, seed)
+    limbs = detached_limbs(robot, hidden)
+    edits = [partial(add_debris, limbs=limbs)] if limbs else []
+    return build(robot, hidden, seed, edits=edits, perturb=partial(perturbed_model, gap=gap))
+
+
+def detached_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
+    """Returns the root body of each limb that a hypothesis detaches, in the order of its faults."""
+    limbs = []
+    for fault in hidden.faults:
+        if fault.kind is BROKEN:
+            bodies = robot.anatomy.joint(fault.part).bodies
+            limbs.append(min(bodies, key=lambda name: int(robot.model.body(name).id)))
+    return tuple(limbs)
+
+
+def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
+    """Adds a free copy of each limb to a physical robot's model, after all other bodies.
+
+    The robot's own limb remains as a detached body, so that the layout of the logged signals is
+    unchanged. The copy has no motors, tendons and sensors, and its joints are free. The copy
+    collides with the ground, the robot and other debris, but not with a body that it overlaps at
+    the start: the contact force would throw the copy away.
+
+    Args:
+        spec: The model; it is changed.
+        limbs: Root body of each limb.
+    """
+    bare = spec.copy()
+    for parts in (bare.actuators, bare.sensors, bare.equalities, bare.tendons):
+        for part in list(parts):
+            bare.delete(part)
+    # _overlapping_pairs computes the excluded pairs anew.
+    for parts in (bare.excludes, bare.pairs):
+        for part in list(parts):
+            bare.delete(part)
+    for k, limb in enumerate(limbs):
+        _add_limb(spec, bare, limb, k)
+    spec.memory = max(spec.memory, CONTACT_MEMORY)
+    for first, second in _overlapping_pairs(spec, limbs):
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+
+
+def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) -> None:
+    """Adds a free copy of a limb, taken from a robot without motors and sensors."""
+    # Every attachment has copies of its materials and meshes: a prefix per limb keeps them apart.
+    prefix = f"{DEBRIS_PREFIX}{number}_"
+    spec.worldbody.add_frame().attach_body(bare.copy().body(limb), prefix, "")
+    root = spec.body(prefix + limb)
+    for part in (root, *(p for kind in ("body", "joint", "geom") for p in root.find_all(kind))):
+        part.name = part.name.replace(prefix, DEBRIS_PREFIX, 1)
+    for joint in list(root.joints):
+        spec.delete(joint)
+    root.add_freejoint(name=DEBRIS_PREFIX + limb)
+    affinities = 0
+    for geom in bare.geoms:
+        affinities |= int(geom.conaffinity)
+    for geom in root.find_all("geom"):
+        if geom.contype or geom.conaffinity:
+            geom.contype |= affinities
+            geom.conaffinity |= affinities
+
+
+def _overlapping_pairs(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Returns the pairs of a body and a debris body that overlap when the limbs are detached."""
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    place_debris(model, data, limbs)
+    mujoco.mj_forward(model, data)
+    geoms = data.contact.geom[data.contact.dist < 0]
+    pairs = np.unique(np.sort(model.geom_bodyid[geoms], axis=1), axis=0)
+    # Debris has the highest body numbers, so the second of a pair; the world is body 0.
+    return [
+        (model.body(first).name, model.body(second).name)
+        for first, second in pairs
+        if first != 0 and model.body(second).name.startswith(DEBRIS_PREFIX)
+    ]
+
+
+def place_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
+    """Sets the pose of each debris body to the pose of the limb that the body is a copy of.
+
+    Args:
+        model: Model of a physical robot with debris.
+        data: State of the model; the positions of the debris are written.
+        limbs: Root body of each limb.
+    """
+    mujoco.mj_kinematics(model, data)
+    for limb in limbs:
+        body = data.body(limb)
+        data.joint(DEBRIS_PREFIX + limb).qpos[:] = np.concatenate([body.xpos, body.xquat])
+    for j in range(model.njnt):
+        name = model.joint(j).name
+        if name.startswith(DEBRIS_PREFIX) and model.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE:
+            data.joint(j).qpos[:] = data.joint(name.removeprefix(DEBRIS_PREFIX)).qpos
