@@ -20,7 +20,6 @@ from selfmodel.diagnosis.comparator import Comparator, PiecewiseTrial
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.evidence import simulate
 from selfmodel.experiments.ablation.bank import gait
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
@@ -29,6 +28,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Stage, Trial, TrialPlan

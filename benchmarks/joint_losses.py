@@ -19,13 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
+from selfmodel import arguments
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.evidence import Evidence
 from selfmodel.diagnosis.joint_losses import JointLosses
 from selfmodel.diagnosis.search.severity import with_fitted_severity
 from selfmodel.diagnosis.verdicts.significance import paired_z
-from selfmodel.experiments import trial_logs
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault
@@ -105,9 +105,9 @@ def imported(folder: Path) -> Recording:
                 check=True,
                 capture_output=True,
             )
-        logs = trial_logs.logs(paths)
+        logs = arguments.read_logs(paths)
     before, after = (log.trial for log in logs)
-    robot = calibrate(trial_logs.robot_of_logs(logs, None), [before], 1).robot
+    robot = calibrate(arguments.robot_of_logs(logs, None), [before], 1).robot
     return Recording(
         evidence=Evidence(Simulator(robot, 1), SEGMENT_PREDICTION),
         space=HypothesisSpace.of(ALL_KINDS, robot.anatomy),

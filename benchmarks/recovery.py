@@ -16,10 +16,10 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs.journal import create_journal

@@ -10,14 +10,13 @@ import sys
 from gravity import GRAVITY
 from heading_comparator import HEADING
 
-from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.robots import common_robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.testing import check_comparator, check_fault_kind, shown
 
 log = read_log(sys.argv[1])
 robot, trial = common_robot([log]), log.trial

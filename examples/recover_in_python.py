@@ -6,8 +6,8 @@ Usage: python examples/recover_in_python.py RUN_FOLDER
 import sys
 from pathlib import Path
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner

@@ -1,19 +1,17 @@
-from .controllers.controller import Controller as Controller
-from .diagnosis.comparator import Comparator as Comparator
-from .diagnosis.comparator_contract import check_comparator as check_comparator
-from .diagnosis.diagnosis import Diagnosis as Diagnosis
-from .diagnosis.kind_contract import check_fault_kind as check_fault_kind
-from .experiments.api import (
+from .api import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
     recover as recover,
     replay as replay,
     run_trial as run_trial,
+    simulated_robot as simulated_robot,
     write_log as write_log,
 )
-from .experiments.arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
-from .experiments.reality import simulated_robot as simulated_robot
+from .arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
+from .controllers.controller import Controller as Controller
+from .diagnosis.comparator import Comparator as Comparator
+from .diagnosis.diagnosis import Diagnosis as Diagnosis
 from .faults.hypothesis import Hypothesis as Hypothesis
 from .faults.kind import FaultKind as FaultKind
 from .faults.registry import ALL_KINDS as ALL_KINDS, PAPER_KINDS as PAPER_KINDS
@@ -24,6 +22,7 @@ from .recovery.recovery import Recovery as Recovery
 from .robot.robot import Robot as Robot
 from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator
+from .testing import check_comparator as check_comparator, check_fault_kind as check_fault_kind
 from .trials.behaviour import Behaviour as Behaviour
 from .trials.trial import Trial as Trial
 from .version import __version__ as __version__

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.lab_robots.study import folder_of
+from selfmodel.arguments import robot_entry
 from selfmodel.experiments.grid import finished
-from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log

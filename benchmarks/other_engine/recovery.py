@@ -11,7 +11,6 @@ from benchmarks.other_engine.damage import Damage, damage_of
 from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
 from benchmarks.other_engine.reality import draw_reality
 from selfmodel.errors import WorkError, describe
-from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.recovery import Recovery
@@ -19,6 +18,7 @@ from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import is_correct
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import forward_displacement
 from selfmodel.version import __version__

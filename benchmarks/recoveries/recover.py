@@ -6,15 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import AUTO, comparator_choice
-from selfmodel.experiments.experiment import Experiment, run
+from selfmodel import plugins
+from selfmodel.arguments import AUTO, comparator_choice
 from selfmodel.experiments.grid import Cell
-from selfmodel.experiments.plugins import DEFAULT_SCORES
 from selfmodel.experiments.study.gaits import read_gait, write_gait
 from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.plugins import DEFAULT_SCORES
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.recovery.scores.upright import UPRIGHT
@@ -22,6 +21,7 @@ from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import Experiment, run
 
 SCORES = {score.name: score for score in (UPRIGHT, DISPLACEMENT)}
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel import arguments
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
     Json,
@@ -18,7 +19,6 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
-from selfmodel.experiments import trial_logs
 from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
@@ -52,8 +52,8 @@ def calibrate(
         raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    logs = trial_logs.logs(files)
-    before = trial_logs.robot_of_logs(logs, robot)
+    logs = arguments.read_logs(files)
+    before = arguments.robot_of_logs(logs, robot)
     _refuse_assets(before, robot or str(files[0]))
     trials = [log.trial for log in logs]
     fit = fit_to(before, trials, thread_count(threads))

@@ -4,6 +4,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from selfmodel import plugins
+from selfmodel.arguments import AUTO, comparator_choice
 from selfmodel.cli.arguments.options import (
     DEFAULT_KIND_NAMES,
     Calibrated,
@@ -30,8 +32,6 @@ from selfmodel.diagnosis.sentences import (
 )
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.verdicts.direct_evidence import direct_evidence
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.files import file_digest
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.trials.trial import trial_names

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from selfmodel import arguments
+from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_notes
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator_choice import ComparatorChoice
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.experiments import trial_logs
-from selfmodel.experiments.log_diagnosis import LogDiagnosis, by_stage, set_up_diagnosis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs import TrialLog
 from selfmodel.recovery.sequential_diagnosis import diagnose_trials
@@ -71,8 +71,8 @@ def diagnose_logs(
     Raises:
         InputError: A log cannot be used, or no comparator can judge all trials.
     """
-    logs = trial_logs.logs(files)
-    model = trial_logs.robot_of_logs(logs, robot)
+    logs = arguments.read_logs(files)
+    model = arguments.robot_of_logs(logs, robot)
     failed, healthy = by_stage([log.trial for log in logs])
     used = [log for log in logs if log.trial in failed]
     set_up = partial(

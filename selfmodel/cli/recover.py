@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from selfmodel import arguments, plugins
+from selfmodel.arguments import AUTO, comparator_choice, repertoire_of
 from selfmodel.cli.arguments import inputs
 from selfmodel.cli.arguments.options import (
     DEFAULT_KIND_NAMES,
@@ -45,10 +47,6 @@ from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import facts, print_report, result_file
 from selfmodel.controllers.controller import check_silent_neurons
-from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.arguments import AUTO, comparator_choice, repertoire_of
-from selfmodel.experiments.chosen_score import choose_score
-from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
@@ -59,6 +57,8 @@ from selfmodel.report.run_folder import subject_of_run
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
+from selfmodel.studies.experiment import Experiment, run
+from selfmodel.studies.scores import choose_score
 from selfmodel.trials.trial import Trial
 
 
@@ -113,7 +113,7 @@ def recover(
     The physical robot is a simulated one with the failure of --case or --damage, which the
     algorithm does not read. Every physical trial becomes a log in the folder of the run.
     """
-    entry = robots.robot_entry(robot, model_settings or ())
+    entry = arguments.robot_entry(robot, model_settings or ())
     considered = plugins.kinds(kinds)
     damaged = inputs.case_notation(entry.cases, case, damage)
     made = entry.robot()

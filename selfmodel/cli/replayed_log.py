@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmodel.experiments import plugins, trial_logs
+from selfmodel import arguments, plugins
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
@@ -37,7 +37,7 @@ def replayed_log(file: Path, hypothesis: str, *, kinds: str, model: str | None) 
     Raises:
         InputError: The log, the hypothesis or the model cannot be used.
     """
-    (log,) = trial_logs.logs([file])
-    robot = trial_logs.robot_of_logs([log], model)
+    (log,) = arguments.read_logs([file])
+    robot = arguments.robot_of_logs([log], model)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(kinds)).parse(hypothesis)
     return ReplayedLog(log, robot, assumed)

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from selfmodel import plugins
+from selfmodel.arguments import AUTO, comparator_choice
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
     DEFAULT_KIND_NAMES,
@@ -22,8 +24,6 @@ from selfmodel.cli.arguments.options import (
 from selfmodel.cli.diagnosed_logs import diagnose_logs
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.errors import InputError, WorkError
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, write_new

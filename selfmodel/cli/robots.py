@@ -4,11 +4,11 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel.arguments import is_model, notes_on, robot_entry
 from selfmodel.cli.arguments.options import Json, ModelSettings
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.robot_parts import parts, print_parts
 from selfmodel.cli.output.tables import folding, print_tables
-from selfmodel.experiments.robots import is_model, notes_on, robot_entry
 from selfmodel.robot.designs import network_for
 from selfmodel.tasks import ROBOTS, Entry
 

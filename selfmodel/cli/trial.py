@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from selfmodel import arguments, plugins
 from selfmodel.cli.arguments import inputs
 from selfmodel.cli.arguments.options import (
     ControllerSource,
@@ -22,8 +23,6 @@ from selfmodel.cli.arguments.options import (
 )
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
-from selfmodel.experiments import plugins, robots, trial_logs
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.logs.atomic import partial_path
@@ -31,6 +30,7 @@ from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trial import TrialPlan
 
 
@@ -51,7 +51,7 @@ def trial(
 ) -> None:
     """Run one trial of the simulated physical robot and write its log."""
     kind = "network" if controller is None else str(controller)
-    made = robots.robot_entry(robot, model_settings or ()).robot()
+    made = arguments.robot_entry(robot, model_settings or ()).robot()
     inputs.check_log_name(out)
     hidden = HypothesisSpace(made.anatomy, plugins.kinds(kinds)).parse(
         "intact" if damage is None else damage
@@ -61,7 +61,7 @@ def trial(
         design = plugins.design(kind, made, neurons)
         driver = Controller(design, draw_genomes(np.random.default_rng(seed), (design.weights,)))
     else:
-        driver = trial_logs.controller(Path(kind), made, neurons)
+        driver = arguments.read_controller(Path(kind), made, neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=steps)
     plan = TrialPlan("trial", inputs.stage(stage), driver, settings.steps, seed)

@@ -49,7 +49,7 @@ class PreparedTrial(Protocol):
 
         Returns:
             ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
-            that reproduces the trial, as ``comparator_contract.shown`` returns.
+            that reproduces the trial, as ``selfmodel.testing.shown`` returns.
         """
         ...
 
@@ -120,7 +120,7 @@ class Comparator(Protocol):
     """A distance between simulated behaviour and a logged trial.
 
     A plug-in is an object with these members; no base class is required.
-    ``comparator_contract.check_comparator`` tests conformance.
+    ``selfmodel.testing.check_comparator`` tests conformance.
     """
 
     @property

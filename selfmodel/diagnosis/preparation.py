@@ -65,7 +65,7 @@ def contract_error(comparator: Comparator, problem: str) -> InputError:
     """Returns the error for a comparator that breaks its contract."""
     return InputError(
         f"the comparator {comparator.name!r} {problem}: run "
-        f"selfmodel.diagnosis.comparator_contract.check_comparator on it"
+        f"selfmodel.testing.check_comparator on it"
     )
 
 

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from selfmodel import arguments
+from selfmodel.api import by_stage
+from selfmodel.arguments import AUTO, comparator_choice, fitted
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
-from selfmodel.experiments import trial_logs
-from selfmodel.experiments.arguments import AUTO, comparator_choice
-from selfmodel.experiments.fitting import fitted
-from selfmodel.experiments.log_diagnosis import by_stage
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.journal import (
     DIAGNOSES,
@@ -60,8 +59,8 @@ def subject_of_run(
     paths = sorted((folder / TRIALS).glob("*.mcap"), key=trial_order)
     if not paths:
         raise InputError(f"{folder}: expected the folder of a run with logs in {TRIALS}, got none")
-    logs = trial_logs.logs(paths)
-    robot = trial_logs.robot_of_logs(logs, None)
+    logs = arguments.read_logs(paths)
+    robot = arguments.robot_of_logs(logs, None)
     result = read_run_result(folder)
     space = recorded_space(folder / RESULT, robot, result.kinds if result else (), kinds)
     diagnoses = read_diagnoses(folder, space)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.experiments.arguments import load_robot
+from selfmodel.arguments import load_robot
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.repertoires import save_repertoire
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation

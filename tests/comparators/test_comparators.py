@@ -8,7 +8,6 @@ import pytest
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.diagnosis.evidence import Evidence, simulate
 from selfmodel.diagnosis.verdicts.significance import NEGLIGIBLE_LOSS
 from selfmodel.errors import InputError
@@ -17,6 +16,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial, TrialPlan

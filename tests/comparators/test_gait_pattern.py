@@ -6,8 +6,8 @@ from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import GAIT_PATTERN
 from selfmodel.comparators.gait_features import LARGE_DIFFERENCES
-from selfmodel.diagnosis.comparator_contract import check_comparator
 from selfmodel.errors import InputError
+from selfmodel.testing import check_comparator
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
 

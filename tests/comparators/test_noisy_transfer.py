@@ -6,9 +6,9 @@ from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import NOISY_TRANSFER
 from selfmodel.comparators.noisy_transfer import WINDOW
-from selfmodel.diagnosis.comparator_contract import check_comparator, shown
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Ensemble
+from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.behaviour import Behaviour
 from tests.helpers.gaits import TROT, batch, changed, gait, logged
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.comparators.encoder_motion import encoder_motion_loss, logged_motion
 from selfmodel.comparators.segment_prediction import CONTRADICTION
-from selfmodel.diagnosis.comparator_contract import shown
+from selfmodel.testing import shown
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES

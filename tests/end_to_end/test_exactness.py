@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel import arguments
 from selfmodel.controllers.playback import played_back
-from selfmodel.experiments import robots
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
@@ -142,7 +142,7 @@ def test_prediction_is_exact_under_a_fault(truth: str, tmp_path: Path):
     ],
 )
 def test_prediction_is_exact_for_a_body_of_the_suite_in_its_own_environment(name: str):
-    entry = robots.robot_entry(name)
+    entry = arguments.robot_entry(name)
     robot = entry.robot()
     check(name, measured(robot))
 

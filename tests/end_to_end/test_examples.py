@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.comparator_contract import check_comparator
 from selfmodel.logs.journal import is_calibrated
+from selfmodel.testing import check_comparator
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
 

@@ -10,11 +10,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from selfmodel import arguments, plugins
+from selfmodel.arguments import kinds_of
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.arguments import kinds_of
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind
@@ -31,6 +30,7 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.testing import check_fault_kind
 from tests.helpers.drivers import random_motion
 
 
@@ -151,7 +151,7 @@ def test_the_contract_kit_sees_a_kind_of_joints_with_other_parts(quadruped: Robo
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
-    robot = robots.robot("quadruped", 0.01)
+    robot = arguments.unadapted_robot("quadruped", 0.01)
 
     def wrong(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
         robot.model.body_mass[1] = 5.0

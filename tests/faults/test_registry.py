@@ -7,7 +7,6 @@ import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.kind_contract import check_fault_kind
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
@@ -24,6 +23,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.testing import check_fault_kind
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_controllers

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.comparators.command_errors import command_errors
 from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
-from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import create_journal

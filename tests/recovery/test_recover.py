@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Draw, Evolution, Generation
-from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse

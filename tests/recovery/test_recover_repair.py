@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
-from selfmodel.experiments.arguments import comparator_choice
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel.arguments import fitted
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
-from selfmodel.experiments.fitting import fitted
 from selfmodel.logs.journal import OPTIONS
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.report.recorded.logs_subject import subject_of_logs

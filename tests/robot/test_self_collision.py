@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.experiments.robots import robot_entry
+from selfmodel.arguments import robot_entry
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.self_collision import penetration_depths

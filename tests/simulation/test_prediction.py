@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from selfmodel import arguments
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.experiments import robots
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.notation import parse
@@ -137,7 +137,7 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
 
 def test_a_lost_limb_rests_wherever_it_starts():
     # The hopper's knee starts beyond its limit, which would push it all through the trial.
-    robot = robots.robot_entry("suite-hopper-hop").robot()
+    robot = arguments.robot_entry("suite-hopper-hop").robot()
     broken = parse("break:knee", robot.anatomy)
     run, starts = trial(robot, broken), range(0, STEPS - HORIZON, 15)
     outcome = Simulator(robot, 1).predict([broken], cut(run, starts))

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
+from selfmodel import arguments
 from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.experiments import trial_logs
 from selfmodel.logs.export import export as write_table, writer_of
 from selfmodel.logs.files import refuse_existing
 
@@ -29,7 +29,7 @@ def export(
     """Write the signals of a trial log as a table: one row per control step."""
     writer_of(out)
     refuse_existing(out)
-    (found,) = trial_logs.logs([log])
+    (found,) = arguments.read_logs([log])
     behaviour = found.trial.behaviour
     names = write_table(out, behaviour)
     if as_json:

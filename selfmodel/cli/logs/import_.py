@@ -5,6 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
+from selfmodel import arguments
+from selfmodel.arguments import is_model
 from selfmodel.cli.arguments.inputs import check_log_name
 from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.plain import counted
@@ -12,8 +14,6 @@ from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
-from selfmodel.experiments import robots, trial_logs
-from selfmodel.experiments.robots import is_model
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.recordings.importer import Recording, import_recording, write_recording
 from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
@@ -71,7 +71,7 @@ def import_(
 
 
 def _suggestion(recording: Path, name: str) -> str:
-    made = robots.recorded_robot(name, None)
+    made = arguments.recorded_robot(name, None)
     return suggest_mapping(recording, made, name, with_timestep=is_model(name))
 
 
@@ -101,7 +101,7 @@ def _mapped_robot(mapping: RecordingMapping, folder: Path) -> Robot:
             ("robot",), f"{name} has no control time step: add control_timestep, s"
         )
     try:
-        return robots.recorded_robot(name if own else str(folder / name), timestep)
+        return arguments.recorded_robot(name if own else str(folder / name), timestep)
     except InputError as error:
         raise mapping.document.error(("robot",), str(error)) from error
 
@@ -110,7 +110,7 @@ def _controller(mapping: RecordingMapping, folder: Path, robot: Robot) -> Contro
     if mapping.controller is None:
         return None
     try:
-        return trial_logs.controller(folder / mapping.controller, robot)
+        return arguments.read_controller(folder / mapping.controller, robot)
     except InputError as error:
         raise mapping.document.error(("controller",), str(error)) from error
 

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from selfmodel import plugins
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_lines
 from selfmodel.cli.output.ranking import ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.sentences import confidence_sentence, right_or_wrong
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
-from selfmodel.experiments import plugins
-from selfmodel.experiments.experiment import Experiment, Outcome
 from selfmodel.files import file_digest
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
+from selfmodel.studies.experiment import Experiment, Outcome
 
 
 def print_report(found: dict[str, Any], folder: Path) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from selfmodel import arguments, plugins
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
     SEARCH,
@@ -20,7 +21,6 @@ from selfmodel.cli.arguments.options import (
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.repertoire.info import facts_of, print_facts
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins, robots
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.repertoires import save_repertoire
@@ -72,7 +72,7 @@ def make(
         raise InputError(f"--out needs a name that ends in .npz, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    made = robots.robot_entry(robot, model_settings or ()).robot()
+    made = arguments.robot_entry(robot, model_settings or ()).robot()
     simulator = Simulator(made, threads)
     repertoire = make_repertoire(
         made,

@@ -47,10 +47,10 @@ from selfmodel.experiments.comparison.tables import table_of_records
 from selfmodel.experiments.confidence_intervals import Interval
 from selfmodel.experiments.grid.checks import read_study
 from selfmodel.experiments.grid.executors import PROCESSES
-from selfmodel.experiments.plugins import PAPER
 from selfmodel.experiments.statistics import balance_warnings, imbalances
 from selfmodel.experiments.study.repair_cost import repair_cost
 from selfmodel.faults.registry import kind_names
+from selfmodel.plugins import PAPER
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 

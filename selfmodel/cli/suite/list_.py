@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from selfmodel.arguments import robot_entry
 from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
-from selfmodel.experiments.robots import robot_entry
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies
 from selfmodel.robot.designs import network_for
 

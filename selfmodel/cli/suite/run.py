@@ -38,13 +38,13 @@ from selfmodel.experiments.comparison.table_formats import Table, check_format
 from selfmodel.experiments.comparison.tables import table_of_records
 from selfmodel.experiments.grid.checks import read_study
 from selfmodel.experiments.grid.executors import PROCESSES
-from selfmodel.experiments.plugins import PAPER
 from selfmodel.experiments.study.repair_cost import repair_cost
 from selfmodel.experiments.suite.bodies import DOMAINS, bodies, tasks_of
 from selfmodel.experiments.suite.plan import Study, cells, known_cases
 from selfmodel.experiments.suite.results import write_results
 from selfmodel.experiments.suite.rows import Summary
 from selfmodel.faults.registry import kind_names
+from selfmodel.plugins import PAPER
 from selfmodel.settings import Settings
 
 COLUMNS = (

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from selfmodel import arguments
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments import robots, trial_logs
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.study.files import key_of
 from selfmodel.experiments.study.gaits import FILE, GAIT, GAITS
@@ -40,7 +40,9 @@ def gait(bank: Path, robot: str, number: int) -> Controller:
     Raises:
         InputError: The bank has no such gait, or the gait is for another robot.
     """
-    return trial_logs.controller(_path(bank, robot, number), robots.robot_entry(robot).robot())
+    return arguments.read_controller(
+        _path(bank, robot, number), arguments.robot_entry(robot).robot()
+    )
 
 
 def _path(bank: Path, robot: str, number: int) -> Path:

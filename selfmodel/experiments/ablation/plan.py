@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from selfmodel import arguments, plugins
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments import plugins, robots
 from selfmodel.experiments.ablation import bank
-from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.gaits import gait_cell
@@ -23,6 +22,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
+from selfmodel.studies.scores import check_score
 
 BANK = "bank"
 NEXT_TRIAL = (BANK, "repair", "disagreement")
@@ -228,7 +228,7 @@ def _gait(ablation: Ablation, robot: Mapping[str, str], number: int) -> Cell:
 
 
 def _failures(ablation: Ablation, robot: str) -> list[tuple[int | None, str]]:
-    entry = robots.robot_entry(robot)
+    entry = arguments.robot_entry(robot)
     anatomy = entry.robot().anatomy
     numbers = entry.cases if ablation.cases is None else ablation.cases
     cases: list[tuple[int | None, str]] = [(case, entry.cases[case]) for case in numbers]
@@ -248,7 +248,7 @@ def _check_names(ablation: Ablation) -> None:
     check_repair(ablation.repair, ablation.search)
     score = score_name(ablation.repair, ablation.score)
     for robot in ablation.robots:
-        entry = robots.robot_entry(robot)
+        entry = arguments.robot_entry(robot)
         check_score(score, entry)
         for case in ablation.cases or ():
             if case not in entry.cases:

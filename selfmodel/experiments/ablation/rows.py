@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from selfmodel.experiments.plugins import OWN_SEARCH, PAPER
+from selfmodel.plugins import OWN_SEARCH, PAPER
 
 
 @dataclass(frozen=True)

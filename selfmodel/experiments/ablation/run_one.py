@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from selfmodel import plugins
+from selfmodel.arguments import comparator_choice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.experiments import plugins
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.score_one import DiagnosisCost, row_of
 from selfmodel.experiments.ablation.trials import (
@@ -16,9 +17,6 @@ from selfmodel.experiments.ablation.trials import (
     read_trials,
     setting_of,
 )
-from selfmodel.experiments.arguments import comparator_choice
-from selfmodel.experiments.chosen_score import choose_score
-from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.study.files import as_dicts
 from selfmodel.experiments.study.gaits import read_gait
@@ -28,6 +26,8 @@ from selfmodel.recovery.sequential_diagnosis import diagnose_trials
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import Experiment, run
+from selfmodel.studies.scores import choose_score
 from selfmodel.trials.trial import Trial
 
 

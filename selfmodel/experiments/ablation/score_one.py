@@ -9,9 +9,9 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.experiments.ablation.rows import AblationRow
 from selfmodel.experiments.ablation.trials import Setting
-from selfmodel.experiments.scoring import is_correct
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import is_correct
 from selfmodel.trials.trial import Trial
 
 

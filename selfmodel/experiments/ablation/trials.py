@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmodel.experiments import plugins
+from selfmodel import plugins
 from selfmodel.experiments.ablation import bank
 from selfmodel.experiments.ablation.plan import BANK, HEALTHY_TRIALS, TRIALS
 from selfmodel.experiments.grid import Cell
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.study.gaits import read_gait
 from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -22,6 +21,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.tasks import Entry
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 

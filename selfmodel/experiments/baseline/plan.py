@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from selfmodel import arguments
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments import robots
 from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.planned_robots import planned
@@ -71,7 +71,7 @@ def check(study: BaselineStudy) -> None:
         if method not in BASELINES:
             raise unknown_name("baseline", method, BASELINES)
     for name in study.robots:
-        cases = robots.robot_entry(name).cases
+        cases = arguments.robot_entry(name).cases
         for case in study.cases:
             if case not in cases:
                 raise unknown_name(f"case of {name}", str(case), map(str, cases))
@@ -100,7 +100,7 @@ def cells(study: BaselineStudy, only: tuple[int, int] = (1, 1)) -> list[Cell]:
         parameters = {
             **planned_robots[name],
             "case": case,
-            "truth": robots.robot_entry(name).cases[case],
+            "truth": arguments.robot_entry(name).cases[case],
             "gap": gap,
             "shared": shared,
         }

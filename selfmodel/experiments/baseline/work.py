@@ -13,7 +13,6 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.baseline.plan import method_key, settings_of
 from selfmodel.experiments.baseline.results import BaselineRow
 from selfmodel.experiments.grid import Cell
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.experiments.study.planned_robots import planned_entry
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -33,6 +32,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import draw_reality
 
 FILE = "repertoire.npz"
 """File of a repertoire in the folder of its cell."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from selfmodel.arguments import AUTO, comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments.arguments import AUTO, comparator_choice
 from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.paper.reported import FAILURES
 from selfmodel.experiments.study.gaits import gait_cell

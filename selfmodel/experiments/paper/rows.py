@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from selfmodel.experiments.experiment import Experiment, Outcome
+from selfmodel.studies.experiment import Experiment, Outcome
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from selfmodel.arguments import comparator_choice
 from selfmodel.controllers.controller import Controller
 from selfmodel.evolution import Generation
-from selfmodel.experiments.arguments import comparator_choice
-from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.paper.rows import EvolutionRow, rows_of
 from selfmodel.experiments.study.files import as_dicts
@@ -28,6 +27,7 @@ from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import Experiment, run
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
+from selfmodel import arguments
 from selfmodel.errors import InputError
-from selfmodel.experiments import robots
 from selfmodel.experiments.grid import FinishedPart
 from selfmodel.files import read_file
 from selfmodel.logs.files import make_folder, replace_file
@@ -31,7 +31,7 @@ BOOLEANS = {"true": True, "false": False, "True": True, "False": False}
 
 def key_of(robot: str) -> str:
     """Returns the robot's part of a file name: its name, or the name of its MJCF or URDF file."""
-    name = Path(robot).stem if robots.is_model(robot) else robot
+    name = Path(robot).stem if arguments.is_model(robot) else robot
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "robot"
 
 

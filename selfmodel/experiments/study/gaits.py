@@ -6,9 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from selfmodel import arguments, plugins
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments import plugins, trial_logs
-from selfmodel.experiments.chosen_score import choose_score
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.study.files import key_of
 from selfmodel.experiments.study.planned_robots import planned_entry
@@ -22,6 +21,7 @@ from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.scores import choose_score
 
 GAITS, GAIT, FILE = "gaits", "gait", "gait.npz"
 """Kind and part of a gait's cell, and its file."""
@@ -106,4 +106,4 @@ def read_gait(folder: Path, robot: Robot) -> Controller:
     Raises:
         InputError: The gait is for another robot.
     """
-    return trial_logs.controller(folder / FILE, robot)
+    return arguments.read_controller(folder / FILE, robot)

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from selfmodel.arguments import robot_entry
 from selfmodel.errors import InputError
-from selfmodel.experiments.robots import robot_entry
 from selfmodel.recovery.repertoire.model_digest import model_digest
 from selfmodel.tasks import Entry
 

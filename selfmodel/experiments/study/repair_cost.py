@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.grid.cell import with_needs
-from selfmodel.experiments.plugins import PAPER
 from selfmodel.experiments.study.gaits import EVOLVE
+from selfmodel.plugins import PAPER
 from selfmodel.recovery.repair.robust_repair import rollouts_of
 from selfmodel.settings import Settings
 

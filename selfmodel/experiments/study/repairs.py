@@ -1,7 +1,7 @@
 """Repair of a study: the names of repair, search and score, which are parameters of the cells."""
 
+from selfmodel import plugins
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins
 
 
 def check_repair(repair: str, search: str | None) -> None:

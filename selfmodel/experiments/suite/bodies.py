@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from selfmodel.arguments import is_model
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments.robots import is_model
 from selfmodel.tasks import ROBOTS, suite_bodies
 
 DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from selfmodel import arguments, plugins
+from selfmodel.arguments import comparator_choice
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.experiments import plugins, robots
-from selfmodel.experiments.arguments import comparator_choice
-from selfmodel.experiments.chosen_score import check_score
 from selfmodel.experiments.grid import Cell, check_runs
 from selfmodel.experiments.study.files import check_keys, key_of
 from selfmodel.experiments.study.gaits import gait_cell
@@ -21,6 +20,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
+from selfmodel.studies.scores import check_score
 from selfmodel.tasks import Entry
 
 RECOVER = "selfmodel.experiments.suite.work:recover"
@@ -65,7 +65,7 @@ class Study:
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
     """Returns the numbers of the cases that apply to at least one body."""
-    return tuple(sorted({case for body in bodies for case in robots.robot_entry(body).cases}))
+    return tuple(sorted({case for body in bodies for case in arguments.robot_entry(body).cases}))
 
 
 def check(study: Study) -> None:
@@ -80,7 +80,7 @@ def check(study: Study) -> None:
     score = score_name(study.repair, study.score)
     check_keys(study.bodies)
     for body in study.bodies:
-        entry = robots.robot_entry(body)
+        entry = arguments.robot_entry(body)
         plugins.design(study.controller, entry.robot(), study.neurons)
         check_score(score, entry)
     if not 0 <= study.gap <= MAX_GAP_LEVEL:
@@ -108,7 +108,7 @@ def cells(study: Study, only: tuple[int, int] = (1, 1)) -> list[Cell]:
     pairs = list(itertools.product(study.seeds, study.bodies))[part - 1 :: parts]
     found = []
     for seed, body in pairs:
-        entry = robots.robot_entry(body)
+        entry = arguments.robot_entry(body)
         gait = gait_cell(
             planned_bodies[body],
             study.settings,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from selfmodel.experiments.confidence_intervals import Interval, proportion
-from selfmodel.experiments.plugins import OWN_SEARCH, PAPER
+from selfmodel.plugins import OWN_SEARCH, PAPER
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""

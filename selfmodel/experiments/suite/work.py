@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from selfmodel import plugins
+from selfmodel.arguments import comparator_choice
 from selfmodel.controllers.controller import check_silent_neurons
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import comparator_choice
-from selfmodel.experiments.chosen_score import choose_score
-from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.study.files import as_dicts
 from selfmodel.experiments.study.gaits import read_gait
@@ -20,6 +18,8 @@ from selfmodel.faults.sensors import silent_neurons
 from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.studies.experiment import Experiment, run
+from selfmodel.studies.scores import choose_score
 from selfmodel.trials.trial import Trial
 
 

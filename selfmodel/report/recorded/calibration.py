@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.experiments.fitting import fitted
+from selfmodel.arguments import fitted
 from selfmodel.robot.parameters import Parameters, factor_names, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration

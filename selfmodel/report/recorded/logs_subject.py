@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from selfmodel.experiments import trial_logs
-from selfmodel.experiments.arguments import AUTO, comparator_choice
+from selfmodel import arguments
+from selfmodel.arguments import AUTO, comparator_choice
 from selfmodel.faults.kind import FaultKind
 from selfmodel.report.recorded.calibration import recorded_calibration
 from selfmodel.report.recorded.diagnosis_file import REMEDY, WHAT, read_diagnosis_file
@@ -41,8 +41,8 @@ def subject_of_logs(
     """
     file = read_diagnosis_file(diagnosis)
     explained, intact = file.matched(paths)
-    logs = trial_logs.logs([*explained, *intact])
-    model = trial_logs.robot_of_logs(logs, robot)
+    logs = arguments.read_logs([*explained, *intact])
+    model = arguments.robot_of_logs(logs, robot)
     file.check_self_model(model)
     found = file.diagnosis(recorded_space(diagnosis, model, file.kinds, kinds))
     trials = [log.trial for log in logs]

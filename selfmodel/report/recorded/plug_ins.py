@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from selfmodel import plugins
+from selfmodel.arguments import AUTO
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import AUTO
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from selfmodel.arguments import robot_entry
 from selfmodel.cli.rendering import camera
 from selfmodel.cli.rendering.film import Film, film_of
-from selfmodel.experiments.robots import robot_entry
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import POSE

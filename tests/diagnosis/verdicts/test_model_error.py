@@ -12,7 +12,6 @@ from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
 from selfmodel.diagnosis.verdicts.model_error import any_fault_is_model_error, is_model_error
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import FRICTION
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -21,6 +20,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory

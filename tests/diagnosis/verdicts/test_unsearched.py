@@ -15,7 +15,6 @@ from selfmodel.diagnosis.sentences import confidence_sentence
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.verdicts.significance import NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdicts.unsearched import best_unsearched_fault
-from selfmodel.experiments.reality import draw_reality
 from selfmodel.faults import ROUGHNESS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -24,6 +23,7 @@ from selfmodel.faults.registry import ALL_KINDS, PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory

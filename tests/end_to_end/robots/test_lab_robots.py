@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.lab_robots.models import MODELS, write_models
-from selfmodel.experiments.robots import robot_entry
+from selfmodel.arguments import robot_entry
 from selfmodel.faults.notation import parse
 from tests.helpers.drivers import random_cpgs
 from tests.helpers.exactness import Exactness, exactness

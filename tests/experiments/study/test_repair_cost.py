@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel import plugins
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments import plugins
 from selfmodel.experiments.grid.cell import with_needs
 from selfmodel.experiments.study.repair_cost import RepairCost, repair_cost
 from selfmodel.experiments.suite.plan import Study, cells

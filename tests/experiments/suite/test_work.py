@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from selfmodel.comparators import DEFAULT
-from selfmodel.experiments.experiment import Experiment, run
 from selfmodel.experiments.study.gaits import evolve
 from selfmodel.experiments.suite import work
 from selfmodel.experiments.suite.plan import Study, cells
 from selfmodel.settings import Settings
+from selfmodel.studies.experiment import Experiment, run
 from tests.robot.mjcf.samples import SAMPLES
 
 TINY = Settings(steps=60, generations=1, trials=1).scaled(4)

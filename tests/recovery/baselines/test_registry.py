@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmodel.experiments.reality import simulated_robot
+from selfmodel.api import simulated_robot
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.baselines.genome_search import genome_search

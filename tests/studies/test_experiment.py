@@ -3,13 +3,13 @@
 import numpy as np
 
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import is_correct
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory

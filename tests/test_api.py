@@ -1,19 +1,24 @@
 """Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
 
+import dataclasses
 import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import selfmodel
+from selfmodel import api
 from selfmodel.comparators import DEFAULT, FORWARD_DISPLACEMENT
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.errors import InputError
 from selfmodel.faults import BROKEN, JAMMED
+from selfmodel.trials.trial import Trial
 from tests.helpers.command import selfmodel as command
 
-LOGS = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
+LOGS = Path(__file__).parent / "data" / "logs-0.1" / "recovery" / "trials"
 BEFORE, AFTER = LOGS / "00-before.mcap", LOGS / "01-after.mcap"
 SMALL = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
 KNEE = "break:front_left_knee"
@@ -194,3 +199,41 @@ def test_a_replay_of_wrong_notation_is_refused():
 def test_a_small_population_alone_is_refused_with_the_remedy():
     with pytest.raises(InputError, match=r"for another population use Settings\(\)\.scaled\(4\)"):
         selfmodel.Settings(population=4)
+
+
+@pytest.fixture
+def blind() -> Trial:
+    """A failing trial without the base's position."""
+    trial = selfmodel.read_log(AFTER).trial
+    run = trial.behaviour
+    lost = {"base_position": np.full_like(run["base_position"], np.nan)}
+    behaviour = dataclasses.replace(run, signals={**run.signals, **lost})
+    return dataclasses.replace(trial, behaviour=behaviour)
+
+
+def test_a_comparator_that_cannot_judge_is_refused_before_the_calibration(
+    blind: Trial, monkeypatch: pytest.MonkeyPatch
+):
+    fits: list[object] = []
+    monkeypatch.setattr(api, "fitted", lambda *given: fits.append(given))
+    healthy = selfmodel.read_log(BEFORE).trial
+
+    with pytest.raises(
+        InputError, match=r"needs base_position.*: give the comparator segment-prediction-onboard"
+    ):
+        selfmodel.diagnose(
+            blind, healthy=healthy, robot="quadruped", comparator="segment-prediction"
+        )
+    assert not fits
+
+
+@pytest.mark.search
+def test_the_default_is_the_best_comparator_that_the_trials_allow_and_is_reported(blind: Trial):
+    events: list[object] = []
+    selfmodel.diagnose(
+        blind, robot="quadruped", kinds="jam", settings=SMALL, on_event=events.append
+    )
+
+    (chosen,) = [event for event in events if isinstance(event, ChosenComparator)]
+    assert chosen.comparator.name == "segment-prediction-onboard"
+    assert "segment-prediction needs base_position" in chosen.reason

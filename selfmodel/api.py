@@ -1,37 +1,43 @@
 """The public functions: one call from names and files to a result."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from selfmodel.controllers.controller import CommandSource, Controller, Design
-from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.experiments import plugins
-from selfmodel.experiments.arguments import (
+from selfmodel import plugins
+from selfmodel.arguments import (
     AUTO,
     KindSource,
     RobotSource,
     TrialSource,
     check_seed,
     comparator_choice,
+    fitted,
     hypothesis_of,
     kinds_of,
+    read_logs,
     repertoire_of,
     robot_of,
+    robot_of_logs,
     sources_of,
     trials_of,
 )
-from selfmodel.experiments.chosen_score import check_motion
-from selfmodel.experiments.fitting import fitted
-from selfmodel.experiments.log_diagnosis import set_up_diagnosis
+from selfmodel.controllers.controller import CommandSource, Controller, Design
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.comparator_choice import ChosenComparator, ComparatorChoice
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.next_trial import NextTrial, by_repair
@@ -49,16 +55,14 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.threads import thread_count
 from selfmodel.simulation.trial_replay import Replay
+from selfmodel.studies.experiment import draw_reality
+from selfmodel.studies.scores import check_motion
 from selfmodel.trials.behaviour import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
 def _ignore(_event: object) -> None:
     """Default callback, which ignores the event."""
-
-
-def _design(source: Design | str, robot: Robot) -> Design:
-    return plugins.design(source, robot) if isinstance(source, str) else source
 
 
 def evolve_controller(
@@ -99,7 +103,7 @@ def evolve_controller(
     check_seed(seed)
     robot = robot_of(robot)
     check_motion(score, robot)
-    chosen = _design(design, robot)
+    chosen = plugins.design(design, robot) if isinstance(design, str) else design
     search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     return search.best(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
 
@@ -369,7 +373,7 @@ def recover(
     score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
     check_motion(score, robot)
     chosen, searched = settings or Settings(), kinds_of(kinds)
-    drawn = _design(design, robot)
+    drawn = plugins.design(design, robot) if isinstance(design, str) else design
     make_repair = plugins.repair(repair, search, repertoire_of(repertoire, robot, drawn))
     journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
     return loop.recover(
@@ -389,3 +393,105 @@ def recover(
         score=score,
         make_repair=make_repair,
     )
+
+
+def simulated_robot(
+    robot: RobotSource,
+    hypothesis: Hypothesis | str = INTACT,
+    *,
+    gap: float = 0.0,
+    seed: int = 0,
+) -> SimulatedRobot:
+    """Returns a physical robot in simulation, with hidden faults and a reality gap.
+
+    Robots of the same seed and gap are one robot before and after its failure; the healthy and the
+    damaged robot have different streams of measurement noise.
+
+    Example:
+        >>> import selfmodel
+        >>> physical = selfmodel.simulated_robot("quadruped", "break:front_left_knee", gap=0.05)
+
+    Args:
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+        hypothesis: The faults of the physical robot, or their notation.
+        gap: Level of the reality gap, the relative standard deviation of its factors; 0 is none.
+        seed: Seed of the gap and of the noise.
+
+    Raises:
+        InputError: The level is out of range, the seed is negative, the robot is unknown, or the
+            notation is invalid.
+    """
+    check_seed(seed)
+    robot = robot_of(robot)
+    hidden = hypothesis_of(hypothesis, robot)
+    stream = 1 if hidden.faults else 0
+    return draw_reality(robot, seed, gap).robot(robot, hidden, stream)
+
+
+@dataclass(frozen=True, eq=False)
+class LogDiagnosis:
+    """Inputs of a diagnosis from logged trials: those to explain, and those of the healthy robot.
+
+    ``comparator`` has the reason for its choice; ``calibration`` is None without a fit.
+    """
+
+    damaged: tuple[Trial, ...]
+    healthy: tuple[Trial, ...]
+    comparator: ChosenComparator
+    calibration: Calibration | None
+    search: DiagnosticSearch
+    seed: int
+
+
+def set_up_diagnosis(
+    trials: Sequence[TrialSource],
+    healthy: Sequence[TrialSource] = (),
+    *,
+    robot: Robot | None,
+    choose_comparator: ComparatorChoice,
+    kinds: Sequence[FaultKind],
+    settings: Settings | None,
+    seed: int | None,
+    calibrate: bool,
+    threads: int,
+) -> LogDiagnosis:
+    """Returns the inputs of a diagnosis: reads the logs, calibrates, and sets up the search.
+
+    The arguments are those of ``diagnose``; the comparator is chosen before the calibration.
+
+    Raises:
+        InputError: As for ``diagnose``; or a trial has no log and no robot is given.
+    """
+    if not trials:
+        raise InputError("expected at least one trial to explain, got none")
+    sources = [*trials, *healthy]
+    read = {
+        log.trial.path: log
+        for log in read_logs([Path(s) for s in sources if not isinstance(s, Trial)])
+    }
+    found = [s if isinstance(s, Trial) else read[str(Path(s))].trial for s in sources]
+    if robot is None and len(read) < len(found):
+        raise InputError(
+            "a trial without a log has no model of its robot: give robot=, such as "
+            'selfmodel.load_robot("quadruped")'
+        )
+    nominal = robot_of_logs(list(read.values()), None) if robot is None else robot
+    to_explain, reference = found[: len(trials)], found[len(trials) :]
+    if not reference:
+        to_explain, reference = by_stage(to_explain)
+    first = to_explain[0]
+    if settings is None:
+        settings = read[first.path].settings if first.path in read else Settings()
+    chosen = choose_comparator(nominal, [*reference, *to_explain])
+    count = thread_count(threads)
+    fit = fitted(nominal, reference, count) if calibrate and reference else None
+    simulator = Simulator(fit.robot if fit else nominal, count)
+    search = DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=reference)
+    drawn = first.plan.seed if seed is None else seed
+    return LogDiagnosis(tuple(to_explain), tuple(reference), chosen, fit, search, drawn)
+
+
+def by_stage(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """Returns the trials to explain, and those of the stage ``before`` unless all are."""
+    failed = [trial for trial in trials if trial.plan.stage != "before"] or list(trials)
+    return failed, [trial for trial in trials if trial not in failed]

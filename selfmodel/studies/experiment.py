@@ -1,32 +1,40 @@
-"""Recovery of a simulated physical robot with known faults, and its score."""
+"""Recovery of a simulated physical robot with known faults: definition, run, correctness."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
+from selfmodel.arguments import fitted
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator_choice import ComparatorChoice
-from selfmodel.experiments.fitting import fitted
-from selfmodel.experiments.plugins import NEXT_TRIAL, PAPER, repair
-from selfmodel.experiments.reality import draw_reality
-from selfmodel.experiments.scoring import is_correct
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
+from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.plugins import NEXT_TRIAL, PAPER, repair
 from selfmodel.recovery.events import Event
+from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.recovery.recover import recover
 from selfmodel.recovery.recovery import Recovery
 from selfmodel.recovery.repertoire.repertoire import Repertoire
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import Trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,3 +153,68 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
             Simulator(robot, experiment.threads),
         ),
     )
+
+
+@dataclass(frozen=True)
+class Reality:
+    """Difference between a physical robot and its model, apart from faults.
+
+    Attributes:
+        gap: The reality gap; level 0 is none.
+    """
+
+    gap: RealityGap
+
+    @property
+    def text(self) -> str | None:
+        """Hidden record of a trial log, as JSON; None if the robot equals its model."""
+        if self.gap.level == 0:
+            return None
+        return json.dumps({**self.gap.as_dict(), "structure": None}, allow_nan=False)
+
+    def hidden_model(self, robot: Robot) -> Robot:
+        """Returns a robot whose model has the factors and the delay of the gap, for an oracle."""
+        model = perturbed_model(robot.model, self.gap)
+        return with_model(robot, model, robot.control_delay + self.gap.delay)
+
+    def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
+        """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""
+        return SimulatedRobot(robot, hidden, self.gap, stream)
+
+
+def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
+    """Returns the reality gap of a physical robot.
+
+    Args:
+        robot: The nominal robot.
+        seed: Seed; a search with the same seed draws other numbers.
+        level: Level of the reality gap.
+
+    Raises:
+        InputError: The level is out of range.
+    """
+    return Reality(draw_gap(robot, level, gap_stream(seed)))
+
+
+def is_correct(
+    best: Hypothesis, truth: Hypothesis, trials: Sequence[Trial], simulator: Simulator
+) -> bool:
+    """Returns whether a hypothesis is the truth, or behaves like the truth in all trials.
+
+    Two hypotheses behave alike if all signals of their simulations are the same to the bit under
+    the controller of every trial.
+
+    Args:
+        best: Best hypothesis of a diagnosis, in canonical form.
+        truth: Hypothesis of the physical robot, in canonical form.
+        trials: Trials that the diagnosis explains.
+        simulator: Self-model.
+    """
+    return best == truth or all(_same_bits(best, truth, trial, simulator) for trial in trials)
+
+
+def _same_bits(best: Hypothesis, truth: Hypothesis, trial: Trial, simulator: Simulator) -> bool:
+    controller = trial.plan.controller
+    runs = [(best, controller), (truth, controller)]
+    behaviour = simulator.run(runs, trial.behaviour.steps, SIGNALS).behaviour
+    return all(np.array_equal(*behaviour[signal]) for signal in SIGNALS)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel import plugins
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
-from selfmodel.experiments import plugins
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
