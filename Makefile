@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SLOW := process or search or bodies or opengl or fuzz
 READY := .venv/.ready
+TOOLS := .venv/.tools
 VIEWERS := .viewers
 NODE_READY := .ci/viewers/node_modules/.ready
 PAGE := selfmodel/report/template.html
@@ -12,7 +13,7 @@ BROWSER_READY := .ci/browser/node_modules/.ready
 help: ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-setup: $(READY) ## make .venv with the locked versions, and the page of a report where there is Node.js
+setup: $(TOOLS) ## make .venv with the locked versions, and the page of a report where there is Node.js
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory page; else echo 'no Node.js: `selfmodel report` needs `make page`, and all else works'; fi
 
 page: $(PAGE) ## build the page of `selfmodel report`; needs Node.js
@@ -26,39 +27,43 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "selfmodel needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable . --group dev --group docs
+	$(BIN)/python -m pip install --constraint constraints.txt --editable .
+	touch $@
+
+$(TOOLS): $(READY)
+	$(BIN)/python -m pip install --constraint constraints.txt --group dev --group docs
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --only-binary pybullet --group other-engine || echo 'no wheel of PyBullet for this platform: its tests are skipped'
 	touch $@
 
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
 	$(BIN)/selfmodel recover quadruped --case 1
 
-test: $(READY) ## run the fast tests: every promise, in about three minutes on two cores
+test: $(TOOLS) ## run the fast tests: every promise, in about three minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
-test-slow: $(READY) ## run the tests that `make test` leaves out; in about ten minutes on two cores
+test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about ten minutes on two cores
 	$(BIN)/pytest -m "$(SLOW)" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
-test-all: $(READY) ## run every test, with every case; in about twelve minutes on two cores
+test-all: $(TOOLS) ## run every test, with every case; in about twelve minutes on two cores
 	$(BIN)/pytest -m "" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
-docs: $(READY) ## build the documentation site in docs/_build; warnings are errors
+docs: $(TOOLS) ## build the documentation site in docs/_build; warnings are errors
 	$(BIN)/sphinx-build -W --keep-going -E -q -b html docs docs/_build/html
 
-lint: $(READY) ## check style and formatting
+lint: $(TOOLS) ## check style and formatting
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(READY) ## check types, strictly
+types: $(TOOLS) ## check types, strictly
 	$(BIN)/mypy
 	$(BIN)/mypy benchmarks examples .ci
 
-wheel: $(READY) $(PAGE) ## build the wheel and check what it holds
+wheel: $(TOOLS) $(PAGE) ## build the wheel and check what it holds
 	rm -rf build dist
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
-viewers: $(READY) $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
+viewers: $(TOOLS) $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
 	rm -rf $(VIEWERS)/logs
 	mkdir $(VIEWERS)/logs
 	$(BIN)/selfmodel trial quadruped --out $(VIEWERS)/logs/quadruped.mcap
@@ -86,7 +91,7 @@ $(BROWSER_READY): .ci/browser/package.json .ci/browser/package-lock.json
 	npm ci --prefix .ci/browser --ignore-scripts --no-audit --no-fund --silent
 	touch $@
 
-bench: $(READY) ## measure speed and memory; on a quiet machine
+bench: $(TOOLS) ## measure speed and memory; on a quiet machine
 	$(BIN)/python -m benchmarks.bench
 
 PAPER ?= runs/paper
@@ -96,7 +101,7 @@ results: $(READY) ## repeat the paper's experiment in runs/paper, with its figur
 	$(BIN)/python -m benchmarks.walking $(PAPER)
 
 FOREIGN ?= runs/foreign
-foreign: $(READY) ## make recordings by an independent generator and score their diagnoses; takes hours
+foreign: $(TOOLS) ## make recordings by an independent generator and score their diagnoses; takes hours
 	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --robots quadruped,hexapod,ant --gaps none,moderate,large --seeds 0
 	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --cases healthy --gaps none,moderate,large --seeds 1-17
 	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
