@@ -98,7 +98,6 @@ PAPER ?= runs/paper
 results: $(READY) ## repeat the paper's experiment in runs/paper, with its figures and tables; takes hours
 	$(BIN)/selfmodel paper --out $(PAPER)
 	$(BIN)/selfmodel paper --out $(PAPER) --robots quadruped --case 1,2,3,5,6,9 --comparator forward-displacement --seeds 10
-	$(BIN)/python -m benchmarks.walking $(PAPER)
 
 FOREIGN ?= runs/foreign
 foreign: $(TOOLS) ## make recordings by an independent generator and score their diagnoses; takes hours

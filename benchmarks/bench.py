@@ -1,9 +1,7 @@
 """``make bench``: speed, memory and their growth, measured in one run and written as JSON.
 
-Every figure is a median of at least five rounds after a warm-up round, except diagnoses: each
-comparator diagnoses every failure once, in turns, and the seconds are summed. Ratios compare
-variants that alternated in one process, with the same model, threads, initial poses and motor
-targets.
+Every figure is a median of at least five rounds after a warm-up round. Ratios compare variants that
+alternated in one process, with the same model, threads, initial poses and motor targets.
 """
 
 import argparse
@@ -19,9 +17,8 @@ from statistics import median
 import mujoco
 import numpy as np
 
-from benchmarks import comparators, recovery, simulation, trial_log
+from benchmarks import recovery, simulation, trial_log
 from benchmarks.facts import Facts
-from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
 
 # dm_control searches for a display on import; nothing is drawn here.
@@ -60,7 +57,6 @@ def main() -> None:
         "closed_loop": loops,
         "closed_loop_of_suite": of_suite(threads),
         "growth": simulation.growth(robots, threads),
-        "comparators": comparators.measure(threads, Settings()),
     }
     text = json.dumps(results, indent=2)
     RESULTS.write_text(text + "\n", encoding="utf-8")

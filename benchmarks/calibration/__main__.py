@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.onboard import without_base
 from selfmodel.controllers.controller import Controller
 from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
@@ -40,6 +39,9 @@ NO_NOISE = 1e-12
 """Level of a gap with negligible measurement noise and initial noise."""
 SEEN, UNSEEN = 2, 2
 """Number of trials to fit; also the index of the held-out gait."""
+
+BASE = ("base_position", "base_linear_velocity")
+"""Signals of a motion capture."""
 
 Facts = dict[str, Any]
 
@@ -169,6 +171,14 @@ def table(rows: Sequence[Facts]) -> str:
             seconds = f"{mean(row['seconds'] for row in same):.1f}" if "seconds" in same[0] else "-"
             lines.append(f"| {robot} | {way} | {log:.3f} | {truth:.3f} | {seconds} |")
     return "\n".join(lines)
+
+
+def without_base(trial: Trial) -> Trial:
+    """Returns the trial without the base's position and linear velocity."""
+    run = trial.behaviour
+    forgotten = {signal: np.full_like(run[signal], np.nan) for signal in BASE}
+    behaviour = dataclasses.replace(run, signals={**run.signals, **forgotten})
+    return dataclasses.replace(trial, behaviour=behaviour)
 
 
 if __name__ == "__main__":

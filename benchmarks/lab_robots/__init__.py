@@ -1,1 +1,0 @@
-"""Study of the robots that laboratories have: models, recoveries, exactness, table and films."""
