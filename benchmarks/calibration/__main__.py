@@ -32,6 +32,7 @@ from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
+from selfmodel.trials.estimation import BASE
 from selfmodel.trials.trial import Trial, TrialPlan
 
 RESULTS = Path(__file__).with_name("calibration.json")
@@ -39,9 +40,6 @@ NO_NOISE = 1e-12
 """Level of a gap with negligible measurement noise and initial noise."""
 SEEN, UNSEEN = 2, 2
 """Number of trials to fit; also the index of the held-out gait."""
-
-BASE = ("base_position", "base_linear_velocity")
-"""Signals of a motion capture."""
 
 Facts = dict[str, Any]
 
