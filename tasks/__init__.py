@@ -9,15 +9,13 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.tasks import suite_bodies, suite_tasks
 from selfmodel.tasks.arguments import check_names
-from selfmodel.tasks.entry import Entry
-from selfmodel.tasks.hexapod import HEXAPOD
-from selfmodel.tasks.quadruped import QUADRUPED
+from selfmodel.tasks.entry import Entry, paper_robot
 
 if TYPE_CHECKING:
     from dm_control.rl import control
 
 
-ROBOTS: Mapping[str, Entry] = {"quadruped": QUADRUPED, "hexapod": HEXAPOD}
+ROBOTS: Mapping[str, Entry] = {name: paper_robot(name) for name in ("quadruped", "hexapod")}
 """The built-in robots by name."""
 
 SUITE: Mapping[str, Mapping[str, Callable[..., "control.Environment"]]] = {

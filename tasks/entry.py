@@ -1,16 +1,19 @@
-"""The registry entry of a robot: its model, its failures, its tasks."""
+"""The registry entry of a robot, and those of the paper's two robots."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.registry import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.scores.fitness import Score
 from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.robot import Robot
+from selfmodel.trials.behaviour import Behaviour, forward_displacement
 
 if TYPE_CHECKING:
     from dm_control.rl import control
@@ -37,3 +40,36 @@ class Entry:
         """Failures by their number in Table I of the paper, in notation."""
         robot = self.robot()
         return cases_of(robot.anatomy, partial(reaches_ground, robot))
+
+
+CONTROL_TIMESTEP = 0.01
+"""Seconds between two commands."""
+
+
+def paper_robot(name: str) -> Entry:
+    """Returns the registry entry of a robot with the task of walking forward.
+
+    Args:
+        name: Name of the robot and of its MJCF file, without the suffix.
+    """
+    return Entry(partial(_robot, name), {"walk": partial(_walk, name)}, None, WALKING_RETURN)
+
+
+def _walk(name: str, **task_kwargs: Any) -> "control.Environment":  # noqa: ANN401  # of the task
+    # Imported here, because dm_control's physics initialises a display when imported.
+    from selfmodel.tasks import walking  # noqa: PLC0415  # see the line above
+
+    return walking.environment(_robot(name), **task_kwargs)
+
+
+def _robot(name: str) -> Robot:
+    mjcf = (Path(__file__).parent / f"{name}.xml").read_text(encoding="utf-8")
+    return Robot(name=name, mjcf=mjcf, control_timestep=CONTROL_TIMESTEP)
+
+
+def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+    return forward_displacement(behaviour) / robot.control_timestep
+
+
+WALKING_RETURN = Score("return", ("base_position",), _speeds)
+"""Sum of the rewards of ``walking.Walk``, m/s: the displacement over the control time step."""

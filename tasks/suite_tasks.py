@@ -2,11 +2,14 @@
 
 import importlib
 import inspect
+from collections import deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import mujoco
+import numpy as np
 
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
@@ -14,15 +17,27 @@ from selfmodel.faults.sensors import SILENT_NEURON
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import read_anatomy
 from selfmodel.robot.control_delay import added_steps
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
+from selfmodel.simulation.initial_pose import randomize_joint_angles, start_spread
 from selfmodel.simulation.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.tasks import suite_bodies
-from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
-from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers
-from selfmodel.tasks.start_noise import start_level
+from selfmodel.tasks.arguments import (
+    Seed,
+    check_number,
+    check_time_limit,
+    construction_numbers,
+    episode_numbers,
+    next_seed,
+    parsed,
+    start_level,
+)
 
 if TYPE_CHECKING:
+    from dm_control.mujoco import Physics
     from dm_control.rl import control
+    from dm_control.suite.base import Task
+
 
 _FIXED = "its base is fixed, so that it does not walk"
 
@@ -111,12 +126,11 @@ def environment(
         embodiment = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
     delay = drawn.delay + added_steps(0, float(embodiment.added_delay[0]))
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
-    damaged = importlib.import_module("selfmodel.tasks.damaged_task")
     extra.pop("n_sub_steps", None)  # is in the control time step of the suite's environment
     constructor = importlib.import_module("dm_control.rl.control").Environment
     return constructor(
         type(env.physics).from_model(wrapper.MjModel(embodiment.model)),
-        damaged.DamagedTask(env.task, embodiment, anatomy, delay, start),
+        DamagedTask(env.task, embodiment, anatomy, delay, start),
         **{
             "time_limit": _default_time_limit(domain, task),
             **limit,
@@ -183,3 +197,65 @@ def _default_time_limit(domain: str, task: str) -> float:
     """Returns the suite's length of an episode, s."""
     module = importlib.import_module(f"dm_control.suite.{domain}")
     return float(inspect.signature(module.SUITE[task]).parameters["time_limit"].default)
+
+
+class DamagedTask:
+    """A task of the suite with welded joints at their angles, a control delay and start noise.
+
+    Observations, rewards and the end of an episode are the suite's.
+
+    Args:
+        task: The suite's task; all other attributes are delegated to it.
+        embodiment: The body with its faults.
+        anatomy: Parts of the body.
+        delay: Control delay, control steps.
+        start: Noise of the initial joint angles, as a gap level.
+    """
+
+    def __init__(
+        self, task: "Task", embodiment: Embodiment, anatomy: Anatomy, delay: int, start: float
+    ) -> None:
+        self._task = task
+        self._embodiment, self._anatomy = embodiment, anatomy
+        self._delay, self._start = delay, start
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
+        if name == "_task":  # a copy has no attributes yet
+            raise AttributeError(name)
+        return getattr(self._task, name)
+
+    @property
+    def visualize_reward(self) -> bool:
+        """Whether the colours of the body show the reward."""
+        return bool(self._task.visualize_reward)
+
+    @visualize_reward.setter
+    def visualize_reward(self, value: bool) -> None:
+        self._task.visualize_reward = value
+
+    @property
+    def _random(self) -> np.random.RandomState:
+        """Generator of the episodes, which Shimmy replaces to seed a task."""
+        random: np.random.RandomState = self._task.random
+        return random
+
+    @_random.setter
+    def _random(self, value: np.random.RandomState) -> None:
+        self._task._random = value  # noqa: SLF001  # dm_control has no other way to seed a task
+
+    def initialize_episode(self, physics: "Physics") -> None:
+        """Draws the suite's initial state, adds the start noise and keeps welded joints welded."""
+        self._task.initialize_episode(physics)
+        model, data = physics.model.ptr, physics.data.ptr
+        if self._start > 0:
+            rng = np.random.default_rng(next_seed(self._task.random))
+            spread = start_spread(self._start)
+            randomize_joint_angles(self._anatomy, model, data, spread.angles, rng)
+        for position, velocity, angle in self._embodiment.welded:
+            data.qpos[position], data.qvel[velocity] = angle, 0.0
+        self._delayed = deque(np.zeros((self._delay, model.nu)))
+
+    def before_step(self, action: FloatArray, physics: "Physics") -> None:
+        """Applies the commands of some control steps ago."""
+        self._delayed.append(np.array(action, dtype=np.float64))
+        self._task.before_step(self._delayed.popleft(), physics)

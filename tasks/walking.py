@@ -23,9 +23,16 @@ from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import current_value, observed_fields
 from selfmodel.simulation.initial_pose import randomize_initial_pose, start_spread
 from selfmodel.simulation.reality_gap import RealityGap
-from selfmodel.tasks.arguments import check_number, check_time_limit, parsed
-from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers, next_seed
-from selfmodel.tasks.start_noise import start_level
+from selfmodel.tasks.arguments import (
+    Seed,
+    check_number,
+    check_time_limit,
+    construction_numbers,
+    episode_numbers,
+    next_seed,
+    parsed,
+    start_level,
+)
 from selfmodel.trials.signals import Signal
 
 TIME_LIMIT = 10.0

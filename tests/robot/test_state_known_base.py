@@ -10,7 +10,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS, with_known_base
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.tasks.quadruped import QUADRUPED
+from selfmodel.tasks.entry import QUADRUPED
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_cpgs

@@ -7,7 +7,7 @@ from dm_control.rl import control
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.simulation.initial_pose import ANGLE_DEVIATION
-from selfmodel.tasks.randomness import Seed, construction_numbers, episode_numbers
+from selfmodel.tasks.arguments import Seed, construction_numbers, episode_numbers
 
 WALKER = ("suite-walker", "walk")
 OWN = ("quadruped", "walk")
