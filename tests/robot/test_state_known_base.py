@@ -10,7 +10,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS, with_known_base
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.tasks.entry import QUADRUPED
+from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_cpgs
@@ -44,8 +44,8 @@ def test_an_observed_base_and_a_floating_base_are_unchanged():
     moved = {**behaviour.signals, "base_position": behaviour["base_position"] + 0.01}
     seen = Behaviour(behaviour.names, behaviour.time, moved)
     assert np.array_equal(with_known_base(arm(), seen)["base_position"], seen["base_position"])
-    floating = without_base(trial_of(QUADRUPED.robot(), 20)).behaviour
-    assert with_known_base(QUADRUPED.robot(), floating) is floating
+    floating = without_base(trial_of(ROBOTS["quadruped"].robot(), 20)).behaviour
+    assert with_known_base(ROBOTS["quadruped"].robot(), floating) is floating
 
 
 def test_a_log_of_an_arm_without_its_base_is_predicted_and_calibrated_exactly():
