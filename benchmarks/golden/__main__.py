@@ -10,7 +10,7 @@
 and writes one JSON file: every number of every ``--json`` output, and digests of every log and file
 that a command wrote. selfmodel is never imported here: only its command line, its JSON and its logs
 are read, which stay the same while modules move. ``compare`` prints a line for each command whose
-result differs, and exits with 1 if there is one; ``same to 1e-9`` stands where only the last
+result differs, and exits with 1 if there is one; ``same to 1e-9`` means that only the last
 digits of floats differ, and counts as a difference with ``--exact``. Times, versions and sentences
 are left out. Keys that only NEW has are no difference.
 
