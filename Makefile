@@ -6,22 +6,21 @@ READY := .venv/.ready
 TOOLS := .venv/.tools
 VIEWERS := .viewers
 NODE_READY := .ci/viewers/node_modules/.ready
-PAGE := selfmodel/report/template.html
-PAGE_SOURCES := $(shell find report_page -path report_page/node_modules -prune -o -type f -print)
+PAGE_READY := report_page/node_modules/.ready
 BROWSER_READY := .ci/browser/node_modules/.ready
 
 help: ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-setup: $(TOOLS) ## make .venv with the locked versions, and the page of a report where there is Node.js
-	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory page; else echo 'no Node.js: `selfmodel report` needs `make page`, and all else works'; fi
+setup: $(TOOLS) ## make .venv with the locked versions
 
-page: $(PAGE) ## build the page of `selfmodel report`; needs Node.js
+page: $(PAGE_READY) ## build the page of `selfmodel report` after a change in report_page; needs Node.js
+	node report_page/build.mjs
 
-$(PAGE): $(PAGE_SOURCES)
+$(PAGE_READY): report_page/package.json report_page/package-lock.json
 	@command -v npm >/dev/null || { echo 'make page needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }
 	npm ci --prefix report_page --ignore-scripts --no-audit --no-fund --silent
-	node report_page/build.mjs
+	touch $@
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "selfmodel needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
@@ -58,7 +57,7 @@ types: $(TOOLS) ## check types, strictly
 	$(BIN)/mypy
 	$(BIN)/mypy benchmarks examples .ci
 
-wheel: $(TOOLS) $(PAGE) ## build the wheel and check what it holds
+wheel: $(TOOLS) ## build the wheel and check what it holds
 	rm -rf build dist
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
@@ -84,7 +83,7 @@ $(NODE_READY): .ci/viewers/package.json .ci/viewers/package-lock.json
 	npm ci --prefix .ci/viewers --ignore-scripts
 	touch $@
 
-browser: $(BROWSER_READY) ## install what tests drive a browser with; needs Node.js and Chromium
+browser: $(BROWSER_READY) $(PAGE_READY) ## install what tests build the page and drive a browser with; needs Node.js
 
 $(BROWSER_READY): .ci/browser/package.json .ci/browser/package-lock.json
 	@command -v npm >/dev/null || { echo 'make browser needs Node.js 20 or newer with npm, and found none' >&2; exit 1; }

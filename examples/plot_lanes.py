@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from selfmodel.arrays import FloatArray
-from selfmodel.cli.rendering.film import evenly, film_of
+from selfmodel.cli.film import evenly, film_of
 from selfmodel.faults.notation import parse
 from selfmodel.logs import TrialLog, read_log
 from selfmodel.logs.robots import common_robot

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.other_engine.damage import Damage
 from benchmarks.other_engine.reality import Reality
 from selfmodel.errors import InputError
-from selfmodel.logs.writing.urdf import urdf as exported_urdf
+from selfmodel.logs.viewers import urdf as exported_urdf
 from selfmodel.robot.robot import Robot
 
 MASSLESS = 1e-9

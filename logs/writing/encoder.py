@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.messages.topics import TIMING, Part, frames_stride, topics, transforms
-from selfmodel.logs.writing.kinematics import (
+from selfmodel.logs.viewers import (
     Kinematics,
     body_names,
     parent_names,

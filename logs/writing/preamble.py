@@ -28,8 +28,8 @@ from selfmodel.logs.records import (
     settings_json,
     sha256,
 )
+from selfmodel.logs.viewers import urdf
 from selfmodel.logs.writing.logfile import LogFile
-from selfmodel.logs.writing.urdf import urdf
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trial import TrialPlan
 from selfmodel.version import __version__

@@ -1,7 +1,6 @@
 // Draws the report whose JSON is in the page. A part that fails is a sentence, and the others follow.
 import { h, prose } from "./dom.js";
 import { drawnAlone } from "./failure.js";
-import { follow } from "./live.js";
 import { player } from "./scene/player.js";
 import { section } from "./section.js";
 
@@ -56,4 +55,3 @@ function footer(report) {
 const read = () => whole(JSON.parse(document.getElementById("report").textContent));
 document.getElementById("main").replaceChildren(drawnAlone("The report", read));
 document.body.dataset.ready = "yes";
-follow();

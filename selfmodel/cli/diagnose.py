@@ -33,6 +33,7 @@ from selfmodel.diagnosis.sentences import (
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.diagnosis.verdicts.direct_evidence import direct_evidence
 from selfmodel.files import file_digest
+from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.trials.trial import trial_names
 
@@ -69,35 +70,35 @@ def diagnose(
         threads=threads,
     )
     found, diagnosis = made.inputs, made.diagnosis
-    result = {
-        "robot": made.robot.name,
-        "model": self_model_digest(made.robot),
-        "comparator": found.comparator.comparator.name,
-        "comparator_reason": found.comparator.reason,
-        "kinds": [kind.name for kind in considered],
-        "seed": found.seed,
-        "settings_from": made.explained[0].trial.path,
-        "logs": [log.trial.path for log in made.explained],
-        "played_back": [log.trial.path for log in made.played_back],
-        "intact": [trial.path for trial in found.healthy],
-        "files": {str(path): file_digest(path) for path in files},
-        "calibration": found.calibration.to_dict() if found.calibration else None,
-        "diagnosis": ranking_to_list(diagnosis.ranked),
+    result = LogsResult(
+        robot=made.robot.name,
+        model=self_model_digest(made.robot),
+        comparator=found.comparator.comparator.name,
+        comparator_reason=found.comparator.reason,
+        kinds=tuple(kind.name for kind in considered),
+        seed=found.seed,
+        settings_from=made.explained[0].trial.path,
+        logs=tuple(log.trial.path for log in made.explained),
+        played_back=tuple(log.trial.path for log in made.played_back),
+        intact=tuple(trial.path for trial in found.healthy),
+        files={str(path): file_digest(path) for path in files},
+        calibration=found.calibration.to_dict() if found.calibration else None,
+        diagnosis=ranking_to_list(diagnosis.ranked),
         **confidence_to_dict(diagnosis),
-        "evidence": [
+        evidence=[
             one.to_dict()
             for one in direct_evidence(
                 diagnosis.explained(found.damaged), made.robot.anatomy, trial_names(found.damaged)
             )
         ],
-        "evaluations": found.search.evaluations,
-        "distinct_hypotheses": found.search.distinct_hypotheses,
-        "seconds": perf_counter() - start,
-    }
+        evaluations=found.search.evaluations,
+        distinct_hypotheses=found.search.distinct_hypotheses,
+        seconds=perf_counter() - start,
+    )
     if as_json:
-        print_json(result)
+        print_json(values_of(result))
     else:
-        _print(result)
+        _print(values_of(result))
 
 
 def _print(result: dict[str, Any]) -> None:

@@ -1,8 +1,8 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
-from contextlib import nullcontext
 from datetime import datetime
 from functools import partial
+from os.path import relpath
 from pathlib import Path
 from typing import Annotated
 
@@ -42,18 +42,22 @@ from selfmodel.cli.arguments.repair_options import (
     RepertoireFile,
     SearchName,
 )
-from selfmodel.cli.live import both, followed, leave_report
 from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
-from selfmodel.cli.output.report import facts, print_report, result_file
+from selfmodel.cli.output.report import print_report, recovery_result
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
+from selfmodel.files import file_digest
 from selfmodel.logs.files import replace_file
+from selfmodel.logs.result_files import result_bytes
+from selfmodel.logs.results import RESULT, as_json as values_of, write_searches
 from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
-from selfmodel.report.progress import ProgressRecorder
-from selfmodel.report.run_folder import subject_of_run
+from selfmodel.report.content import report_of
+from selfmodel.report.page import REPORT, html_of
+from selfmodel.report.progress import Progress
+from selfmodel.report.subject import subject_of_run
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.threads import thread_count
@@ -102,8 +106,7 @@ def recover(
         bool,
         typer.Option(
             "--report",
-            help="Serve a report on this computer while the recovery runs, and leave it in the "
-            "folder as report.html.",
+            help="Write report.html in the folder of the run, anew after each trial.",
         ),
     ] = False,
     as_json: Json = False,
@@ -161,25 +164,27 @@ def recover(
         search=search,
         repertoire=gaits,
     )
-    options = ("--comparator", comparator, "--kinds", kinds)
-    with followed(experiment.folder, made.name, options) if report else nullcontext() as live:
-        with display(partial(_described, made, chosen.score)) as on_event:
-            progress = ProgressRecorder(both(on_event, live) if live else on_event)
-            with progress.kept_on_failure(experiment.folder):
-                outcome = run(experiment, progress)
-        found = facts(experiment, outcome)
-        try:
-            progress.write(experiment.folder)
-            logs = [Path(trial.path) for trial in outcome.recovery.trials]
-            replace_file(experiment.folder / "result.json", result_file(experiment, found, logs))
-        finally:  # the result is printed even if the disk is full
-            if as_json:
-                print_json(found)
-            else:
-                print_report(found, experiment.folder)
-        if live:
-            subject = subject_of_run(experiment.folder, experiment.threads, comparator, considered)
-            leave_report(live, experiment.folder, subject)
+    with display(partial(_described, made, chosen.score)) as on_event:
+        progress = Progress(experiment.folder, made, on_event, experiment.threads, reports=report)
+        with progress.kept_on_failure():
+            outcome = run(experiment, progress)
+    result = recovery_result(experiment, outcome)
+    try:
+        write_searches(experiment.folder, progress.searches)
+        logs = [Path(trial.path) for trial in outcome.recovery.trials]
+        content = result.as_file(
+            settings, {relpath(one, experiment.folder): file_digest(one) for one in logs}
+        )
+        replace_file(experiment.folder / RESULT, result_bytes(content))
+    finally:  # the result is printed even if the disk is full
+        if as_json:
+            print_json(values_of(result))
+        else:
+            print_report(values_of(result), experiment.folder)
+    if report:
+        subject = subject_of_run(experiment.folder, experiment.threads, comparator, considered)
+        replace_file(experiment.folder / REPORT, html_of(report_of(subject)))
+        print_notes(f"report: {experiment.folder / REPORT}")
 
 
 def _described(robot: Robot, score: Score, trial: Trial) -> str:

@@ -7,7 +7,12 @@ from selfmodel import arguments, plugins
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
+from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.trial_replay import Replay, replay
+from selfmodel.trials.trial import check_magnitudes
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +28,18 @@ class ReplayedLog:
     log: TrialLog
     robot: Robot
     hypothesis: Hypothesis
+
+    def replayed(self, threads: int) -> Replay:
+        """Returns the simulation of the trial under the hypothesis, compared with the log.
+
+        Args:
+            threads: Threads of the physics; 0 for one per processor.
+
+        Raises:
+            InputError: A pose in the log is too large to draw.
+        """
+        check_magnitudes(self.log.trial, POSE)
+        return replay(self.log.trial, self.hypothesis, Simulator(self.robot, thread_count(threads)))
 
 
 def replayed_log(file: Path, hypothesis: str, *, kinds: str, model: str | None) -> ReplayedLog:

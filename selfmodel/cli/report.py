@@ -27,13 +27,11 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, write_new
-from selfmodel.report.build import report_of
 from selfmodel.report.campaign import is_campaign, report_of_campaign
-from selfmodel.report.document import Report
-from selfmodel.report.html import html_of, template
-from selfmodel.report.recorded.logs_subject import subject_of_logs
-from selfmodel.report.run_folder import REPORT, is_run, subject_of_run
-from selfmodel.report.subject import Subject
+from selfmodel.report.charts import Report
+from selfmodel.report.content import report_of
+from selfmodel.report.page import REPORT, html_of
+from selfmodel.report.subject import Subject, is_run, subject_of_logs, subject_of_run
 from selfmodel.simulation.threads import thread_count
 from selfmodel.trials.trial import trial_names
 
@@ -94,10 +92,9 @@ def report(
         raise InputError(f"--out needs a name that ends in .html, got {str(out)!r}")
     check_folder(out)
     refuse_existing(out)
-    template()  # a missing page is an error before any work is done
     searched = plugins.kinds(kinds)
     if folder is not None:
-        made = _of_folder(folder, thread_count(threads), comparator, searched)
+        made = _of_folder(folder, threads, comparator, searched)
     elif diagnosis is not None:
         subject = subject_of_logs(
             sources,
@@ -123,7 +120,7 @@ def report(
         )
         made = report_of(
             Subject(
-                title=", ".join(trial_names(found.inputs.damaged).values()),
+                name=", ".join(trial_names(found.inputs.damaged).values()),
                 robot=found.robot,
                 healthy=found.inputs.healthy,
                 damaged=found.inputs.damaged,

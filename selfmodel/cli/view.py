@@ -1,11 +1,21 @@
 """``selfmodel view``: a logged trial and its simulation in Rerun, and the log in Foxglove."""
 
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated
+from time import monotonic, sleep
+from typing import Annotated, Any
 
+import mujoco
 import numpy as np
 import typer
 
+from selfmodel.arrays import FloatArray
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.arguments.options import (
     HypothesisText,
@@ -15,25 +25,46 @@ from selfmodel.cli.arguments.options import (
     SelfModel,
     Threads,
 )
+from selfmodel.cli.film import Film, film_of
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.rendering.film import film_of
 from selfmodel.cli.replayed_log import ReplayedLog, replayed_log
-from selfmodel.cli.viewing.foxglove import foxglove_lines, layout_path
-from selfmodel.cli.viewing.recording import LOGGED, SIMULATED, fill_recording
-from selfmodel.cli.viewing.rerun_view import (
-    PORT,
-    check_display,
-    import_rerun,
-    open_viewer,
-    write_recording,
+from selfmodel.errors import InputError, WorkError
+from selfmodel.logs.errors import LogWriteError
+from selfmodel.logs.files import refuse_existing, replace_file
+from selfmodel.robot.motion import (
+    Shape,
+    bodies_of,
+    body_poses,
+    shapes_of,
+    triangles_of,
+    visible_geoms,
 )
-from selfmodel.errors import InputError
-from selfmodel.logs.files import refuse_existing
-from selfmodel.robot.state import POSE
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
-from selfmodel.simulation.trial_replay import Replay, replay
-from selfmodel.trials.trial import check_magnitudes
+from selfmodel.simulation.trial_replay import Replay
+from selfmodel.trials.rotation import rotated
+
+APPLICATION = "selfmodel"
+
+HOST, PORT = "127.0.0.1", 9876
+"""Address of the viewer: Rerun's own port, on this computer alone."""
+
+START_SECONDS = 60.0
+"""Longest wait until the viewer listens; a cold start from a slow disk takes some 10 s."""
+
+FLUSH_SECONDS = 60.0
+"""Longest wait until the viewer has the recording: a viewer that ended never has it."""
+
+TIMELINE = "trial time"
+"""Timeline of the recording: time since the start of the trial, s."""
+
+LOGGED, SIMULATED = "logged", "simulated"
+"""Names of the two bodies in paths of entities, such as ``/world/logged/torso``."""
+
+Colour = tuple[int, int, int, int]
+"""Red, green, blue and opacity, 0 to 255."""
+
+COLOURS: dict[str, Colour] = {LOGGED: (70, 110, 150, 255), SIMULATED: (230, 120, 20, 255)}
+DETACHED: Colour = (170, 170, 170, 255)
+JAMMED: Colour = (200, 40, 40, 255)
 
 
 def view(
@@ -67,62 +98,305 @@ def view(
     Beside the bodies are the joint positions of both, and the errors over time. The command also
     prints how to open the same log in Foxglove.
     """
-    if out is not None:
-        _check_name(out)
-    else:
+    if out is None:
         check_display()
+    else:
+        if out.suffix.lower() != ".rrd":
+            raise InputError(f"--out needs a name that ends in .rrd, got {str(out)!r}")
+        check_folder(out)
+        refuse_existing(out)
     import_rerun()  # a missing package is an error before any work is done
     given = replayed_log(file, hypothesis, kinds=kinds, model=model)
-    log, robot, assumed = given.log, given.robot, given.hypothesis
-    check_magnitudes(log.trial, POSE)
-    found = replay(log.trial, assumed, Simulator(robot, thread_count(threads)))
+    found = given.replayed(threads)
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")
-    written = _show(given, found, out, port)
+    if out is None:
+        open_viewer(given, found, port)
+    written = write_recording(out, given, found) if out else None
+    layout = layout_path()
     if as_json:
         print_json(
             {
                 "log": str(file),
-                "robot": robot.name,
-                "hypothesis": str(assumed),
-                "steps": log.trial.behaviour.steps,
+                "robot": given.robot.name,
+                "hypothesis": str(given.hypothesis),
+                "steps": given.log.trial.behaviour.steps,
                 "diverged": found.diverged,
                 "out": str(out) if out else None,
                 "bytes": written,
-                "foxglove_layout": str(layout_path()),
+                "foxglove_layout": str(layout),
             }
         )
         return
-    body = f"{robot.name} as logged, and simulated as {assumed}, transparent"
-    if out is None:
-        print_lines(f"Rerun shows {body}.")
-    else:
-        print_lines(f"{out}: {body}; open it with `rerun {out}`.")
-    print_lines(*foxglove_lines(str(file)))
+    body = f"{given.robot.name} as logged, and simulated as {given.hypothesis}, transparent"
+    print_lines(
+        f"{out}: {body}; open it with `rerun {out}`." if out else f"Rerun shows {body}.",
+        f"In Foxglove or Lichtblick: open the local file {file}, then import the layout {layout}.",
+        "The layout's plots of legs are of the quadruped: other robots need their own indices.",
+    )
 
 
-def _check_name(out: Path) -> None:
-    if out.suffix.lower() != ".rrd":
-        raise InputError(f"--out needs a name that ends in .rrd, got {str(out)!r}")
-    check_folder(out)
-    refuse_existing(out)
+def layout_path() -> Path:
+    """Returns the path of the installed layout for Foxglove and Lichtblick."""
+    with as_file(files("selfmodel.cli.logs") / "foxglove-layout.json") as path:
+        return path
 
 
-def _show(given: ReplayedLog, found: Replay, out: Path | None, port: int) -> int | None:
-    """Opens the viewer, or writes the file; returns the number of bytes of the file."""
-    log, robot, assumed = given.log, given.robot, given.hypothesis
-    logged = log.trial.behaviour
+def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
+    """Writes a trial and its simulation as a file of Rerun and returns its number of bytes.
+
+    Raises:
+        InputError: Rerun is not installed.
+        WorkError: The file could not be written.
+    """
+    recording = import_rerun().RecordingStream(APPLICATION)
+    with tempfile.TemporaryDirectory() as folder:
+        part = Path(folder) / "recording.rrd"
+        recording.save(part)
+        fill_recording(recording, given, found)
+        recording.disconnect()  # the file is complete
+        data = part.read_bytes()
+    try:
+        replace_file(out, data)
+    except LogWriteError as error:
+        raise WorkError(f"{out}: it could not be written: {error.reason}") from error
+    return len(data)
+
+
+def open_viewer(given: ReplayedLog, found: Replay, port: int = PORT) -> None:
+    """Opens Rerun's viewer, in a process of its own, with a trial and its simulation.
+
+    A viewer that runs already shows the recording too. A new one is bound to this computer, which
+    ``rerun.spawn`` cannot do: a viewer of its own listens on all network interfaces.
+
+    Raises:
+        InputError: Rerun is not installed, or there is no display.
+        WorkError: The viewer did not start, was closed before it had the recording, or another
+            program has the port.
+    """
+    check_display()
+    recording = import_rerun().RecordingStream(APPLICATION)
+    if not is_listening(port):
+        _start_viewer(port)
+    recording.connect_grpc(f"rerun+http://{HOST}:{port}/proxy")
+    fill_recording(recording, given, found)
+    try:
+        recording.flush(timeout_sec=FLUSH_SECONDS)
+    except RuntimeError as error:
+        raise WorkError(
+            f"Rerun's viewer ended before it had the recording, or port {port} is that of another "
+            f"program: {error}; choose another with --port N, or write a file with -o NAME.rrd"
+        ) from error
+
+
+def _start_viewer(port: int) -> None:
+    """Starts a viewer, which goes on after this process, and waits until it listens.
+
+    Raises:
+        WorkError: It did not start.
+    """
+    try:
+        viewer = subprocess.Popen(  # noqa: S603  # Rerun's own command
+            viewer_command(port),
+            stdin=subprocess.DEVNULL,
+            # A reader of this command's output waits for no viewer.
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    except OSError as error:
+        raise WorkError(f"Rerun's viewer did not start: {error.strerror}") from error
+    end = monotonic() + START_SECONDS
+    while not is_listening(port):
+        if viewer.poll() is not None:
+            raise WorkError(
+                f"Rerun's viewer did not start: it ended with status {viewer.returncode}; write a "
+                f"file with -o NAME.rrd instead"
+            )
+        if monotonic() > end:
+            viewer.kill()
+            viewer.wait()
+            raise WorkError(f"Rerun's viewer did not listen on port {port} in {START_SECONDS:g} s")
+        sleep(0.05)
+
+
+def viewer_command(port: int) -> list[str]:
+    """Returns the command of a viewer that listens on this computer alone."""
+    # -P: a folder such as rerun_cli in the current folder is not imported.
+    command = [sys.executable, "-P", "-m", "rerun_cli", "--bind", HOST, "--port", str(port)]
+    # As rerun.spawn has them: the share of the memory, and no welcome before the recording.
+    return [*command, "--memory-limit", "75%", "--expect-data-soon"]
+
+
+def is_listening(port: int, host: str = HOST) -> bool:
+    """Returns whether a program listens on a port."""
+    with socket.socket() as tried:
+        tried.settimeout(1.0)
+        return tried.connect_ex((host, port)) == 0
+
+
+def import_rerun() -> Any:  # noqa: ANN401  # an extra
+    """Returns the module ``rerun``.
+
+    Raises:
+        InputError: It is not installed.
+    """
+    try:
+        import rerun  # noqa: PLC0415  # an extra
+        import rerun.blueprint  # noqa: PLC0415
+    except ImportError as error:
+        raise InputError(
+            "Rerun is not installed: pip install 'selfmodel[rerun]' (0.8 GB on the disk)"
+        ) from error
+    return rerun
+
+
+def check_display(environment: Mapping[str, str] = os.environ) -> None:
+    """Checks that a window can be opened.
+
+    Raises:
+        InputError: This is Linux without a display.
+    """
+    if sys.platform == "linux" and not any(map(environment.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+        raise InputError(
+            "there is no display to open Rerun on: write a file with -o NAME.rrd, and open it with "
+            "`rerun NAME.rrd` where there is one"
+        )
+
+
+def fill_recording(recording: Any, given: ReplayedLog, found: Replay) -> None:  # noqa: ANN401  # Rerun
+    """Sends both bodies, the joints and the errors of a trial to a recording, and its layout.
+
+    Args:
+        recording: The recording, a ``rerun.RecordingStream``.
+        given: The logged trial, and the hypothesis.
+        found: The simulation, compared with it.
+    """
+    rr = import_rerun()
+    logged = given.log.trial.behaviour
     motions = [(LOGGED, logged), (SIMULATED, found.simulated)]
-    film = film_of(robot, assumed, motions, np.asarray(logged.time))
+    film = film_of(given.robot, given.hypothesis, motions, np.asarray(logged.time))
     about = (
-        f"**{robot.name}**, trial {log.trial.plan.name}\n\n"
+        f"**{given.robot.name}**, trial {given.log.trial.plan.name}\n\n"
         f"- solid: as logged\n"
-        f"- transparent: simulated as `{assumed}` with the logged controller\n"
+        f"- transparent: simulated as `{given.hypothesis}` with the logged controller\n"
         f"- grey: detached by the hypothesis; red: jammed by it\n"
     )
-    if out is None:
-        open_viewer(lambda recording: fill_recording(recording, film, logged, found, about), port)
-        return None
-    return write_recording(
-        out, lambda recording: fill_recording(recording, film, logged, found, about)
+    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
+    times = [rr.TimeColumn(TIMELINE, duration=film.time)]
+
+    def send_line(path: tuple[str, ...], values: FloatArray, colour: Colour | None = None) -> None:
+        """Sends a number per step as a line of a plot; a missing number is a gap."""
+        entity = rr.new_entity_path(path)
+        colours = None if colour is None else [colour]
+        line = rr.SeriesLines(names=[", ".join(path[1:])], colors=colours)
+        recording.log(entity, line, static=True)
+        recording.send_columns(entity, times, rr.Scalars.columns(scalars=values))
+
+    for shot, (name, behaviour) in zip(film.shots, motions, strict=True):
+        _send_body(recording, film, shot.qpos, name, times)
+        angles = behaviour["joint_positions"]
+        for column, hinge in enumerate(behaviour.names.columns("joint_positions")):
+            send_line(("joints", hinge, name), angles[:, column], COLOURS[name])
+    for signal, errors in found.errors.items():
+        send_line(("errors", signal), errors)
+    recording.send_blueprint(_layout(film))
+
+
+def _send_body(recording: Any, film: Film, qpos: FloatArray, name: str, times: list[Any]) -> None:  # noqa: ANN401  # Rerun
+    """Sends the shapes of a body once, and its pose at every step."""
+    rr = import_rerun()
+    model = film.model
+    poses = body_poses(model, qpos)
+    paths: dict[int, tuple[str, ...]] = {}
+    for body in bodies_of(model, model.body(film.root).name):
+        path = ("world", name, model.body(body).name or f"body_{body}")
+        moved = rr.Transform3D.columns(
+            translation=poses[:, body, :3], quaternion=xyzw(poses[:, body, 3:])
+        )
+        recording.send_columns(rr.new_entity_path(path), times, moved)
+        paths[int(body)] = path
+    for shape in shapes_of(model, np.flatnonzero(visible_geoms(model))):
+        if shape.body not in paths:
+            continue
+        colour = JAMMED if shape.body in film.jammed else COLOURS[name]
+        colour = DETACHED if shape.body in film.detached else colour
+        drawn = archetype(model, shape, colour, transparent=name == SIMULATED)
+        entity = rr.new_entity_path((*paths[shape.body], f"geom_{shape.geom}"))
+        recording.log(entity, drawn, static=True)
+
+
+def archetype(model: mujoco.MjModel, shape: Shape, colour: Colour, *, transparent: bool) -> Any:  # noqa: ANN401  # one of several archetypes
+    """Returns a shape in the frame of its body as an archetype of Rerun.
+
+    Args:
+        model: Model of the shape.
+        shape: The shape.
+        colour: Its colour.
+        transparent: Whether faces are transparent and edges drawn; a mesh always has faces.
+    """
+    rr = import_rerun()
+    modes = rr.components.FillMode
+    place, turn, size = shape.position, shape.quaternion, shape.size
+    look = {
+        "colors": [colour],
+        "fill_mode": modes.TransparentFillMajorWireframe if transparent else modes.Solid,
+        "quaternions": [xyzw(turn)],
+    }
+    match shape.kind:
+        case "capsule":
+            # A capsule of Rerun begins at its origin; MuJoCo's has the origin in the middle.
+            start = place - rotated(np.array([0.0, 0.0, size[1]]), turn)
+            length, radius = [2 * size[1]], [size[0]]
+            return rr.Capsules3D(lengths=length, radii=radius, translations=[start], **look)
+        case "cylinder":
+            length, radius = [2 * size[1]], [size[0]]
+            return rr.Cylinders3D(lengths=length, radii=radius, centers=[place], **look)
+        case "sphere":
+            return rr.Ellipsoids3D(half_sizes=[np.repeat(size[0], 3)], centers=[place], **look)
+        case "ellipsoid":
+            return rr.Ellipsoids3D(half_sizes=[size], centers=[place], **look)
+        case "mesh":
+            vertices, faces = triangles_of(model, shape.mesh)
+            return rr.Mesh3D(
+                vertex_positions=rotated(vertices, turn) + place,
+                triangle_indices=faces,
+                albedo_factor=colour,
+            )
+    return rr.Boxes3D(half_sizes=[size], centers=[place], **look)
+
+
+def xyzw(quaternions: FloatArray) -> FloatArray:
+    """Returns quaternions of MuJoCo, ``(..., 4)`` with w first, in Rerun's order, w last."""
+    return np.roll(quaternions, -1, axis=-1)
+
+
+def _layout(film: Film) -> Any:  # noqa: ANN401  # Rerun
+    """Returns the views: the world, the joints, the errors and the text."""
+    rr = import_rerun()
+    rrb = rr.blueprint
+    root = rr.new_entity_path(("world", LOGGED, film.model.body(film.root).name))
+    ground = rr.components.Plane3D(normal=film.normal, distance=0.0)
+    no_legend = rrb.PlotLegend(visible=False)  # it would cover the lines, which tell their names
+    plots = (("joints", "joint positions, rad"), ("errors", "root mean square errors, SI units"))
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(
+                origin="world",
+                name="solid: logged; transparent: simulated",
+                line_grid=rrb.LineGrid3D(visible=True, plane=ground),
+                eye_controls=rrb.EyeControls3D(tracking_entity=root),
+            ),
+            rrb.Vertical(
+                *(
+                    rrb.TimeSeriesView(origin=origin, name=name, plot_legend=no_legend)
+                    for origin, name in plots
+                ),
+                rrb.TextDocumentView(origin="about", name="trial"),
+                row_shares=[3, 2, 1],
+            ),
+            column_shares=[3, 2],
+        ),
+        collapse_panels=True,
     )

@@ -2,27 +2,42 @@
 
 The reader is narrow on purpose: it takes every table (``*.csv``, ``*.jsonl``, and the lists of
 ``results.json``) and every figure (``*.png``, ``*.svg``) in the folder or in its folder
-``figures``, whatever study wrote them.
+``figures``, whatever study wrote them. Cells are shown as they are in their files: JSON gives each
+value its type; a column of a CSV file has numbers if each filled cell is one, and none would lose a
+digit (``_is_numeric``); other columns have texts. A cell ``true`` or ``false`` is a truth value.
 """
 
 import base64
+import csv
+import io
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.experiments.confidence_intervals import proportion
-from selfmodel.files import check_regular, read_file
-from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Table
-from selfmodel.report.document import Report, Section
-from selfmodel.report.recorded.tables import other_lists, read_table, table_files
+from selfmodel.files import check_regular, encodable, read_file
+from selfmodel.logs.result_files import parse_json
+from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Report, Section, Table
 
-MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
+MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+"""Media types of figures; an SVG file is preferred to a PNG file of the same name."""
 
 FIGURES = "figures"
 
 MAX_FIGURE_BYTES = 8_000_000
 """Largest size of all figures together, bytes; those beyond are named instead."""
+
+MAX_FILE_BYTES = 8_000_000
+"""Largest table that is read, bytes."""
+
+MAX_INTEGER = 2**53 - 1
+"""Largest integer that is a number in the page: JavaScript rounds larger ones."""
+
+LEADING_ZERO = re.compile(r"\s*[+-]?0[0-9]")
+"""Beginning of a text such as 007, which is a name and not the number 7."""
 
 CORRECT = "correct"
 """Column of the rows of a study: whether a diagnosis is right."""
@@ -30,24 +45,26 @@ CORRECT = "correct"
 FACTORS = ("comparator", "method", "robot", "case", "gap", "trials")
 """Columns by which the share of right diagnoses is shown."""
 
-Records = Sequence[Mapping[str, Cell]]
+Record = Mapping[str, Cell]
+"""A row of a table: cells by the name of their column."""
 
 
 def is_campaign(folder: Path) -> bool:
     """Returns whether a folder has tables of results."""
-    return any(table_files(folder))
+    return any(_table_files(folder))
 
 
-def report_of_campaign(folder: Path) -> Report:
+def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Report:
     """Returns the report of a campaign.
 
     Args:
         folder: Folder of the campaign.
+        most_figures: Largest size of all figures together, bytes.
 
     Raises:
         InputError: The folder has no table, or a file cannot be read.
     """
-    tables = {path.name: read_table(path) for path in table_files(folder)}
+    tables = {path.name: read_table(path) for path in _table_files(folder)}
     tables = {name: records for name, records in tables.items() if records}
     if not tables:
         raise InputError(
@@ -55,36 +72,25 @@ def report_of_campaign(folder: Path) -> Report:
             f"results.csv, got neither"
         )
     judged = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
-    rows = next(filter(None, judged), ())
+    rows = next(filter(None, judged), [])
+    every = {**other_lists(folder), **tables}
+    shown = tuple(_table(name, records) for name, records in every.items())
     found = [
         _shares(rows) if rows else None,
-        Section(
-            "tables",
-            "Tables",
-            ("A heading sorts its table by that column.",),
-            tuple(
-                _table(name, records) for name, records in {**other_lists(folder), **tables}.items()
-            ),
-        ),
-        _figures(folder),
+        Section("tables", "Tables", ("A heading sorts its table by that column.",), shown),
+        _figures(folder, most_figures),
     ]
     return Report(
-        title=f"campaign: {folder.resolve().name}",
+        title=f"campaign: {encodable(folder.resolve().name)}",
         headline=_headline(tables, rows),
-        verdict=(),
         sections=tuple(section for section in found if section is not None),
     )
 
 
-def _headline(tables: Mapping[str, Records], rows: Records) -> str:
-    """Returns what the campaign has.
-
-    Args:
-        tables: The rows of each table, by its name.
-        rows: The rows with a judged diagnosis.
-    """
+def _headline(tables: Mapping[str, Sequence[Record]], rows: Sequence[Record]) -> str:
+    """Returns what the campaign has; ``rows`` are those with a judged diagnosis."""
     counts = ", ".join(
-        f"{len(records)} {'row' if len(records) == 1 else 'rows'} in {name}"
+        f"{len(records)} {'row' if len(records) == 1 else 'rows'} in {encodable(name)}"
         for name, records in tables.items()
     )
     if not rows:
@@ -97,7 +103,7 @@ def _headline(tables: Mapping[str, Records], rows: Records) -> str:
     )
 
 
-def _shares(rows: Records) -> Section:
+def _shares(rows: Sequence[Record]) -> Section:
     charts = []
     for factor in FACTORS:
         groups: dict[str, list[bool]] = {}
@@ -110,17 +116,15 @@ def _shares(rows: Records) -> Section:
 
 
 def _share_chart(factor: str, groups: Mapping[str, Sequence[bool]]) -> IntervalChart:
-    shares = {
-        name: proportion(sum(groups[name]), len(groups[name]))
-        for name in sorted(groups, key=_numbers_first)
-    }
+    estimates = []
+    for name in sorted(groups, key=_numbers_first):
+        count = len(groups[name])
+        share = proportion(sum(groups[name]), count)
+        estimates.append(Estimate(f"{name} (n = {count})", share.estimate, share.low, share.high))
     return IntervalChart(
         title=f"Share of right diagnoses by {factor}, with 95 % intervals",
         x_label="share of right diagnoses",
-        estimates=tuple(
-            Estimate(f"{name} (n = {len(groups[name])})", one.estimate, one.low, one.high)
-            for name, one in shares.items()
-        ),
+        estimates=tuple(estimates),
         limits=(0.0, 1.0),
     )
 
@@ -134,25 +138,24 @@ def _numbers_first(name: str) -> tuple[float, str]:
     return (math.inf if math.isnan(value) else value), name
 
 
-def _table(name: str, records: Records) -> Table:
+def _table(name: str, records: Sequence[Record]) -> Table:
     columns = tuple(dict.fromkeys(key for record in records for key in record))
     rows = tuple(tuple(record.get(column) for column in columns) for record in records)
-    return Table(name, columns, rows)
+    return Table(encodable(name), columns, rows)
 
 
-def _figures(folder: Path) -> Section | None:
+def _figures(folder: Path, most: int) -> Section | None:
     shown: list[Picture] = []
     left_out: list[str] = []
-    left = MAX_FIGURE_BYTES
     for path in _figure_files(folder):
         check_regular(path, "a figure")
-        if path.stat().st_size > left:
-            left_out.append(path.name)
+        if path.stat().st_size > most:
+            left_out.append(encodable(path.name))
             continue
-        data = read_file(path, "a figure", left)
-        left -= len(data)
+        data = read_file(path, "a figure", most)
+        most -= len(data)
         encoded = base64.b64encode(data).decode("ascii")
-        shown.append(Picture(path.stem, MEDIA_TYPES[path.suffix], encoded))
+        shown.append(Picture(encodable(path.stem), MEDIA_TYPES[path.suffix], encoded))
     text = f"Left out, because the report would become too large: {', '.join(left_out)}."
     if not shown and not left_out:
         return None
@@ -160,15 +163,129 @@ def _figures(folder: Path) -> Section | None:
 
 
 def _figure_files(folder: Path) -> Iterator[Path]:
-    """Yields the figures, SVG before PNG of the same name."""
-    paths = [
-        path
-        for place in (folder, folder / FIGURES)
-        for suffix in (".svg", ".png")
-        for path in sorted(place.glob(f"*{suffix}"))
+    found: dict[str, Path] = {}
+    for place in (folder, folder / FIGURES):
+        for suffix in MEDIA_TYPES:
+            for path in sorted(place.glob(f"*{suffix}")):
+                found.setdefault(path.stem, path)
+    yield from found.values()
+
+
+def _table_files(folder: Path) -> list[Path]:
+    """Returns the tables in a folder: CSV files, then those with a JSON object per line."""
+    return [path for kind in ("*.csv", "*.jsonl") for path in sorted(folder.glob(kind))]
+
+
+def read_table(path: Path) -> list[dict[str, Cell]]:
+    """Returns the rows of a table.
+
+    Args:
+        path: A CSV file, or a file with a JSON object per line, ``.jsonl``.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    data = read_file(path, "a table of results", MAX_FILE_BYTES)
+    try:
+        text = data.decode("utf-8-sig")  # spreadsheets begin a CSV file with a byte order mark
+        if path.suffix == ".csv":
+            return _typed(list(csv.DictReader(io.StringIO(text))))
+        found = [parse_json(line.encode()) for line in text.split("\n") if line.strip()]
+        return [_flat(item) for item in found if isinstance(item, dict)]
+    except (ValueError, RecursionError, csv.Error) as error:
+        raise _unreadable(path, "a table of results", error) from error
+
+
+def other_lists(folder: Path) -> dict[str, list[dict[str, Cell]]]:
+    """Returns the lists of ``results.json`` that are in no other table, such as summaries.
+
+    Args:
+        folder: Folder of the campaign.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    path = folder / "results.json"
+    if not path.exists():
+        return {}
+    known = {path.stem for path in _table_files(folder)} | {"rows"}
+    try:
+        values: Any = parse_json(read_file(path, "the results of a study", MAX_FILE_BYTES))
+        lists = {
+            name: [_flat(item) for item in items if isinstance(item, dict)]
+            for name, items in (values.items() if isinstance(values, dict) else ())
+            if isinstance(items, list) and name not in known
+        }
+        return {name: records for name, records in lists.items() if any(records)}
+    except (ValueError, RecursionError) as error:
+        raise _unreadable(path, "the results of a study", error) from error
+
+
+def _unreadable(path: Path, what: str, error: Exception) -> InputError:
+    return InputError(
+        f"{path}: expected {what}: {error}; move it away, and the report is made without it"
+    )
+
+
+def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
+    """Returns the values of a JSON object, those of inner objects under joined names."""
+    found: dict[str, Cell] = {}
+    for key, value in item.items():
+        name = encodable(f"{prefix}{key}")
+        if isinstance(value, dict):
+            found |= _flat(value, f"{name} ")
+        elif isinstance(value, list):
+            found[name] = encodable(", ".join(map(str, value)))
+        elif isinstance(value, str):
+            found[name] = encodable(value)
+        elif isinstance(value, int) and abs(value) > MAX_INTEGER:
+            found[name] = str(value)
+        else:
+            found[name] = value
+    return found
+
+
+def _typed(rows: Sequence[Mapping[str, str | None]]) -> list[dict[str, Cell]]:
+    """Returns the rows of a CSV file with numbers and truth values."""
+    columns = [name for name in (rows[0] if rows else ()) if name]
+    numeric = {name for name in columns if _is_numeric(name, [row[name] or "" for row in rows])}
+    return [
+        {name: _cell(row[name], is_numeric=name in numeric) for name in columns} for row in rows
     ]
-    seen: set[str] = set()
-    for path in paths:
-        if path.stem not in seen:
-            seen.add(path.stem)
-            yield path
+
+
+def _is_numeric(name: str, cells: Sequence[str]) -> bool:
+    """Returns whether each filled cell of a column is a number that keeps all of its digits.
+
+    A cell does not keep them if it has a leading zero, such as 007, is an integer beyond
+    ``MAX_INTEGER``, or is a version, by the name of its column: 3.10 is not 3.1.
+    """
+    return "version" not in name.lower() and all(
+        _number(cell) is not None and not LEADING_ZERO.match(cell) for cell in cells if cell
+    )
+
+
+def _number(text: str) -> float | int | None:
+    """Returns the number that a text is, NaN and infinity too; None if it is none."""
+    if not text.isascii() or "_" in text:  # Python reads 1_000 as a number; it is a name
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    if not text.strip().lstrip("+-").isdigit():
+        return value
+    # A double is enough to compare, and Python refuses to convert thousands of digits exactly.
+    return int(text) if abs(value) <= MAX_INTEGER else None
+
+
+def _cell(text: str | None, *, is_numeric: bool) -> Cell:
+    """Returns a cell of a CSV file: a number, a truth value, a text, or None if it is empty."""
+    if not text:
+        return None
+    if text in ("true", "false", "True", "False"):  # pandas writes the latter
+        return text.lower() == "true"
+    value = _number(text) if is_numeric else None
+    if value is None or math.isinf(value):  # JSON has no infinity
+        return text
+    return None if math.isnan(value) else value

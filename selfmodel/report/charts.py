@@ -1,12 +1,38 @@
-"""Charts, tables and pictures of a report: plain data, which the page draws."""
+"""Content of a report as plain data, which the page draws: sections of charts and tables.
+
+Every record is JSON as ``as_json`` writes it: an item has its ``kind``; numbers are those of the
+logs and results, and NaN or infinite numbers are null.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any
+
+import msgspec
+
+FORMAT = "selfmodel-report-1"
+"""Format of the JSON in the page."""
+
+Cell = float | int | str | bool | None
+"""Cell of a table; None if it is empty."""
+
+Numbers = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Mark:
+class Record(msgspec.Struct, frozen=True):
+    """A part of an item."""
+
+
+class Item(msgspec.Struct, frozen=True, tag_field="kind"):
+    """What a section shows.
+
+    Attributes:
+        title: Title.
+    """
+
+    title: str
+
+
+class Mark(Record, frozen=True):
     """A time or a value that a chart marks.
 
     Attributes:
@@ -22,43 +48,30 @@ class Mark:
     high: float | None = None
 
 
-@dataclass(frozen=True)
-class Series:
+class Series(Record, frozen=True):
     """One line of a chart.
 
     Attributes:
         name: Name in the legend.
         x: Positions on the horizontal axis.
-        y: Values, as many; NaN where unknown.
+        y: Values, as many; NaN or None where unknown.
     """
 
     name: str
-    x: tuple[float, ...]
-    y: tuple[float, ...]
+    x: Numbers
+    y: tuple[float | None, ...]
 
 
-@dataclass(frozen=True)
-class LineChart:
-    """Values over a horizontal axis.
+class LineChart(Item, frozen=True, tag="line"):
+    """Values over a horizontal axis; labels have the unit."""
 
-    Attributes:
-        title: Title.
-        x_label: Label of the horizontal axis, with its unit.
-        y_label: Label of the vertical axis, with its unit.
-        series: The lines.
-        marks: Marked positions on the horizontal axis.
-    """
-
-    KIND: ClassVar[str] = "line"
-    title: str
     x_label: str
     y_label: str
     series: tuple[Series, ...]
     marks: tuple[Mark, ...] = ()
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(Record, frozen=True):
     """Bars with one label.
 
     Attributes:
@@ -67,29 +80,24 @@ class Group:
     """
 
     label: str
-    values: tuple[float, ...]
+    values: Numbers
 
 
-@dataclass(frozen=True)
-class BarChart:
+class BarChart(Item, frozen=True, tag="bars"):
     """Horizontal bars in groups.
 
     Attributes:
-        title: Title.
         x_label: Label of the values, with their unit.
         names: Names of the bars of a group.
         groups: The groups.
     """
 
-    KIND: ClassVar[str] = "bars"
-    title: str
     x_label: str
     names: tuple[str, ...]
     groups: tuple[Group, ...]
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(Record, frozen=True):
     """A value with an interval.
 
     Attributes:
@@ -107,45 +115,33 @@ class Estimate:
     note: str = ""
 
 
-@dataclass(frozen=True)
-class IntervalChart:
+class IntervalChart(Item, frozen=True, tag="intervals"):
     """Values with intervals, one below the other.
 
     Attributes:
-        title: Title.
         x_label: Label of the values, with their unit.
         estimates: The values.
         reference: Value that is marked, such as 1 for factors; None without one.
         limits: Ends of the axis, such as 0 and 1 for shares; None for those of the values.
     """
 
-    KIND: ClassVar[str] = "intervals"
-    title: str
     x_label: str
     estimates: tuple[Estimate, ...]
     reference: float | None = None
     limits: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class Row:
-    """A row of a heat map.
-
-    Attributes:
-        label: Name of the row.
-        values: Value in each column; NaN where unknown.
-    """
+class Row(Record, frozen=True):
+    """A row of a heat map: its name, and its value in each column, NaN where unknown."""
 
     label: str
-    values: tuple[float, ...]
+    values: Numbers
 
 
-@dataclass(frozen=True)
-class HeatMap:
+class HeatMap(Item, frozen=True, tag="heat"):
     """Values by row and time.
 
     Attributes:
-        title: Title.
         x_label: Label of the horizontal axis, with its unit.
         value_label: Label of the values, with their unit.
         begin: Beginning of each column on the horizontal axis.
@@ -155,97 +151,87 @@ class HeatMap:
         marks: Marked positions on the horizontal axis.
     """
 
-    KIND: ClassVar[str] = "heat"
-    title: str
     x_label: str
     value_label: str
-    begin: tuple[float, ...]
-    end: tuple[float, ...]
+    begin: Numbers
+    end: Numbers
     rows: tuple[Row, ...]
     largest: float
     marks: tuple[Mark, ...] = ()
 
 
-@dataclass(frozen=True)
-class Lane:
-    """A lane of a gait diagram.
-
-    Attributes:
-        label: Name of the sensor.
-        spans: Beginning and end of each contact, s.
-    """
+class Lane(Record, frozen=True):
+    """A lane of a gait diagram: name of the sensor, beginning and end of each contact, s."""
 
     label: str
     spans: tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
-class GaitDiagram:
-    """Ground contacts over time, one group of lanes per robot.
+class GaitDiagram(Item, frozen=True, tag="gait"):
+    """Ground contacts over time: lanes by the name of the robot, and the end of the trial, s."""
 
-    Attributes:
-        title: Title.
-        groups: Lanes by the name of the robot.
-        end: Duration of the trial, s.
-    """
-
-    KIND: ClassVar[str] = "gait"
-    title: str
     groups: Mapping[str, tuple[Lane, ...]]
     end: float
 
 
-Cell = float | int | str | bool | None
-"""Cell of a table; None if it is empty."""
+class Table(Item, frozen=True, tag="table"):
+    """A table that the reader can sort; names of columns have the unit."""
 
-
-@dataclass(frozen=True)
-class Table:
-    """A table that the reader can sort.
-
-    Attributes:
-        title: Title.
-        columns: Name of each column, with its unit.
-        rows: Cells: numbers, texts, truth values, or None for an empty cell.
-    """
-
-    KIND: ClassVar[str] = "table"
-    title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A picture.
+class Picture(Item, frozen=True, tag="picture"):
+    """A picture: media type, such as ``image/png``, and the file in base64."""
 
-    Attributes:
-        title: Title, which is also the text for screen readers.
-        media_type: Media type, such as ``image/png``.
-        data: The file in base64.
-    """
-
-    KIND: ClassVar[str] = "picture"
-    title: str
     media_type: str
     data: str
 
 
-@dataclass(frozen=True)
-class Attachment:
-    """A file that the reader can save.
+class Attachment(Item, frozen=True, tag="file"):
+    """A file that the reader can save: its name, and the file in base64."""
 
-    Attributes:
-        title: What the file is.
-        name: Name of the file.
-        data: The file in base64.
-    """
-
-    KIND: ClassVar[str] = "file"
-    title: str
     name: str
     data: str
 
 
-Item = LineChart | BarChart | IntervalChart | HeatMap | GaitDiagram | Table | Picture | Attachment
-"""What a section shows."""
+class Section(Record, frozen=True):
+    """A section of a report.
+
+    Attributes:
+        key: Identifier in the page, a word in lower case.
+        title: Heading.
+        text: Paragraphs before the items.
+        items: Charts, tables and pictures, in order.
+    """
+
+    key: str
+    title: str
+    text: tuple[str, ...] = ()
+    items: tuple[Item, ...] = ()
+
+
+class Report(Record, frozen=True, kw_only=True):
+    """A report.
+
+    Attributes:
+        title: Title of the page.
+        headline: What happened, in one sentence.
+        verdict: Further sentences about the result.
+        sections: The sections, in order.
+        scene: Robots on one timeline, ``scene.scene_of``; None without one.
+        made_with: Versions by the name of the software.
+    """
+
+    format: str = FORMAT
+    title: str
+    headline: str
+    verdict: tuple[str, ...] = ()
+    sections: tuple[Section, ...] = ()
+    scene: Mapping[str, Any] | None = None
+    made_with: Mapping[str, str] = {}  # a struct copies it
+
+
+def as_json(report: Report) -> bytes:
+    """Returns the JSON of a report; a number that is not finite is null."""
+    return msgspec.json.encode(report, enc_hook=dict)  # a read-only mapping

@@ -1,48 +1,73 @@
-"""Progress of the searches of a recovery: recorded as it happens, kept in the run's folder."""
+"""Progress of a recovery in its folder: its searches, and on request a report after each trial."""
 
-import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from selfmodel.errors import InputError, WorkError
+from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.errors import WorkError
 from selfmodel.evolution import Generation
-from selfmodel.files import read_file
 from selfmodel.logs.files import replace_file
-from selfmodel.logs.result_files import MAX_BYTES, parse_json
+from selfmodel.logs.results import Search, write_searches
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.report.subject import Search
+from selfmodel.report.charts import Report
+from selfmodel.report.content import report_before_diagnosis, report_of
+from selfmodel.report.page import REPORT, html_of
+from selfmodel.report.subject import Subject, title_of
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
-SEARCHES = "searches.json"
-"""File of the progress of all searches, in the folder of a run."""
 
+@dataclass(eq=False)
+class Progress:
+    """Records the events of a recovery, and hands every event on.
 
-@dataclass(frozen=True, eq=False)
-class ProgressRecorder:
-    """Records the generations of each search, and hands every event on.
+    The report is made of what the recovery has in memory, by simulations of its own: the recovery
+    computes the same numbers with and without it.
 
     Attributes:
+        folder: Folder of the run.
+        robot: The nominal robot.
         on_event: Callback that every event is handed to.
-        begun: Each search that began, with its generations.
-        finished: Names of the trials that ended.
+        threads: Threads of the physics of the report.
+        reports: Whether the report in the folder is rewritten after each trial, as soon as it is
+            diagnosed, and before the first diagnosis.
     """
 
-    on_event: Callable[[Event], None]
-    begun: list[tuple[SearchBegins, list[Generation]]] = field(default_factory=list)
-    finished: list[str] = field(default_factory=list)
+    folder: Path
+    robot: Robot
+    on_event: Callable[[Event], None] = lambda _event: None
+    threads: int = 0
+    reports: bool = False
+    _begun: list[tuple[SearchBegins, list[Generation]]] = field(default_factory=list)
+    _trials: list[Trial] = field(default_factory=list)
+    _diagnoses: list[Diagnosis] = field(default_factory=list)
+    _comparator: ChosenComparator | None = None
+    _calibration: Calibration | None = None
 
     def __call__(self, event: Event) -> None:
         """Records an event."""
-        if isinstance(event, SearchBegins):
-            self.begun.append((event, []))
-        elif isinstance(event, Generation) and self.begun:
-            self.begun[-1][1].append(event)
-        elif isinstance(event, Trial):
-            self.finished.append(event.plan.name)
+        match event:
+            case SearchBegins():
+                self._begun.append((event, []))
+            case Generation() if self._begun:
+                self._begun[-1][1].append(event)
+            case ChosenComparator():
+                self._comparator = event
+            case Calibration():
+                self._calibration = event
+            case Trial():
+                self._trials.append(event)
+            case Diagnosis():
+                self._diagnoses.append(event)
         self.on_event(event)
+        is_news = isinstance(event, Diagnosis) or (isinstance(event, Trial) and not self._diagnoses)
+        if self.reports and is_news:
+            replace_file(self.folder / REPORT, html_of(self.report()))
 
     @property
     def searches(self) -> tuple[Search, ...]:
@@ -51,70 +76,47 @@ class ProgressRecorder:
             Search(
                 kind=begun.kind,
                 hypothesis="" if begun.hypothesis is None else str(begun.hypothesis),
-                best=tuple(one.best for one in generations),
+                best=tuple(one.best if one.best > -math.inf else None for one in generations),
                 evaluations=tuple(one.evaluations for one in generations),
             )
-            for begun, generations in self.begun
+            for begun, generations in self._begun
         )
 
-    @contextmanager
-    def kept_on_failure(self, folder: Path) -> Iterator[None]:
-        """Writes the progress if an error ends the recovery, with a note where its trials are.
+    def report(self) -> Report:
+        """Returns the report of what happened so far, which states that it is not finished."""
+        name = self.folder.resolve().name
+        if not self._diagnoses or self._comparator is None:
+            happened = (
+                f"the trial {self._trials[-1].plan.name} was run" if self._trials else "it begins"
+            )
+            return report_before_diagnosis(title_of(self.robot, name), happened, self.searches)
+        healthy = [trial for trial in self._trials if trial.plan.stage == "before"]
+        damaged = [trial for trial in self._trials if trial.plan.stage != "before"]
+        subject = Subject(
+            name=name,
+            robot=self.robot,
+            healthy=tuple(healthy),
+            damaged=tuple(damaged[: self._diagnoses[-1].trials]),
+            diagnoses=tuple(self._diagnoses),
+            comparator=self._comparator.comparator,
+            calibration=self._calibration,
+            searches=self.searches,
+            threads=self.threads,
+        )
+        return report_of(subject, finished=False)
 
-        Args:
-            folder: Folder of the run. An error before any search, such as that the folder has other
-                files, leaves it as it is.
+    @contextmanager
+    def kept_on_failure(self) -> Iterator[None]:
+        """Writes the searches if an error ends the recovery, with a note where its trials are.
+
+        An error before any search, such as that the folder has other files, leaves it as it is.
         """
         try:
             yield
         except BaseException as error:
-            if self.finished:
-                error.add_note(f"the finished trials are in {folder}")
-            if self.begun:
+            if self._trials:
+                error.add_note(f"the finished trials are in {self.folder}")
+            if self._begun:
                 with suppress(OSError, WorkError):  # the first error is the one to report
-                    self.write(folder)
+                    write_searches(self.folder, self.searches)
             raise
-
-    def write(self, folder: Path) -> None:
-        """Writes the progress into the folder of a run.
-
-        Raises:
-            LogWriteError: The disk is full, or failed.
-        """
-        values = [
-            {**asdict(search), "best": [_finite(one) for one in search.best]}
-            for search in self.searches
-        ]
-        replace_file(folder / SEARCHES, json.dumps(values, indent=1, allow_nan=False).encode())
-
-
-def read_searches(folder: Path) -> tuple[Search, ...]:
-    """Returns the progress in the folder of a run; none if it was not recorded.
-
-    Raises:
-        InputError: The file is damaged.
-    """
-    path = folder / SEARCHES
-    if not path.exists():
-        return ()
-    try:
-        items: Any = parse_json(read_file(path, "the progress of searches", MAX_BYTES))
-        return tuple(
-            Search(
-                kind=str(item["kind"]),
-                hypothesis=str(item["hypothesis"]),
-                best=tuple(float("-inf") if one is None else float(one) for one in item["best"]),
-                evaluations=tuple(int(one) for one in item["evaluations"]),
-            )
-            for item in items
-        )
-    except (ValueError, KeyError, TypeError, OverflowError) as error:
-        raise InputError(
-            f"{path}: expected the progress of the searches of a run: {error}; move it away, and "
-            f"the report is made without it"
-        ) from error
-
-
-def _finite(value: float) -> float | None:
-    """JSON has no infinity, which is the fitness if every simulation diverged."""
-    return value if value > float("-inf") else None

@@ -1,16 +1,32 @@
-"""Geometry of a robot in a page: its bodies, and the shapes on them, from its own model."""
+"""The robots of a report on one timeline, as JSON: bodies with their shapes, and poses over time.
 
-from collections.abc import Iterator, Mapping
+Poses are by forward kinematics of the robot's own model. Arrays are 16-bit numbers in base64.
+"""
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.report.encoding import base64_of, quantised
-from selfmodel.report.meshes import Triangles, simplified
+from selfmodel.faults.build import build, detached_bodies, jammed_bodies
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.motion import (
+    bodies_of,
+    body_poses,
+    poses_of,
+    shapes_of,
+    triangles_of,
+    visible_geoms,
+)
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.visible_geoms import visible_geoms
+from selfmodel.trials.behaviour import Behaviour
+
+MAX_POSES = 400_000
+"""Poses of single bodies in a report, over all motions and frames: 14 bytes each, before base64."""
 
 MAX_FACES = 40_000
 """Triangles of all meshes of a robot, at most."""
@@ -18,22 +34,58 @@ MAX_FACES = 40_000
 MIN_FACES = 200
 """Triangles that each mesh may have, however many meshes there are."""
 
-SHAPES: Mapping[int, str] = {
-    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-}
-"""Shapes that are drawn, by type of a geom; the ground is drawn by the page."""
+FINEST_GRID = 64
+"""Cells along the longest side of a mesh in the first simplification."""
+
+LEVELS = 65535
+"""Largest 16-bit number."""
 
 
-def bodies_of(robot: Robot) -> IndexArray:
-    """Returns the ids of a robot's bodies, ``(bodies,)``: those of its kinematic tree."""
-    model = robot.model
-    root = int(model.body(robot.root).id)
-    return np.flatnonzero(model.body_rootid == model.body_rootid[root])
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One motion of the robot.
+
+    Attributes:
+        name: Name in the legend, such as ``measured``.
+        hypothesis: Faults of the robot in this motion; of the measured robot, those of the best
+            hypothesis.
+        behaviour: The motion, with the signals of a pose.
+    """
+
+    name: str
+    hypothesis: Hypothesis
+    behaviour: Behaviour
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """The motions of one trial.
+
+    Attributes:
+        name: Name of the trial.
+        motions: The measured motion, then the simulated ones.
+        mark: Time of a change of the robot, s; None without one.
+    """
+
+    name: str
+    motions: tuple[Motion, ...]
+    mark: float | None = None
+
+
+def scene_of(robot: Robot, shots: Sequence[Shot], most_poses: int = MAX_POSES) -> dict[str, Any]:
+    """Returns the geometry and the motions of a robot as JSON values.
+
+    Steps are left out where a report would be too large; the first and the last remain.
+
+    Args:
+        robot: The robot.
+        shots: The trials.
+        most_poses: Largest number of poses of single bodies, about.
+    """
+    bodies = bodies_of(robot.model, robot.root)
+    poses = sum(shot.motions[0].behaviour.steps * len(shot.motions) for shot in shots) * len(bodies)
+    stride = max(1, -(-poses // most_poses))
+    return {**geometry_of(robot), "shots": [_shot(robot, bodies, one, stride) for one in shots]}
 
 
 def geometry_of(robot: Robot) -> dict[str, Any]:
@@ -45,29 +97,26 @@ def geometry_of(robot: Robot) -> dict[str, Any]:
     angle ``reference``, and turns about ``axis``.
     """
     model = robot.model
-    bodies = bodies_of(robot)
+    bodies = bodies_of(model, robot.root)
     index = {int(body): i for i, body in enumerate(bodies)}
-    shapes = [
-        int(geom)
-        for geom in np.flatnonzero(visible_geoms(model))
-        if int(model.geom_bodyid[geom]) in index and int(model.geom_type[geom]) in SHAPES
-    ]
-    meshes = sorted({int(model.geom_dataid[geom]) for geom in shapes if _is_mesh(model, geom)})
+    drawn = shapes_of(model, np.flatnonzero(visible_geoms(model)))
+    shapes = [shape for shape in drawn if shape.body in index]
+    meshes = sorted({shape.mesh for shape in shapes if shape.kind == "mesh"})
     faces = max(MIN_FACES, MAX_FACES // max(1, len(meshes)))
     return {
         "bodies": [str(model.body(body).name) for body in bodies],
         "shapes": [
             {
-                "body": index[int(model.geom_bodyid[geom])],
-                "type": SHAPES[int(model.geom_type[geom])],
-                "size": model.geom_size[geom].tolist(),
-                "position": model.geom_pos[geom].tolist(),
-                "quaternion": model.geom_quat[geom].tolist(),
-                "mesh": meshes.index(int(model.geom_dataid[geom])) if _is_mesh(model, geom) else -1,
+                "body": index[shape.body],
+                "type": shape.kind,
+                "size": shape.size.tolist(),
+                "position": shape.position.tolist(),
+                "quaternion": shape.quaternion.tolist(),
+                "mesh": meshes.index(shape.mesh) if shape.kind == "mesh" else -1,
             }
-            for geom in shapes
+            for shape in shapes
         ],
-        "meshes": [_mesh(simplified(_triangles(model, mesh), faces)) for mesh in meshes],
+        "meshes": [_mesh(*simplified(*triangles_of(model, mesh), faces)) for mesh in meshes],
         "hinges": list(robot.anatomy.hinges),
         "turned": list(_turned(robot, index)),
         "height": robot.standing_height,
@@ -75,19 +124,8 @@ def geometry_of(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _is_mesh(model: mujoco.MjModel, geom: int) -> bool:
-    return bool(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH)
-
-
-def _triangles(model: mujoco.MjModel, mesh: int) -> Triangles:
-    vertex, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
-    vertices: FloatArray = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[mesh])]
-    faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
-    return Triangles(vertices.astype(float), faces.astype(np.intp))
-
-
-def _mesh(mesh: Triangles) -> dict[str, Any]:
-    return {"vertices": quantised(mesh.vertices), "faces": base64_of(mesh.faces.astype("<u4"))}
+def _mesh(vertices: FloatArray, faces: IndexArray) -> dict[str, Any]:
+    return {"vertices": quantised(vertices), "faces": _base64(faces.astype("<u4"))}
 
 
 def _turned(robot: Robot, index: Mapping[int, int]) -> Iterator[dict[str, Any]]:
@@ -106,3 +144,97 @@ def _turned(robot: Robot, index: Mapping[int, int]) -> Iterator[dict[str, Any]]:
                 "reference": float(hinge.qpos0[0]),
                 "rest": model.body_quat[body].tolist(),
             }
+
+
+def _shot(robot: Robot, bodies: IndexArray, shot: Shot, stride: int) -> dict[str, Any]:
+    time = shot.motions[0].behaviour.time
+    steps = np.unique(np.append(np.arange(0, len(time), stride), len(time) - 1))
+    return {
+        "name": shot.name,
+        "time": time[steps].tolist(),
+        "mark": shot.mark,
+        "motions": [_motion(robot, bodies, motion, steps) for motion in shot.motions],
+    }
+
+
+def _motion(robot: Robot, bodies: IndexArray, motion: Motion, steps: IndexArray) -> dict[str, Any]:
+    index = {int(body): i for i, body in enumerate(bodies)}
+    # A welded hinge has its own rotation in the hypothesis's model; the geometry is the robot's.
+    poses = poses_of(robot, robot.model, motion.behaviour)
+    qpos = poses.qpos[steps]
+    drawn = body_poses(robot.model, qpos)[:, bodies].reshape(-1, 7)
+    hinges = [int(robot.model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]
+    model = build(robot, motion.hypothesis).model
+    detached = detached_bodies(robot.anatomy, model, motion.hypothesis)
+    jammed = jammed_bodies(robot.anatomy, model, motion.hypothesis)
+    return {
+        "name": motion.name,
+        "hypothesis": str(motion.hypothesis),
+        "position": quantised(drawn[:, :3]),
+        "rotation": quantised(drawn[:, 3:]),
+        "angles": quantised(qpos[:, hinges]),
+        "missing": list(poses.missing),
+        "held": np.flatnonzero(poses.held[steps]).tolist(),
+        "detached": sorted(index[body] for body in detached),
+        "jammed": sorted(index[body] for body in jammed),
+        "travelled": poses.forward[steps].tolist(),
+    }
+
+
+def quantised(values: FloatArray) -> dict[str, Any]:
+    """Returns finite numbers as 16-bit numbers between the bounds of each column.
+
+    Args:
+        values: Numbers, ``(rows, columns)``; the error is at most 1/131070 of a column's span.
+
+    Returns:
+        ``low`` and ``span`` of each column and, in ``data``, little-endian 16-bit numbers q in
+        base64, in row-major order: a value is ``low + span * q / 65535``.
+    """
+    low, high = values.min(axis=0), values.max(axis=0)
+    span = high - low
+    levels = np.round((values - low) / np.where(span > 0, span, 1.0) * LEVELS)
+    return {"low": low.tolist(), "span": span.tolist(), "data": _base64(levels.astype("<u2"))}
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def simplified(
+    vertices: FloatArray, faces: IndexArray, most_faces: int
+) -> tuple[FloatArray, IndexArray]:
+    """Returns the vertices and the faces of a mesh with at most that many triangles.
+
+    Vertices in one cell of a grid become one, at their mean; the grid is coarsened until the rest
+    is small enough. A mesh that is small enough is returned as it is.
+
+    Source: Rossignac & Borrel, "Multi-resolution 3D approximations for rendering complex scenes"
+    (1993).
+
+    Args:
+        vertices: Positions, ``(vertices, 3)``, m.
+        faces: Indices of the corners of each triangle, ``(faces, 3)``.
+        most_faces: Largest number of triangles, at least 200.
+    """
+    found, cells = (vertices, faces), FINEST_GRID
+    while len(found[1]) > most_faces and cells >= 1:
+        found, cells = _clustered(vertices, faces, cells), cells * 3 // 4
+    return found
+
+
+def _clustered(
+    vertices: FloatArray, faces: IndexArray, cells: int
+) -> tuple[FloatArray, IndexArray]:
+    low = vertices.min(axis=0)
+    size = float(np.ptp(vertices, axis=0).max()) / cells or 1.0
+    keys = np.floor((vertices - low) / size).astype(np.int64)
+    _, cluster = np.unique(keys, axis=0, return_inverse=True)
+    cluster = cluster.reshape(-1)
+    counts = np.bincount(cluster)
+    means = [np.bincount(cluster, weights=column) / counts for column in vertices.T]
+    corners = cluster[faces]
+    ordered = np.sort(corners, axis=1)
+    proper = (ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2])
+    _, first = np.unique(ordered[proper], axis=0, return_index=True)
+    return np.stack(means, axis=1), corners[proper][np.sort(first)]

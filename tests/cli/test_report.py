@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.report import html
-from selfmodel.report.document import Report
-from tests.helpers.browser import built
+from selfmodel.report.charts import Report
+from selfmodel.report.page import html_of
 from tests.helpers.command import SMALL, selfmodel
 
 BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"
@@ -36,7 +35,6 @@ def diagnosed(logs: Path) -> Path:
     return logs / "found.json"
 
 
-@built
 def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_same(
     logs: Path, diagnosed: Path
 ):
@@ -55,7 +53,6 @@ def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_s
     assert "diagnostic EA" not in again.stderr
 
 
-@built
 def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
     (logs / "moved").mkdir()
     shutil.copy(logs / "before.mcap", logs / "moved" / "after.mcap")
@@ -72,7 +69,6 @@ def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
         )
 
 
-@built
 def test_a_diagnosis_with_another_self_model_is_refused_and_without_a_digest_noted(
     logs: Path, diagnosed: Path
 ):
@@ -91,7 +87,6 @@ def test_a_diagnosis_with_another_self_model_is_refused_and_without_a_digest_not
     assert "note: earlier.json is of an earlier version, which did not record" in noted.stderr
 
 
-@built
 def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
     (tmp_path / "results.csv").write_text("robot,correct\nquadruped,true\n")
 
@@ -102,7 +97,6 @@ def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
     assert (tmp_path / "report.html").exists()
 
 
-@built
 def test_a_file_that_appears_while_the_report_is_made_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -122,10 +116,9 @@ def test_a_file_that_appears_while_the_report_is_made_is_kept(
 def _meanwhile(folder: Path, report: Report) -> bytes:
     """The page of a report, while another program writes a file of that name."""
     (folder / "a.html").write_text("of another")
-    return html.html_of(report)
+    return html_of(report)
 
 
-@built
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -146,16 +139,3 @@ def test_bad_input_is_one_sentence_and_status_2(logs: Path, arguments: tuple[str
 
     assert (done.returncode, done.stdout) == (2, "")
     assert said in done.stderr
-
-
-def test_a_missing_page_is_an_error_before_any_work(
-    logs: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-):
-    monkeypatch.setattr(html, "files", lambda _package: tmp_path)
-    shutil.copy(logs / "after.mcap", tmp_path)
-
-    done = selfmodel("report", "after.mcap", cwd=tmp_path)
-
-    assert done.returncode == 2
-    assert "run `make page` in a checkout" in done.stderr
-    assert "diagnostic EA" not in done.stderr

@@ -1,4 +1,4 @@
-"""A browser for tests, and the built page of a report; what needs one is skipped without."""
+"""A browser for tests; what needs one is skipped without."""
 
 import json
 import os
@@ -16,11 +16,6 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 CHROMIUM = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
 """The browser that tests drive."""
-
-built = pytest.mark.skipif(
-    not (ROOT / "selfmodel" / "report" / "template.html").exists(),
-    reason="the page of a report is not built: make page",
-)
 
 browses = pytest.mark.skipif(
     not (DRIVER / "node_modules" / ".ready").exists() or CHROMIUM is None,

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from selfmodel.cli.rendering.gl import WITHOUT_SCREEN, works
+from selfmodel.cli.render import WITHOUT_SCREEN, draws as works
 
 WORKS = next(filter(works, WITHOUT_SCREEN), None)
 """The value of ``MUJOCO_GL`` with which MuJoCo draws."""

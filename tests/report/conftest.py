@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.report.rollouts import TrialRollouts, rollouts_of
-from selfmodel.report.run_folder import subject_of_run
-from selfmodel.report.subject import Subject
+from selfmodel.report.subject import Subject, subject_of_run
+from selfmodel.report.trials import TrialRollouts, rollouts_of
 from tests.helpers.command import SMALL, selfmodel
 
 

@@ -1,3 +1,5 @@
+"""The progress of a recovery in its folder, and the report that is rewritten while it goes on."""
+
 import json
 import math
 from pathlib import Path
@@ -8,93 +10,126 @@ import pytest
 from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs.results import SEARCHES, read_searches, write_searches
 from selfmodel.recovery.events import SearchBegins
-from selfmodel.report.progress import SEARCHES, ProgressRecorder, read_searches
+from selfmodel.report.progress import Progress
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import random_controllers
 
 
-def recorded() -> ProgressRecorder:
-    recorder = ProgressRecorder(lambda _event: None)
-    recorder(SearchBegins("repair", INTACT))
-    recorder(Generation(1, 2, 0.1, 20, 1.0))
-    recorder(Generation(2, 2, 0.30000000000000004, 30, 2.0))
-    recorder(SearchBegins("diagnostic"))
-    recorder(Generation(1, 2, -math.inf, 20, 1.0))
-    return recorder
+def recorded(folder: Path, robot: Robot) -> Progress:
+    progress = Progress(folder, robot)
+    progress(SearchBegins("repair", INTACT))
+    progress(Generation(1, 2, 0.1, 20, 1.0))
+    progress(Generation(2, 2, 0.30000000000000004, 30, 2.0))
+    progress(SearchBegins("diagnostic"))
+    progress(Generation(1, 2, -math.inf, 20, 1.0))
+    return progress
 
 
-def test_every_event_is_handed_on():
-    handed = []
-    event = SearchBegins("diagnostic")
+def test_the_searches_are_read_back_from_the_folder(tmp_path: Path, quadruped: Robot):
+    searches = recorded(tmp_path, quadruped).searches
 
-    ProgressRecorder(handed.append)(event)
+    write_searches(tmp_path, searches)
 
-    assert handed == [event]
-
-
-def test_the_progress_is_read_back_from_the_folder(tmp_path: Path):
-    recorder = recorded()
-
-    recorder.write(tmp_path)
-
-    assert read_searches(tmp_path) == recorder.searches
-    assert [one.best for one in recorder.searches] == [(0.1, 0.30000000000000004), (-math.inf,)]
-    assert [one.hypothesis for one in recorder.searches] == ["intact", ""]
+    assert read_searches(tmp_path) == searches
+    assert [one.best for one in searches] == [(0.1, 0.30000000000000004), (None,)]
+    assert [one.hypothesis for one in searches] == ["intact", ""]
 
 
 @pytest.mark.parametrize("kind", [WorkError, InputError, KeyboardInterrupt])
-def test_a_failure_keeps_the_progress_and_names_the_folder_of_the_finished_trials(
+def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trials(
     tmp_path: Path, quadruped: Robot, kind: type[BaseException]
 ):
-    recorder = recorded()
-    with pytest.raises(kind) as early, recorder.kept_on_failure(tmp_path):
+    progress = recorded(tmp_path, quadruped)
+    with pytest.raises(kind) as early, progress.kept_on_failure():
         raise kind("before the first trial")
     (gait,) = random_controllers(quadruped, 1)
     plan = TrialPlan("00-before", "before", gait, 1, 0)
-    recorder(Trial(plan, "quadruped", Behaviour(quadruped.anatomy.names, np.zeros(1), {}), "log"))
-    with pytest.raises(kind) as failure, recorder.kept_on_failure(tmp_path):
+    progress(Trial(plan, "quadruped", Behaviour(quadruped.anatomy.names, np.zeros(1), {}), "log"))
+    with pytest.raises(kind) as failure, progress.kept_on_failure():
         raise kind("the robot is gone")
 
     assert describe(early.value) == "before the first trial"
     assert describe(failure.value) == f"the robot is gone; the finished trials are in {tmp_path}"
-    assert read_searches(tmp_path) == recorder.searches
+    assert read_searches(tmp_path) == progress.searches
 
 
-def test_a_failure_before_any_search_writes_nothing(tmp_path: Path):
-    recorder = ProgressRecorder(lambda _event: None)
-    with pytest.raises(InputError, match="another run"), recorder.kept_on_failure(tmp_path):
+def test_a_failure_before_any_search_or_without_a_disk_is_reported_as_it_is(
+    tmp_path: Path, quadruped: Robot
+):
+    with (
+        pytest.raises(InputError, match="another"),
+        Progress(tmp_path, quadruped).kept_on_failure(),
+    ):
         raise InputError("the folder has another run")
-
     assert not list(tmp_path.iterdir())
-
-
-def test_a_failure_is_reported_though_the_progress_cannot_be_written(tmp_path: Path):
-    recorder, gone = recorded(), tmp_path / "gone"
-    with pytest.raises(WorkError, match="the robot is gone"), recorder.kept_on_failure(gone):
+    progress = recorded(tmp_path / "no-folder", quadruped)
+    with pytest.raises(WorkError, match="gone"), progress.kept_on_failure():
         raise WorkError("the robot is gone")
-
-
-def test_a_folder_without_progress_has_none(tmp_path: Path):
-    assert read_searches(tmp_path) == ()
 
 
 LONG = '[{"kind": "repair", "hypothesis": "", "best": [1%s], "evaluations": [1]}]' % ("0" * 400)
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '[{"kind": "repair"}]', '[{"best": [NaN]}]', LONG])
-def test_a_damaged_file_is_named(tmp_path: Path, text: str):
+def test_a_damaged_file_is_named_and_a_folder_without_one_has_none(tmp_path: Path, text: str):
+    assert read_searches(tmp_path) == ()
     (tmp_path / SEARCHES).write_text(text)
 
     with pytest.raises(InputError, match=r"searches\.json: expected the progress"):
         read_searches(tmp_path)
 
 
-def test_a_recovery_leaves_its_progress(run: Path):
-    searches = read_searches(run)
+def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    pages: list[tuple[str, int]] = []
 
-    assert [one.kind for one in searches] == ["repair", "diagnostic", "repair", "diagnostic"]
-    assert all(0 < len(one.best) == len(one.evaluations) for one in searches)
-    assert json.loads((run / SEARCHES).read_text())[2]["hypothesis"] != ""
+    def kept(path: Path, data: bytes) -> None:
+        if path.name == "report.html":
+            text = data.decode().partition('id="report">')[2].partition("</script>")[0]
+            values = json.loads(text)
+            pages.append((values["headline"], len(values["sections"])))
+        path.write_bytes(data)
+
+    monkeypatch.setattr("selfmodel.report.progress.replace_file", kept)
+    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--gap", "0.1")
+    done = selfmodel("recover", "quadruped", *arguments, "--report", "--out", "run", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert f"report: {Path('run') / 'report.html'}" in done.stderr
+    headlines = [headline for headline, _ in pages]
+    assert headlines[0] == "The recovery is not finished: the trial 00-before was run."
+    assert headlines[1] == "The recovery is not finished: the trial 01-after was run."
+    assert headlines[2].startswith("The recovery is not finished: 1 trial of the quadruped: it ")
+    assert headlines[3].startswith("The recovery is not finished: 2 trials of the quadruped: it ")
+    assert pages[3][1] == 7
+    last = (tmp_path / "run" / "report.html").read_text()
+    assert '"headline":"The quadruped moved' in last
+    # The recovery computes the same numbers with and without a report.
+    for name in (SEARCHES, "diagnoses.json"):
+        assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
+    before, after = (
+        json.loads((folder / "result.json").read_text()) for folder in (run, tmp_path / "run")
+    )
+    for key in ("seconds", "sha256"):
+        del before[key], after[key]
+    assert before == after
+
+
+def test_a_recovery_that_is_interrupted_leaves_the_last_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def stopped(*_arguments: object, **_more: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("selfmodel.studies.experiment.is_correct", stopped)
+    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--out", "run")
+    done = selfmodel("recover", "quadruped", *arguments, "--report", cwd=tmp_path)
+
+    assert done.returncode != 0
+    assert "The recovery is not finished: " in (tmp_path / "run" / "report.html").read_text()

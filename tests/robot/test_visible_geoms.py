@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from selfmodel.experiments.suite.bodies import DOMAINS
-from selfmodel.robot.visible_geoms import opacity, stick_geoms, visible_geoms
+from selfmodel.robot.motion import opacity, stick_geoms, visible_geoms
 from selfmodel.tasks import ROBOTS
 from tests.helpers.opengl import WORKS, draws
 from tests.robot.mjcf.samples import GYMNASIUM, SAMPLES
@@ -55,7 +55,7 @@ SEEN = (
 @pytest.fixture(scope="module")
 def pixels() -> dict[str, list[int]]:
     """The smallest number of pixels of each robot of ``SEEN``, by name."""
-    command = [sys.executable, "-m", "tests.cli.rendering.robot_pixels", *SEEN]
+    command = [sys.executable, "-m", "tests.robot.robot_pixels", *SEEN]
     environment = {**os.environ, "MUJOCO_GL": str(WORKS)}
     root = Path(__file__).parents[2]
     done = subprocess.run(

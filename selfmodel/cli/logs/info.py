@@ -10,7 +10,7 @@ from selfmodel.cli.arguments.options import Json, LogFiles
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
-from selfmodel.cli.viewing.foxglove import layout_path
+from selfmodel.cli.view import layout_path
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.info import Info, has_truth, read_info

@@ -2,8 +2,6 @@
 
 import dataclasses
 import math
-import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +12,7 @@ from selfmodel.cli.output.ranking import ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.sentences import confidence_sentence, right_or_wrong
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
-from selfmodel.files import file_digest
-from selfmodel.logs.result_files import result_bytes
+from selfmodel.logs.results import RecoveryResult, ScoreResult, TrialResult
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.recovery.scores.fitness import DISPLACEMENT
 from selfmodel.robot.designs import network_for
@@ -26,7 +23,7 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
     """Prints the trials, the diagnosis, and the true hypothesis.
 
     Args:
-        found: Result of ``facts``.
+        found: Result of ``recovery_result`` as JSON values.
         folder: Folder of the recovery.
     """
     score = found["score"]
@@ -88,59 +85,38 @@ def _reality(found: dict[str, Any]) -> str:
     return f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
 
 
-def result_file(experiment: Experiment, found: dict[str, Any], logs: Sequence[Path]) -> bytes:
-    """Returns the ``result.json`` of a run: the outcome with its settings, and its logs' digests.
-
-    Args:
-        experiment: The run.
-        found: Result of ``facts``.
-        logs: Logs of the run's trials.
-
-    Raises:
-        OSError: A log cannot be read.
-    """
-    return result_bytes(
-        {
-            **found,
-            "settings": dataclasses.asdict(experiment.settings),
-            "files": {os.path.relpath(log, experiment.folder): file_digest(log) for log in logs},
-        }
-    )
-
-
-def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
-    """Returns the outcome as the JSON values that ``recover --json`` prints."""
+def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
+    """Returns the outcome of a recovery as ``recover --json`` prints it."""
     recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
     design = experiment.design or network_for(experiment.robot)
-    return {
-        "robot": experiment.robot.name,
-        "model": self_model_digest(experiment.robot),
-        "case": experiment.case,
-        "truth": str(experiment.truth),
-        "comparator": recovery.comparator.comparator.name,
-        "comparator_reason": recovery.comparator.reason,
-        "kinds": [kind.name for kind in experiment.kinds],
-        "gap": experiment.gap,
-        "structure": False,  # readers of 0.1 expect the key
-        "next_trial": experiment.next_trial,
-        "repair": experiment.repair,
-        "search": plugins.search_name(experiment.repair, experiment.search, gaits),
-        "repertoire": dataclasses.asdict(gaits.origin) if gaits else None,
-        "controller": design.name,
-        "neurons": design.hidden,
-        "seed": experiment.seed,
-        "trials": [
-            {
-                "log": trial.path,
-                "stage": trial.plan.stage,
-                "displacement": trial.displacement,
-                "steps": trial.behaviour.steps,
-                "ended_early": trial.early_end != "",
-                "score": score,
-                "predicted_score": predicted if math.isfinite(predicted) else None,
-                "fell_at_step": fall,
-                "hypothesis": str(tried),
-            }
+    return RecoveryResult(
+        robot=experiment.robot.name,
+        model=self_model_digest(experiment.robot),
+        case=experiment.case,
+        truth=str(experiment.truth),
+        comparator=recovery.comparator.comparator.name,
+        comparator_reason=recovery.comparator.reason,
+        kinds=tuple(kind.name for kind in experiment.kinds),
+        gap=experiment.gap,
+        next_trial=experiment.next_trial,
+        repair=experiment.repair,
+        search=plugins.search_name(experiment.repair, experiment.search, gaits),
+        repertoire=dataclasses.asdict(gaits.origin) if gaits else None,
+        controller=design.name,
+        neurons=design.hidden,
+        seed=experiment.seed,
+        trials=tuple(
+            TrialResult(
+                log=trial.path,
+                stage=trial.plan.stage,
+                displacement=trial.displacement,
+                steps=trial.behaviour.steps,
+                ended_early=trial.early_end != "",
+                score=score,
+                predicted_score=predicted if math.isfinite(predicted) else None,
+                fell_at_step=fall,
+                hypothesis=str(tried),
+            )
             for trial, tried, score, predicted, fall in zip(
                 recovery.trials,
                 recovery.tried,
@@ -149,32 +125,32 @@ def facts(experiment: Experiment, outcome: Outcome) -> dict[str, Any]:
                 recovery.falls,
                 strict=True,
             )
-        ],
-        "diagnosis": ranking_to_list(recovery.diagnosis.ranked),
+        ),
+        diagnosis=ranking_to_list(recovery.diagnosis.ranked),
         **confidence_to_dict(recovery.diagnosis),
-        "calibration": recovery.calibration.to_dict() if recovery.calibration else None,
-        "correct": outcome.correct,
-        "displacement": {
+        calibration=recovery.calibration.to_dict() if recovery.calibration else None,
+        correct=outcome.correct,
+        displacement={
             "before": recovery.before,
             "after": recovery.after,
             "recovered": recovery.recovered,
         },
-        "score": {
-            "name": recovery.score.name,
-            "unit": recovery.score.unit,
-            "before": recovery.scores[0],
-            "after": recovery.scores[1],
-            "recovered": recovery.best_score,
-        },
-        "fell": recovery.fell,
-        "recovery": recovery.recovered / recovery.before if recovery.before > 0 else None,
-        "physical_trials": len(recovery.trials) - 2,
-        "evaluations": {
+        score=ScoreResult(
+            recovery.score.name,
+            recovery.score.unit,
+            recovery.scores[0],
+            recovery.scores[1],
+            recovery.best_score,
+        ),
+        fell=recovery.fell,
+        recovery=recovery.recovered / recovery.before if recovery.before > 0 else None,
+        physical_trials=len(recovery.trials) - 2,
+        evaluations={
             "repair": recovery.repair_evaluations,
             "diagnostic": recovery.diagnostic_evaluations,
             "distinct_hypotheses": recovery.distinct_hypotheses,
             "simulated_steps": stats.steps,
             "diverged": stats.diverged,
         },
-        "seconds": outcome.seconds,
-    }
+        seconds=outcome.seconds,
+    )

@@ -18,7 +18,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
-from selfmodel.logs.writing.kinematics import Kinematics, body_names
+from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot

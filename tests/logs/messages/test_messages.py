@@ -16,7 +16,7 @@ from selfmodel.logs.messages.cdr import decode_names
 from selfmodel.logs.messages.schemas import schema_text
 from selfmodel.logs.messages.topics import Topic, description, topics, transforms
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.kinematics import body_names
+from selfmodel.logs.viewers import body_names
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot

@@ -1,1 +1,0 @@
-"""Pictures of a trial: the logged motion beside the simulated one."""

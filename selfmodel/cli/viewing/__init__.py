@@ -1,1 +1,0 @@
-"""Viewers of other projects: Rerun, with both bodies, and Foxglove, with a layout."""

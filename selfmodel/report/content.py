@@ -1,0 +1,262 @@
+"""Content of the report of a subject: its scene, its first sentences and its sections."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.sentences import confidence_sentence, fit_sentence, right_or_wrong
+from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.logs.results import RecoveryResult, Search, as_json
+from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.report.charts import (
+    BarChart,
+    Estimate,
+    Group,
+    IntervalChart,
+    LineChart,
+    Report,
+    Section,
+    Series,
+    Table,
+)
+from selfmodel.report.evidence import residual_section, separation_section
+from selfmodel.report.scene import Motion, Shot, scene_of
+from selfmodel.report.subject import Subject
+from selfmodel.report.trials import TrialRollouts, gait_section, rollouts_of, trials_section
+from selfmodel.simulation.calibration import UNDETERMINED, Calibration
+
+NOT_FINISHED = "The recovery is not finished"
+"""Beginning of the headline of a recovery that goes on, or that was interrupted."""
+
+MAX_LINES = 4
+"""Hypotheses in the chart over diagnoses."""
+
+Z = 1.96
+"""Half width of a 95 % interval of a normal distribution, in standard deviations."""
+
+
+def report_of(subject: Subject, *, finished: bool = True) -> Report:
+    """Returns the report of trials and their diagnoses.
+
+    Args:
+        subject: The trials and diagnoses.
+        finished: Whether the recovery that they are of is finished.
+    """
+    rolled = rollouts_of(subject)
+    found = [
+        trials_section(subject, rolled),
+        hypotheses_section(subject),
+        residual_section(subject),
+        separation_section(subject),
+        searches_section(subject.searches),
+        calibration_section(subject.calibration),
+        gait_section(subject, rolled),
+    ]
+    said = headline(subject)
+    return Report(
+        title=subject.title,
+        headline=said if finished else f"{NOT_FINISHED}: {said}",
+        verdict=details(subject),
+        sections=tuple(section for section in found if section is not None),
+        scene=scene_of(subject.robot, [_shot(subject, one) for one in rolled]),
+        made_with=subject.made_with,
+    )
+
+
+def report_before_diagnosis(title: str, happened: str, searches: Sequence[Search]) -> Report:
+    """Returns the report of a recovery without a diagnosis yet.
+
+    Args:
+        title: Title of the report.
+        happened: What happened last, as a clause.
+        searches: Progress of the searches so far.
+    """
+    section = searches_section(searches)
+    sections = () if section is None else (section,)
+    return Report(title=title, headline=f"{NOT_FINISHED}: {happened}.", sections=sections)
+
+
+def headline(subject: Subject) -> str:
+    """Returns what happened, in one sentence."""
+    verdict, result = _verdict(subject.diagnosis), subject.result
+    if result is None:
+        count = len(subject.damaged)
+        trials = f"{count} {'trial' if count == 1 else 'trials'}"
+        return f"{trials} of the {subject.robot.name}: it {verdict}."
+    score = result.score
+    before, after, recovered = (
+        f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
+        for value in (score.before, score.after, score.recovered)
+    )
+    is_distance = score.name in (DISPLACEMENT.name, UPRIGHT.name)
+    name = "" if is_distance else f" ({score.name})"
+    achieved = "moved" if is_distance else "scored"
+    fall = ", and fell" if result.fell else ""
+    since = f"{result.physical_trials} {'trial' if result.physical_trials == 1 else 'trials'}"
+    return (
+        f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
+        f"it; it {verdict}, and {achieved} {recovered} at best in {since} since{fall}."
+    )
+
+
+def details(subject: Subject) -> tuple[str, ...]:
+    """Returns the sentences of the verdict, and the truth where it is known."""
+    diagnosis = subject.diagnosis
+    found = {**confidence_to_dict(diagnosis), "diagnosis": ranking_to_list(diagnosis.ranked)}
+    sentences = [confidence_sentence(found), fit_sentence(found)]
+    if subject.result is not None:
+        sentences.append(_truth(subject.result))
+    return tuple(sentence for sentence in sentences if sentence)
+
+
+def _truth(result: RecoveryResult) -> str:
+    gap = f", at a reality gap of {result.gap:g}" if result.gap else ""
+    judgement = right_or_wrong(as_json(result))
+    return f"True faults: {result.truth}{gap}; the diagnosis is {judgement}."
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
+    match diagnosis.verdict:
+        case "intact":
+            return "is healthy: no fault is needed to predict its trials"
+        case "explained":
+            return f"has the fault {diagnosis.best}, which explains its trials"
+        case "ambiguous":
+            found = [str(one) for one in (diagnosis.best, *diagnosis.indistinguishable)]
+            more = f" or one of {len(found) - 3} others" if len(found) > 3 else ""
+            return f"has {' or '.join(found[:3])}{more}"
+    return f"moves in a way that no searched hypothesis explains; the nearest is {diagnosis.best}"
+
+
+def _shot(subject: Subject, rolled: TrialRollouts) -> Shot:
+    change = subject.change_of(rolled.trial)
+    drawn = [
+        Motion(one.name, one.hypothesis, one.behaviour)
+        for one in rolled.rollouts
+        if not one.diverged and np.isfinite(one.behaviour["joint_positions"]).all()
+    ]
+    measured = Motion("measured", rolled.rollouts[0].hypothesis, rolled.trial.behaviour)
+    return Shot(rolled.name, (measured, *drawn), None if change is None else change[0])
+
+
+def hypotheses_section(subject: Subject) -> Section:
+    """Returns the section of the hypotheses: the loss of each, and how it went over diagnoses."""
+    diagnosis = subject.diagnosis
+    ranked = [(one.hypothesis, one.distance) for one in diagnosis.ranked]
+    if INTACT not in (one for one, _ in ranked):
+        ranked.append((INTACT, diagnosis.intact_distance))
+    chart = BarChart(
+        title="Loss of each hypothesis",
+        x_label=f"distance by {subject.comparator.name}, summed over the trials",
+        names=("distance",),
+        groups=tuple(Group(str(one), (distance,)) for one, distance in ranked),
+    )
+    table = Table(
+        "Hypotheses",
+        ("rank", "hypothesis", "distance", "against the best"),
+        tuple(
+            (rank, str(one), distance, _standing(diagnosis, one))
+            for rank, (one, distance) in enumerate(ranked, start=1)
+        ),
+    )
+    items = (chart, table) if len(subject.diagnoses) < 2 else (chart, table, _over_time(subject))
+    text = (
+        f"The smaller the distance, the better the prediction. The first hypothesis has the fewest "
+        f"faults, each of which improves the prediction significantly; a hypothesis with more "
+        f"faults may have a smaller distance. Test: {diagnosis.test}."
+    )
+    return Section("hypotheses", "Hypotheses", (text,), items)
+
+
+def _standing(diagnosis: Diagnosis, hypothesis: Hypothesis) -> str:
+    if hypothesis == diagnosis.best:
+        return "the best"
+    if hypothesis in diagnosis.indistinguishable:
+        return "cannot be distinguished"
+    if hypothesis in diagnosis.undetectable:
+        return "its further fault is undetectable"
+    return "worse, or not better with more faults"
+
+
+def _over_time(subject: Subject) -> LineChart:
+    """Returns the distance per trial of the hypotheses of the last diagnosis, by diagnosis."""
+    counts = tuple(float(diagnosis.trials) for diagnosis in subject.diagnoses)
+    lines = {"intact": tuple(one.intact_distance / one.trials for one in subject.diagnoses)}
+    for hypothesis in (candidate.hypothesis for candidate in subject.diagnosis.ranked[:MAX_LINES]):
+        lines[str(hypothesis)] = tuple(
+            next((c.distance for c in one.ranked if c.hypothesis == hypothesis), math.nan)
+            / one.trials
+            for one in subject.diagnoses
+        )
+    return LineChart(
+        title="Distance per trial after each diagnosis",
+        x_label="trials explained",
+        y_label="distance per trial",
+        series=tuple(Series(name, counts, values) for name, values in lines.items()),
+    )
+
+
+def searches_section(searches: Sequence[Search]) -> Section | None:
+    """Returns the section of the searches; None if their progress was not recorded."""
+    charts = tuple(
+        LineChart(
+            title=title,
+            x_label="generation",
+            y_label=y_label,
+            series=tuple(
+                Series(
+                    name=f"{number}. {one.hypothesis or 'diagnosis'}",
+                    x=tuple(map(float, range(1, len(one.best) + 1))),
+                    y=one.best,
+                )
+                for number, one in enumerate((one for one in searches if one.kind == kind), start=1)
+            ),
+        )
+        for kind, title, y_label in (
+            ("repair", "Repair: best score by generation", "best score"),
+            ("diagnostic", "Diagnosis: best fitness by generation", "best fitness, minus distance"),
+        )
+        if any(one.kind == kind and one.best for one in searches)
+    )
+    text = "Each line is one search: a repair before a trial, or the diagnosis after it."
+    return Section("searches", "Progress of the searches", (text,), charts) if charts else None
+
+
+def calibration_section(fit: Calibration | None) -> Section | None:
+    """Returns the section of the calibration: errors, and factors with intervals; None without."""
+    if fit is None:
+        return None
+    error = BarChart(
+        title="Prediction error of the self-model on the healthy trials",
+        x_label="root mean square error, in units of each signal's scale",
+        names=("error",),
+        groups=(Group("before", (fit.error_before,)), Group("after", (fit.error,))),
+    )
+    factors = IntervalChart(
+        title="Fitted factors, with 95 % intervals",
+        x_label="factor of the nominal value (1: as in the model)",
+        estimates=tuple(_estimate(row) for row in fit.rows()),
+        reference=1.0,
+    )
+    delay = fit.parameters.delay
+    steps = f"{delay:g} {'step' if delay == 1 else 'steps'}"
+    explained = (
+        f"The self-model was fitted to the trials before the failure; the chosen set of parameters "
+        f"is {fit.chosen}, with a control delay of {steps}. The prior of each factor is 1 with a "
+        f"wide interval: a factor whose interval is as wide is {UNDETERMINED}."
+    )
+    text = [explained, *fit.contacts]
+    text += [str(fit.suspicion)] if fit.suspicion is not None else []
+    return Section("calibration", "Calibration", tuple(text), (error, factors))
+
+
+def _estimate(row: dict[str, Any]) -> Estimate:
+    value, deviation = row["factor"], row["deviation"]
+    with np.errstate(over="ignore"):  # a deviation of a changed file may be of any size
+        low, high = (float(value * np.exp(sign * Z * deviation)) for sign in (-1, 1))
+    return Estimate(row["name"], value, low, high, "" if row["determined"] else UNDETERMINED)

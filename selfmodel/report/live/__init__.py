@@ -1,1 +1,0 @@
-"""A report that is served on this computer while a recovery runs."""

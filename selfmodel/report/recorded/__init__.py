@@ -1,1 +1,0 @@
-"""Files of earlier commands: what a diagnosis was made with, and the tables of campaigns."""

@@ -1,0 +1,366 @@
+"""``selfmodel render``: pictures of a trial from its log, on any machine."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from selfmodel.cli import render
+from selfmodel.cli.film import Film, evenly, film_of, painted
+from selfmodel.cli.sticks import GRID, draw_ground, draw_robot, stick_frames, strip
+from selfmodel.errors import InputError, WorkError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.results import best_hypothesis
+from selfmodel.logs.writing.writer import write_trial
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.robot.motion import POSE
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import TrialPlan
+from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.drivers import random_controllers
+from tests.helpers.opengl import WORKS, draws
+
+STEPS = 31
+"""0.3 s, which are 8 frames of a film."""
+
+DAMAGE = "break:front_left_knee"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
+    """A folder with a short log of a damaged quadruped."""
+    folder = tmp_path_factory.mktemp("render")
+    (controller,) = random_controllers(quadruped, 1, seed=3)
+    plan = TrialPlan("trial", "single", controller, STEPS, 0)
+    samples = SimulatedRobot(quadruped, parse(DAMAGE, quadruped.anatomy)).run(controller, STEPS)
+    write_trial(folder / "a.mcap", quadruped, plan, samples, TrialHeader(Settings()))
+    return folder
+
+
+def film(robot: Robot, text: str, frames: int = 2, unseen: slice = slice(0)) -> Film:
+    """A film of a random motion with some steps of it not observed."""
+    (controller,) = random_controllers(robot, 1)
+    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).behaviour
+    signals = {signal: batch[signal][0].copy() for signal in POSE}
+    signals["joint_positions"][unseen] = np.nan
+    seen = Behaviour(batch.names, batch.time, signals)
+    moments = np.linspace(0, batch.time[-1], frames)
+    hypothesis = parse(text, robot.anatomy)
+    return film_of(robot, hypothesis, [("logged: $x_1", seen), ("model", seen)], moments)
+
+
+@pytest.mark.process
+def test_a_strip_is_drawn_whatever_there_is_of_opengl(folder: Path, tmp_path: Path):
+    """Even where the library that MuJoCo is told to take would end any program."""
+    out = tmp_path / "strip.png"
+    arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", DAMAGE, "--pictures", "3")
+    done = selfmodel_process(*arguments, "--json", cwd=folder, MUJOCO_GL="nothing-like-it")
+    told = json.loads(done.stdout)
+
+    assert (done.returncode, done.stderr) == (0, "")
+    with Image.open(out) as image:
+        assert image.format == "PNG"
+    assert (told["out"], told["hypothesis"], told["frames"]) == (str(out), DAMAGE, 3)
+    assert (told["drawn_by"], told["gl"], told["held"]) == ("matplotlib", None, 0)
+    assert told["bytes"] == out.stat().st_size
+    assert [p.name for p in tmp_path.iterdir()] == ["strip.png"]
+
+
+@draws
+@pytest.mark.process
+@pytest.mark.opengl
+def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
+    frames = {}
+    for text in ("intact", DAMAGE):
+        out = tmp_path / f"{len(frames)}.gif"
+        arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", text, "--json")
+        done = selfmodel_process(*arguments, cwd=folder, MUJOCO_GL="")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert json.loads(done.stdout)["gl"] == WORKS
+        with Image.open(out) as image:
+            assert (image.n_frames, image.info["duration"]) == (8, 40)
+            frames[text] = np.asarray(image.convert("RGB")).astype(int)
+
+    assert frames["intact"].shape == (360, 960, 3)
+    assert np.ptp(frames["intact"]) > 150  # there is something to be seen
+    assert np.abs(frames["intact"] - frames[DAMAGE]).max() > 50  # the limb is pale
+
+
+@pytest.mark.process
+def test_where_nothing_draws_a_sentence_says_what_to_do(folder: Path):
+    done = selfmodel("render", "a.mcap", cwd=folder, MUJOCO_GL="disable")
+
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: MuJoCo cannot draw with MUJOCO_GL=disable: unset it")
+    assert "--stick" in done.stderr
+    assert not (folder / "a.gif").exists()
+
+
+@pytest.mark.parametrize("works", [("egl", "osmesa"), ("osmesa",), ()])
+def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
+    works: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("MUJOCO_GL", "")
+    monkeypatch.setattr(render, "draws", lambda name: name in works)
+    monkeypatch.setattr(render, "WITHOUT_SCREEN", ("egl", "osmesa"))
+    if works:
+        assert render.choose_gl() == os.environ["MUJOCO_GL"] == works[0]
+    else:
+        with pytest.raises(WorkError, match=r"neither EGL nor OSMesa.*libosmesa6.*-o NAME\.png"):
+            render.choose_gl()
+
+
+def test_what_is_asked_for_is_taken_or_nothing(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    monkeypatch.setattr(render, "draws", lambda name: name == "egl")
+    with pytest.raises(WorkError, match="MUJOCO_GL=osmesa: unset it"):
+        render.choose_gl()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("-o", "a.txt"), "--out needs a name that ends in .gif, .mp4, .png"),
+        (("-o", "a.mcap"), "--out needs a name that ends in"),
+        (("-o", "nowhere/a.png"), "there is no folder nowhere"),
+        (("-o", "taken.png"), "taken.png exists, and is not overwritten"),
+        (("-o", "a.png", "--stick"), "--stick is for films"),
+        (("-o", "a.png", "--hypothesis", "break:nose"), "'nose'"),
+        (("-o", "a.png", "--diagnosis", "taken.png"), "expected a diagnosis"),
+        (("-o", "a.png", "--diagnosis", "x", "--hypothesis", "intact"), "got both: leave one out"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_a_sentence(
+    folder: Path, arguments: tuple[str, ...], sentence: str
+):
+    (folder / "taken.png").write_text("{}")
+    done = selfmodel("render", "a.mcap", *arguments, cwd=folder)
+
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.opengl
+def test_the_best_of_a_diagnosis_is_drawn(folder: Path, tmp_path: Path):
+    (tmp_path / "result.json").write_text(
+        json.dumps({"diagnosis": [{"hypothesis": DAMAGE}, {"hypothesis": "intact"}]})
+    )
+    arguments = ("-o", str(tmp_path / "a.svg"), "--diagnosis", str(tmp_path / "result.json"))
+    done = selfmodel("render", "a.mcap", *arguments, "--json", cwd=folder)
+
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["hypothesis"] == DAMAGE
+
+
+@pytest.mark.parametrize(
+    ("text", "best"),
+    [
+        ('[{"ranked": [{"hypothesis": "a"}]}, {"ranked": [{"hypothesis": "b"}]}]', "b"),
+        ('{"diagnosis": [{"hypothesis": "c", "distance": null}]}', "c"),
+        *((text, None) for text in ("", "[]", "{}", "3", "null", '{"diagnosis": []}', "\xff")),
+        *((text, None) for text in ('[{"ranked": 1}]', '{"diagnosis": [{"hypothesis": 1}]}')),
+        ("[" * 100_000, None),
+    ],
+)
+def test_a_diagnosis_is_read_or_refused(text: str, best: str | None, tmp_path: Path):
+    path = tmp_path / "diagnosis.json"
+    path.write_bytes(text.encode("latin-1"))
+    if best is not None:
+        assert best_hypothesis(path) == best
+        return
+    with pytest.raises(InputError, match=r"diagnosis\.json: expected a diagnosis"):
+        best_hypothesis(path)
+
+
+def test_what_is_lost_is_dotted_and_what_is_jammed_red(robot: Robot):
+    broken, jammed = robot.anatomy.joints[0], robot.anatomy.joints[-2]
+    drawn = film(robot, f"break:{broken.name}+jam:{jammed.name}=0.1")
+    names = {robot.model.body(body).name for body in drawn.detached}
+    axes = Figure().add_subplot()
+    draw_robot(axes, drawn, _standing(drawn), np.zeros(3), held=False)
+    dotted, whole, red = axes.collections
+
+    assert names == broken.bodies
+    assert len(drawn.jammed) == 1
+    assert len(dotted.get_segments()) == len(broken.bodies)  # each has one capsule
+    assert dotted.get_linestyle()[0][1] is not None
+    assert whole.get_linestyle()[0][1] is None
+    assert len(red.get_segments()) == 1
+    redness, greenness = red.get_color()[0][:2]
+    assert redness > 0.7
+    assert greenness < 0.3
+    ends = np.concatenate([np.array(one.get_segments()) for one in (dotted, whole, red)])
+    assert ends[:, :, 1].min() > -0.5  # upright, and on the ground
+
+
+def _standing(drawn: Film) -> mujoco.MjData:
+    data = mujoco.MjData(drawn.model)
+    mujoco.mj_kinematics(drawn.model, data)
+    return data
+
+
+def test_what_is_lost_is_pale_and_what_is_jammed_red_in_a_film(robot: Robot):
+    broken, jammed = robot.anatomy.joints[0], robot.anatomy.joints[-2]
+    drawn = film(robot, f"break:{broken.name}+jam:{jammed.name}")
+    before = drawn.model.geom_rgba.copy()
+    model = painted(drawn)
+    names = [model.body(body).name for body in model.geom_bodyid]
+    lost = np.isin(names, list(broken.bodies))
+    held = np.isin(model.geom_bodyid, list(drawn.jammed))
+    feet = np.isin([model.body(body).name for body in model.site_bodyid], list(broken.bodies))
+
+    assert lost.sum() == len(broken.bodies)
+    assert held.sum() == feet.sum() == 1
+    assert np.all(model.geom_rgba[lost, 3] < 0.5)
+    assert np.all(model.site_rgba[feet, 3] < 0.5)
+    assert np.all(model.geom_rgba[~lost, 3] == 1)
+    assert np.all(model.geom_rgba[held, 0] > 3 * model.geom_rgba[held, 1])
+    assert np.all(model.geom_matid[lost | held] == -1)
+    assert np.all(model.geom_matid[~lost & ~held] >= 0)
+    np.testing.assert_array_equal(drawn.model.geom_rgba, before)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_camera_stands_where_what_is_lost_is_in_sight(robot: Robot, side: str):
+    drawn = film(robot, f"break:back_{side}_knee")
+    right, up = drawn.plane.T
+    towards = np.cross(right, up)  # from the robot to the camera
+
+    assert np.sign(towards[1]) == (1 if side == "left" else -1)
+    assert towards[2] > 0
+    assert np.sign(right[0]) == (1 if side == "right" else -1)
+    # Forward is to the right of whoever stands on the right.
+    way = drawn.gaze(drawn.shots[0])
+    assert np.abs(way - [0, 0, robot.standing_height]).max() < 0.2
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_steps_that_were_not_observed_are_marked_in_every_kind_of_strip(
+    quadruped: Robot, kind: str
+):
+    drawn = film(quadruped, DAMAGE, frames=3, unseen=slice(10, 20))
+    begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
+
+    assert drawn.shots[0].held.tolist() == [False, True, False]
+    assert strip(drawn, kind).startswith(begins)
+    assert strip(drawn, kind) != strip(film(quadruped, DAMAGE, frames=3), kind)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_a_trial_of_few_steps_shows_each_once(quadruped: Robot, steps: int):
+    (controller,) = random_controllers(quadruped, 1)
+    batch = Simulator(quadruped, 1).run([(INTACT, controller)], steps, POSE).behaviour
+    seen = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
+    short = film_of(quadruped, INTACT, [("logged", seen)], evenly(batch.time, 20))
+
+    np.testing.assert_array_equal(short.time, batch.time)
+    assert len(list(stick_frames(short))) == steps
+    assert strip(short, "png").startswith(b"\x89PNG")
+
+
+def test_each_frame_shows_the_pose_of_its_moment(quadruped: Robot):
+    drawn = film(quadruped, "intact", frames=3)
+    logged, simulated = drawn.shots
+    bent = simulated.qpos.copy()
+    bent[2, -1] += 0.5
+    other = replace(drawn, shots=(logged, replace(simulated, qpos=bent)))
+    frames, others = (np.array(list(stick_frames(each))) for each in (drawn, other))
+
+    np.testing.assert_array_equal(frames[:2], others[:2])
+    np.testing.assert_array_equal(frames[2, :, :480], others[2, :, :480])
+    assert np.any(frames[2, :, 480:] != others[2, :, 480:])
+
+
+def test_a_film_of_sticks_becomes_a_gif_of_all_its_frames(quadruped: Robot):
+    data = render.gif(stick_frames(film(quadruped, "intact", frames=3)))
+    with Image.open(BytesIO(data)) as image:
+        assert (image.n_frames, image.size, image.info["loop"]) == (3, (960, 360), 0)
+
+
+def test_an_mp4_has_every_frame(quadruped: Robot, tmp_path: Path):
+    frames = list(stick_frames(film(quadruped, "intact", frames=3)))
+    path = tmp_path / "film.mp4"
+    path.write_bytes(render.mp4(iter(frames)))
+    command = [render.ffmpeg(), "-loglevel", "error", "-i", str(path)]
+    command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    decoded = subprocess.run(command, capture_output=True, check=True).stdout
+    shown = np.frombuffer(decoded, dtype=np.uint8).reshape(-1, *frames[0].shape)
+
+    assert len(shown) == 3
+    assert np.abs(shown.astype(int) - np.array(frames)).mean() < 3
+
+
+def test_an_mp4_without_ffmpeg_is_refused_with_what_to_install(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(render.shutil, "which", lambda _: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(WorkError, match=r"ffmpeg.*selfmodel\[render\].*\.gif"):
+        render.ffmpeg()
+
+
+@pytest.mark.parametrize("reads", ["", "cat >/dev/null\n"])
+def test_a_failing_ffmpeg_says_why(reads: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    program = tmp_path / "ffmpeg"
+    program.write_text(f"#!/bin/sh\n{reads}echo no such encoder >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(render, "ffmpeg", lambda: str(program))
+    frames = iter([np.zeros((360, 960, 3), dtype=np.uint8)] * 3)
+    with pytest.raises(WorkError, match="could not make the film: no such encoder"):
+        render.mp4(frames)
+
+
+def test_a_film_takes_as_long_as_the_trial_however_long_a_control_step_is(quadruped: Robot):
+    slow = replace(quadruped, control_timestep=0.1)
+    run = Simulator(slow, 1).run([(INTACT, random_controllers(slow, 1)[0])], 21, SIGNALS).behaviour
+    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    film = film_of(slow, INTACT, [("seen", seen)], np.arange(51) / 25)
+
+    assert len(film.time) == 51
+    np.testing.assert_allclose(film.time, np.floor(np.arange(51) / 2.5 + 1e-9) * 0.1)
+
+
+def test_the_ground_of_a_stick_figure_slopes_as_the_world_does(quadruped: Robot):
+    slope = parse("slope=0.2", quadruped.anatomy)
+    run = (
+        Simulator(quadruped, 1)
+        .run([(slope, random_controllers(quadruped, 1)[0])], 2, SIGNALS)
+        .behaviour
+    )
+    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    film = film_of(quadruped, slope, [("seen", seen)], run.time)
+
+    np.testing.assert_allclose(film.normal, [-np.sin(0.2), 0, np.cos(0.2)])
+    axes = Figure().subplots()
+    side = np.array([[1.0, 0], [0, 0], [0, 1.0]])  # x to the right, z up
+    draw_ground(axes, film.normal, np.zeros(3), side, 1.0)
+    (lines,) = axes.collections
+    for line in lines.get_segments():
+        np.testing.assert_allclose(line[:, 1], np.tan(0.2) * line[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("reach", "lines"), [(1.0, 2 * (6 / GRID + 1)), (1e10, 2 * 601)])
+def test_the_ground_has_a_line_every_half_metre_and_a_wider_grid_for_a_huge_robot(
+    reach: float, lines: float
+):
+    axes = Figure().subplots()
+    side = np.array([[1.0, 0.0], [0.0, 0.5], [0.0, 0.5]])
+
+    draw_ground(axes, np.array([0.0, 0.0, 1.0]), np.zeros(3), side, reach)
+
+    assert len(axes.collections[0].get_segments()) == pytest.approx(lines, abs=2)

@@ -1,0 +1,182 @@
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
+
+from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.viewers import _roll_pitch_yaw, body_names, urdf
+from selfmodel.robot.mjcf.document.document import parse_xml
+from selfmodel.robot.mjcf.document.files import InMemory
+from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.urdf.conversion import convert
+from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.tasks import ROBOTS
+
+
+def numbers(element: ET.Element | None, name: str) -> np.ndarray:
+    assert element is not None
+    return np.array([float(number) for number in element.attrib[name].split()])
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    quaternion, matrix = np.zeros(4), np.zeros(9)
+    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+def from_origin(element: ET.Element) -> tuple[np.ndarray, np.ndarray]:
+    roll, pitch, yaw = numbers(element.find("origin"), "rpy")
+    x, y, z = np.eye(3)
+    turn = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+    return numbers(element.find("origin"), "xyz"), turn
+
+
+def link_poses(tree: ET.Element, root: str, angles: dict[str, float]) -> dict:
+    """Forward kinematics as URDF defines it: position and rotation of each link from the root."""
+    poses = {root: (np.zeros(3), np.eye(3))}
+    for joint in tree.findall("joint"):  # parents come first
+        parent, child = joint.find("parent"), joint.find("child")
+        assert parent is not None
+        assert child is not None
+        place, turn = poses[parent.attrib["link"]]
+        offset, inner = from_origin(joint)
+        place, turn = place + turn @ offset, turn @ inner
+        if joint.attrib["type"] != "fixed":
+            turn = turn @ rotation(numbers(joint.find("axis"), "xyz"), angles[joint.attrib["name"]])
+        poses[child.attrib["link"]] = (place, turn)
+    return poses
+
+
+@pytest.fixture(params=["biped", *sorted(ROBOTS)])
+def drawn(request: pytest.FixtureRequest, biped: Robot) -> Robot:
+    """The biped, and each registered robot."""
+    return biped if request.param == "biped" else ROBOTS[request.param].robot()
+
+
+@pytest.mark.parametrize("bent", [False, True])
+def test_links_stand_where_the_bodies_do(drawn: Robot, bent: bool):  # noqa: FBT001  # a parameter
+    rng = np.random.default_rng(2)
+    hinges = drawn.anatomy.hinges
+    angles = {hinge: float(bent * rng.uniform(-0.5, 0.5)) for hinge in hinges}
+    data = mujoco.MjData(drawn.model)
+    for hinge, angle in angles.items():
+        data.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(drawn.model, data)
+    tree = ET.fromstring(urdf(drawn))  # noqa: S314 - our own text
+    poses = link_poses(tree, drawn.root, angles)
+    base, turned = data.body(drawn.root).xpos, data.body(drawn.root).xmat.reshape(3, 3)
+    assert set(body_names(drawn.model)) <= set(poses)
+    for body in body_names(drawn.model):
+        place, turn = poses[body]
+        np.testing.assert_allclose(base + turned @ place, data.body(body).xpos, atol=1e-7)
+        expected = data.body(body).xmat.reshape(3, 3)
+        np.testing.assert_allclose(turned @ turn, expected, atol=1e-7)
+
+
+def test_every_hinge_and_body_is_there_once(drawn: Robot):
+    tree = ET.fromstring(urdf(drawn))  # noqa: S314 - our own text
+    assert tree.attrib["name"] == drawn.name
+    links = [link.attrib["name"] for link in tree.findall("link")]
+    assert len(links) == len(set(links))
+    moving = [joint for joint in tree.findall("joint") if joint.attrib["type"] == "revolute"]
+    assert tuple(joint.attrib["name"] for joint in moving) == drawn.anatomy.hinges
+    for joint in moving:
+        limit = joint.find("limit")
+        expected = drawn.model.joint(joint.attrib["name"]).range
+        assert [numbers(limit, "lower")[0], numbers(limit, "upper")[0]] == pytest.approx(expected)
+    children = [joint.find("child") for joint in tree.findall("joint")]
+    assert sorted([drawn.root, *(c.attrib["link"] for c in children if c is not None)]) == sorted(
+        links
+    )
+
+
+def test_shapes_stand_where_the_geoms_do(drawn: Robot):
+    tree = ET.fromstring(urdf(drawn))  # noqa: S314 - our own text
+    model = drawn.model
+    for link in tree.findall("link"):
+        if "__" in link.attrib["name"]:
+            assert len(link) == 0
+            continue
+        body = model.body(link.attrib["name"])
+        first, count = body.geomadr[0], body.geomnum[0]
+        geoms = range(first, first + count)
+        for geom, visual in zip(geoms, link.findall("visual"), strict=True):
+            place, turn = from_origin(visual)
+            matrix = np.zeros(9)
+            mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
+            np.testing.assert_allclose(place, model.geom_pos[geom], atol=1e-7)
+            np.testing.assert_allclose(turn, matrix.reshape(3, 3), atol=1e-7)
+
+
+@pytest.mark.parametrize("pitch", [-np.pi / 2, -1.0, 0.0, np.pi / 2])
+@pytest.mark.parametrize("roll", [-2.0, 0.0, 0.7])
+@pytest.mark.parametrize("yaw", [-3.0, 0.0, 1.1])
+def test_a_turn_is_told_in_angles_even_straight_up_and_down(roll: float, pitch: float, yaw: float):
+    x, y, z = np.eye(3)
+    turn = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, turn.ravel())
+    roll, pitch, yaw = _roll_pitch_yaw(quaternion)
+    told = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+    np.testing.assert_allclose(told, turn, atol=1e-7)
+
+
+def test_a_log_carries_the_description(log: Path, biped: Robot):
+    [payload] = read_contents(log).topics["/robot_description"].payloads
+    assert payload[8:-1].decode() == urdf(biped)
+
+
+def inertia_in_body(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The inertia of a body about its centre of mass, in the body's frame."""
+    body, matrix = model.body(name), np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, body.iquat)
+    turn = matrix.reshape(3, 3)
+    return turn @ np.diag(body.inertia) @ turn.T
+
+
+def from_root(model: mujoco.MjModel, data: mujoco.MjData, root: str) -> tuple[np.ndarray, ...]:
+    """Positions and rotations of all bodies in the frame of the root body, by the root's order."""
+    turn = data.body(root).xmat.reshape(3, 3)
+    first = model.body(root).id
+    places = (data.xpos[first:] - data.body(root).xpos) @ turn
+    return places, turn.T @ data.xmat[first:].reshape(-1, 3, 3)
+
+
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_read_back_it_is_a_robot_with_the_same_bodies_in_any_pose(drawn: Robot, seed: int):
+    document = read_urdf(parse_xml(urdf(drawn).encode()), InMemory({}))
+    text = convert(document, MjcfSettings(base="fixed")).text
+    before, after = drawn.model, mujoco.MjModel.from_xml_string(text)
+    first = before.body(drawn.root).id
+    names = [before.body(body).name for body in range(first, before.nbody)]
+    hinges = drawn.anatomy.hinges
+    here, there = mujoco.MjData(before), mujoco.MjData(after)
+    for hinge, angle in zip(
+        hinges, np.random.default_rng(seed).uniform(-3, 3, len(hinges)), strict=True
+    ):
+        here.joint(hinge).qpos[0] = there.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(before, here)
+    mujoco.mj_kinematics(after, there)
+
+    assert [after.body(body).name for body in range(1, after.nbody)] == names
+    assert [after.joint(joint).name for joint in range(after.njnt)] == list(hinges)
+    for hinge in hinges:
+        np.testing.assert_allclose(after.joint(hinge).range, before.joint(hinge).range, atol=1e-8)
+        assert after.joint(hinge).limited == before.joint(hinge).limited
+    for name in names:
+        np.testing.assert_allclose(after.body(name).mass, before.body(name).mass, rtol=1e-8)
+        expected = inertia_in_body(before, name)
+        np.testing.assert_allclose(inertia_in_body(after, name), expected, rtol=1e-6, atol=1e-9)
+    placed, expected = (
+        from_root(model, data, drawn.root) for model, data in ((after, there), (before, here))
+    )
+    for one, other in zip(placed, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6)

@@ -1,0 +1,96 @@
+"""The sentences and sections of a report: what happened, with the numbers of the result."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.faults.notation import parse
+from selfmodel.report.charts import GaitDiagram
+from selfmodel.report.content import details, headline, report_of
+from selfmodel.report.subject import Subject
+from selfmodel.report.trials import TrialRollouts, gait_section
+
+
+def with_verdict(subject: Subject, **changes: object) -> Subject:
+    diagnosis = dataclasses.replace(subject.diagnosis, **changes)
+    return dataclasses.replace(subject, diagnoses=(diagnosis,), result=None)
+
+
+def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, subject: Subject):
+    result = json.loads((run / "result.json").read_text())
+
+    report = report_of(subject)
+
+    assert [section.key for section in report.sections] == [
+        *("trials", "hypotheses", "residual", "separation", "searches", "calibration", "gait"),
+    ]
+    assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
+    assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline
+    assert result["diagnosis"][0]["hypothesis"] in report.headline
+    trials = report.sections[0].items[1]
+    assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]
+    ranking = report.sections[1].items[1].rows
+    assert ranking[0][1:3] == tuple(result["diagnosis"][0].values())
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("explained", "2 trials of the quadruped: it has the fault {best}, which explains"),
+        ("intact", "it is healthy: no fault is needed"),
+        ("unexplained", "no searched hypothesis explains; the nearest is {best}"),
+    ],
+)
+def test_every_verdict_has_its_sentence(subject: Subject, verdict: str, said: str):
+    expected = said.format(best=subject.diagnosis.best)
+
+    assert expected in headline(with_verdict(subject, verdict=verdict))
+
+
+def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subject: Subject):
+    others = tuple(
+        parse(f"motor:{joint}=0.9", subject.robot.anatomy)
+        for joint in ("back_left_knee", "back_right_knee", "front_left_knee", "front_right_knee")
+    )
+
+    found = headline(with_verdict(subject, verdict="ambiguous", indistinguishable=others))
+
+    assert "or motor:back_left_knee=0.9 or motor:back_right_knee=0.9 or one of 2 others" in found
+
+
+def test_the_truth_of_a_run_is_named(subject: Subject):
+    assert subject.result is not None
+    assert f"True faults: {subject.result.truth}, at a reality gap of 0.1" in details(subject)[-1]
+    assert not any("True" in one for one in details(with_verdict(subject)))
+
+
+def test_the_spans_of_a_lane_are_the_times_of_contact(
+    subject: Subject, rolled: tuple[TrialRollouts, ...]
+):
+    section = gait_section(subject, rolled)
+    assert section is not None
+    diagram = section.items[0]
+    assert isinstance(diagram, GaitDiagram)
+    behaviour = rolled[0].trial.behaviour
+    for lane in diagram.groups["measured"]:
+        column = behaviour.names.sensors.index(lane.label)
+        contact = np.zeros(behaviour.steps, dtype=bool)
+        for begin, end in lane.spans:
+            contact |= (behaviour.time >= begin) & (behaviour.time < end)
+
+        assert np.array_equal(contact[:-1], (behaviour["sensors"][:, column] > 0.5)[:-1])
+
+
+def test_a_simulation_that_diverged_has_no_contacts(
+    subject: Subject, rolled: tuple[TrialRollouts, ...]
+):
+    first = dataclasses.replace(rolled[0].rollouts[0], diverged=True)
+
+    section = gait_section(subject, (dataclasses.replace(rolled[0], rollouts=(first,)),))
+
+    assert section is not None
+    assert isinstance(section.items[0], GaitDiagram)
+    assert list(section.items[0].groups) == ["measured"]
