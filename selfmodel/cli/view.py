@@ -252,11 +252,7 @@ def import_rerun() -> Any:  # noqa: ANN401  # an extra
 
 
 def check_display(environment: Mapping[str, str] = os.environ) -> None:
-    """Checks that a window can be opened.
-
-    Raises:
-        InputError: This is Linux without a display.
-    """
+    """Raises ``InputError`` where no window can be opened: on Linux without a display."""
     if sys.platform == "linux" and not any(map(environment.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise InputError(
             "there is no display to open Rerun on: write a file with -o NAME.rrd, and open it with "

@@ -36,8 +36,8 @@ MAX_FILE_BYTES = 8_000_000
 MAX_INTEGER = 2**53 - 1
 """Largest integer that is a number in the page: JavaScript rounds larger ones."""
 
-LEADING_ZERO = re.compile(r"\s*[+-]?0[0-9]")
-"""Beginning of a text such as 007, which is a name and not the number 7."""
+NUMBER = re.compile(r"[+-]?((0|[1-9][0-9]*)(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf)")
+"""A number; not 007, nor 1_000, which Python reads as one: they are names."""
 
 CORRECT = "correct"
 """Column of the rows of a study: whether a diagnosis is right."""
@@ -248,44 +248,36 @@ def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
 def _typed(rows: Sequence[Mapping[str, str | None]]) -> list[dict[str, Cell]]:
     """Returns the rows of a CSV file with numbers and truth values."""
     columns = [name for name in (rows[0] if rows else ()) if name]
-    numeric = {name for name in columns if _is_numeric(name, [row[name] or "" for row in rows])}
-    return [
-        {name: _cell(row[name], is_numeric=name in numeric) for name in columns} for row in rows
-    ]
+    numeric = {name for name in columns if _is_numeric(name, [row[name] for row in rows])}
+    return [{name: _cell(row[name], numeric=name in numeric) for name in columns} for row in rows]
 
 
-def _is_numeric(name: str, cells: Sequence[str]) -> bool:
+def _is_numeric(name: str, cells: Sequence[str | None]) -> bool:
     """Returns whether each filled cell of a column is a number that keeps all of its digits.
 
-    A cell does not keep them if it has a leading zero, such as 007, is an integer beyond
-    ``MAX_INTEGER``, or is a version, by the name of its column: 3.10 is not 3.1.
+    An integer beyond ``MAX_INTEGER`` does not, nor a version, by the name of its column: 3.10 is
+    not 3.1.
     """
     return "version" not in name.lower() and all(
-        _number(cell) is not None and not LEADING_ZERO.match(cell) for cell in cells if cell
+        NUMBER.fullmatch(cell) and not (_is_whole(cell) and abs(float(cell)) > MAX_INTEGER)
+        for cell in cells
+        if cell
     )
 
 
-def _number(text: str) -> float | int | None:
-    """Returns the number that a text is, NaN and infinity too; None if it is none."""
-    if not text.isascii() or "_" in text:  # Python reads 1_000 as a number; it is a name
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    if not text.strip().lstrip("+-").isdigit():
-        return value
-    # A double is enough to compare, and Python refuses to convert thousands of digits exactly.
-    return int(text) if abs(value) <= MAX_INTEGER else None
+def _is_whole(text: str) -> bool:
+    return text.lstrip("+-").isdigit()
 
 
-def _cell(text: str | None, *, is_numeric: bool) -> Cell:
+def _cell(text: str | None, *, numeric: bool) -> Cell:
     """Returns a cell of a CSV file: a number, a truth value, a text, or None if it is empty."""
     if not text:
         return None
     if text in ("true", "false", "True", "False"):  # pandas writes the latter
         return text.lower() == "true"
-    value = _number(text) if is_numeric else None
-    if value is None or math.isinf(value):  # JSON has no infinity
+    if not numeric:
+        return text
+    value = int(text) if _is_whole(text) else float(text)
+    if math.isinf(value):  # JSON has no infinity
         return text
     return None if math.isnan(value) else value
