@@ -26,10 +26,9 @@ from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.database import Journal, RunTrial
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.recover import Journal, RecoveryLoop, RunTrial
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -111,9 +110,7 @@ def measure_once() -> dict[str, float]:
         journal = create_journal(Path(folder) / "run", robot.anatomy, calibrated=False)
         run_trial = TrialRunner(journal.trials, robot, settings)
         timed = TimedLogs(run_trial, journal, (healthy, damaged))
-        recover(
-            healthy=healthy,
-            damaged=damaged,
+        RecoveryLoop(
             simulator=simulator,
             choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             kinds=PAPER_KINDS,
@@ -124,7 +121,7 @@ def measure_once() -> dict[str, float]:
             on_event=lambda _: None,
             score=DISPLACEMENT,
             make_repair=RepairSearch,
-        )
+        ).run(healthy, damaged)
     seconds = perf_counter() - start
     return {
         "recover_seconds": seconds,

@@ -12,7 +12,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import recover
+from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -24,9 +24,7 @@ def main(folder: Path) -> None:
     truth = parse("break:back_left_shoulder", robot.anatomy)
     settings = Settings(steps=300, trials=2, generations=5).scaled(20)
     journal = create_journal(folder, robot.anatomy, calibrated=False)
-    recovery = recover(
-        healthy=SimulatedRobot(robot),  # or any object with PhysicalRobot's `run`
-        damaged=SimulatedRobot(robot, truth),
+    recovery = RecoveryLoop(
         simulator=Simulator(robot, threads=2),
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=TrialRunner(journal.trials, robot, settings),
@@ -34,7 +32,7 @@ def main(folder: Path) -> None:
         settings=settings,
         seed=0,
         on_event=lambda _event: None,
-    )
+    ).run(SimulatedRobot(robot), SimulatedRobot(robot, truth))  # or any PhysicalRobot
     print(f"best explanation: {recovery.diagnosis.best} (the truth: {truth})")
     print(f"{recovery.before:.2f} m, {recovery.after:.2f} m, {recovery.recovered:.2f} m")
 

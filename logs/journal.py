@@ -16,7 +16,7 @@ from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, result_bytes
-from selfmodel.recovery.database import Database
+from selfmodel.recovery.result import Database
 from selfmodel.robot.anatomy import Anatomy
 
 TRIALS = "trials"

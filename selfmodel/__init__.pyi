@@ -18,7 +18,7 @@ from .faults.registry import ALL_KINDS as ALL_KINDS, PAPER_KINDS as PAPER_KINDS
 from .logs.reader import read_log as read_log
 from .physical.environment import EnvironmentRobot as EnvironmentRobot
 from .physical.interface import PhysicalRobot as PhysicalRobot
-from .recovery.recovery import Recovery as Recovery
+from .recovery.result import Recovery as Recovery
 from .robot.robot import Robot as Robot
 from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator

@@ -38,16 +38,14 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery import recover as loop
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.next_trial import NextTrial, by_repair
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair, diagnose_trials
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire.repertoire import Repertoire
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
-from selfmodel.recovery.scores.upright import UPRIGHT
-from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
+from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
@@ -104,8 +102,9 @@ def evolve_controller(
     robot = robot_of(robot)
     check_motion(score, robot)
     chosen = plugins.design(design, robot) if isinstance(design, str) else design
-    search = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
-    return search.best(hypothesis_of(hypothesis, robot), seeds, repair_stream(seed, 0), on_event)
+    repair = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
+    assumed, faults = partial(assumed_uncertainty, robot), (hypothesis_of(hypothesis, robot),)
+    return repair(faults, assumed, seeds, repair_stream(seed, 0), on_event)[0].controller
 
 
 def run_trial(
@@ -376,9 +375,7 @@ def recover(
     drawn = plugins.design(design, robot) if isinstance(design, str) else design
     make_repair = plugins.repair(repair, search, repertoire_of(repertoire, robot, drawn))
     journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
-    return loop.recover(
-        healthy=healthy,
-        damaged=damaged,
+    return RecoveryLoop(
         simulator=Simulator(robot, count),
         choose_comparator=comparator_choice(comparator),
         run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
@@ -392,7 +389,7 @@ def recover(
         next_trial=next_trial,
         score=score,
         make_repair=make_repair,
-    )
+    ).run(healthy, damaged)
 
 
 def simulated_robot(

@@ -50,6 +50,8 @@ class Evolution:
         rng: Source of all random numbers.
         seeds: Genomes of the first generation beside random genomes; the first
             ``settings.population`` seeds are used.
+        noisy: Whether fitness is comparable within a generation only: survivors are evaluated
+            again with their children, so that the luck of one does not last.
     """
 
     def __init__(
@@ -59,13 +61,12 @@ class Evolution:
         settings: Settings,
         rng: np.random.Generator,
         seeds: Sequence[FloatArray] = (),
+        *,
+        noisy: bool = False,
     ) -> None:
-        self._settings = settings
-        self._draw = draw
-        self._rng = rng
+        self._settings, self._draw, self._rng, self._noisy = settings, draw, rng, noisy
         self._asked = first_generation(settings.population, length, draw, rng, seeds)
-        self._genomes = np.empty((0, length))
-        self._fitness = np.empty(0)
+        self._genomes, self._fitness = np.empty((0, length)), np.empty(0)
         self.generations = settings.generations
         self.generation = 0
         self.evaluations = 0
@@ -81,29 +82,33 @@ class Evolution:
             ValueError: ``fitness`` has another shape, or a NaN.
         """
         check_fitness(fitness, self._asked)
-        genomes = np.concatenate([self._genomes, self._asked])
-        scores = np.concatenate([self._fitness, fitness])
+        kept = 0 if self._noisy else self._settings.survivors
+        genomes = np.concatenate([self._genomes[:kept], self._asked])
+        scores = np.concatenate([self._fitness[:kept], fitness])
         best = np.argsort(-scores, kind="stable")
-        self.best, self.best_fitness = genomes[best[0]], float(scores[best[0]])
-        survivors = best[: self._settings.survivors]
-        self._genomes, self._fitness = genomes[survivors], scores[survivors]
+        self._genomes, self._fitness = genomes[best], scores[best]
+        self.best, self.best_fitness = self._genomes[0], float(self._fitness[0])
         self.generation += 1
         self.evaluations += len(fitness)
-        self._asked = self._children()
+        survivors, _ = self.survivors
+        children = offspring_of(survivors, self._draw, self._settings, self._rng)
+        self._asked = np.concatenate([survivors, children]) if self._noisy else children
 
     @property
     def survivors(self) -> tuple[FloatArray, FloatArray]:
         """The genomes that survive, ``(n, length)``, best first, and their fitness, ``(n,)``."""
-        return self._genomes, self._fitness
+        count = self._settings.survivors
+        return self._genomes[:count], self._fitness[:count]
+
+    def candidates(self, count: int) -> FloatArray:
+        """Returns at most ``count`` of the best genomes, best first, ``(n, length)``."""
+        return self._genomes[:count]
 
     def stop(self) -> dict[str, int]:
         """Returns the stop reason, such as ``{"generations": 30}``; empty while the search runs."""
         if self.generation >= self.generations:
             return {"generations": self.generations}
         return {}
-
-    def _children(self) -> FloatArray:
-        return offspring_of(self._genomes, self._draw, self._settings, self._rng)
 
 
 def first_generation(

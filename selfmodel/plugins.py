@@ -15,22 +15,16 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
-from selfmodel.recovery.next_trial import NextTrial, by_disagreement, by_repair
-from selfmodel.recovery.repair.candidate_controller import MakeRepair
-from selfmodel.recovery.repair.cma_es import CmaEs
-from selfmodel.recovery.repair.genome_search import MakeSearch
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.repair.repertoire_search import FromRepertoire
-from selfmodel.recovery.repair.robust_repair import RobustRepair
+from selfmodel.recovery.cma_es import CmaEs
+from selfmodel.recovery.next_trial import by_disagreement
+from selfmodel.recovery.recover import NextTrial, by_repair
+from selfmodel.recovery.repair import MakeRepair, RepairSearch
 from selfmodel.recovery.repertoire.repertoire import Repertoire
-from selfmodel.recovery.scores.checked import checked
-from selfmodel.recovery.scores.energy import ENERGY
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
-from selfmodel.recovery.scores.tracking import TRACKING
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair, from_repertoire
+from selfmodel.recovery.scores import DISPLACEMENT, ENERGY, TRACKING, UPRIGHT, Score, checked
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
@@ -48,7 +42,9 @@ DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
 )
 """Name of the score of each repair, unless another is given."""
 
-SEARCHES: Mapping[str, MakeSearch] = MappingProxyType({"cma-es": CmaEs, "ea": NoisyEa})
+SEARCHES: Mapping[str, MakeSearch] = MappingProxyType(
+    {"cma-es": CmaEs, "ea": partial(Evolution, noisy=True)}
+)
 """Searches of the robust repair that need nothing else, by name."""
 
 REPERTOIRE = "repertoire"
@@ -125,7 +121,7 @@ def repair(
         )
     if name == PAPER:
         return RepairSearch
-    make_search = SEARCHES[chosen] if repertoire is None else FromRepertoire(repertoire)
+    make_search = SEARCHES[chosen] if repertoire is None else from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
 
 

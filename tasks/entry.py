@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.registry import cases_of
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores import Score
 from selfmodel.robot.legs import reaches_ground
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour, forward_displacement

@@ -17,7 +17,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.simulated import OWN_SEED
-from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.scores import Score
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mjcf.adaptation import adapt_text

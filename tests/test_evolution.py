@@ -90,7 +90,7 @@ def test_the_worst_fitness_does_not_survive():
     evolution.tell(fitness.astype(float))
 
     assert evolution.best_fitness == 99
-    assert not losers & {genome.tobytes() for genome in evolution._genomes}
+    assert not losers & {genome.tobytes() for genome in evolution.survivors[0]}
 
 
 def test_a_value_of_a_child_is_drawn_anew_with_one_percent():
@@ -149,7 +149,7 @@ def test_of_equals_the_earlier_survive():
     first = evolution.ask()[:50].copy()
     evolution.tell(np.zeros(100))
 
-    assert evolution._genomes.tobytes() == first.tobytes()
+    assert evolution.survivors[0].tobytes() == first.tobytes()
 
 
 @pytest.mark.parametrize("fitness", [np.zeros(99), np.full(100, np.nan)])
@@ -185,3 +185,18 @@ def test_another_population_keeps_the_papers_proportions(population: int):
     assert scaled.population == population
     assert scaled.survivors == population // 2
     assert abs(scaled.crossovers - 0.12 * population) <= 1
+
+
+def test_a_noisy_fitness_is_evaluated_again_so_that_luck_does_not_last():
+    numbers = Settings().scaled(20)
+    noisy = Evolution(LENGTH, draw, numbers, np.random.default_rng(0), noisy=True)
+    genomes = noisy.ask()
+    noisy.tell(genomes[:, 0])
+    lucky = genomes[np.argmax(genomes[:, 0])]
+
+    assert len(noisy.ask()) == numbers.population
+    np.testing.assert_array_equal(noisy.ask()[: numbers.survivors], noisy.survivors[0])
+    np.testing.assert_array_equal(noisy.candidates(1), [lucky])
+    noisy.tell(np.where((noisy.ask() == lucky).all(axis=1), -9.0, 0.0))
+    assert not (noisy.survivors[0] == lucky).all(axis=1).any()
+    assert noisy.evaluations == 2 * numbers.population

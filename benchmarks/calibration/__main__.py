@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from statistics import mean
 from time import process_time
@@ -23,7 +24,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -153,7 +155,8 @@ def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
     if bank is not None:
         return gait(bank, robot.name, number)
     repair = RepairSearch(Simulator(robot, threads=1), Settings())
-    return repair.best(INTACT, (), repair_stream(number, 0), lambda _generation: None)
+    assumed, stream = partial(assumed_uncertainty, robot), repair_stream(number, 0)
+    return repair((INTACT,), assumed, (), stream, lambda _generation: None)[0].controller
 
 
 def table(rows: Sequence[Facts]) -> str:

@@ -15,8 +15,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.plugins import DEFAULT_SCORES
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings

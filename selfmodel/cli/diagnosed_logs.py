@@ -16,7 +16,7 @@ from selfmodel.diagnosis.comparator_choice import ComparatorChoice
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs import TrialLog
-from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 

@@ -1,13 +1,12 @@
-from .database import Database as Database, Journal as Journal
 from .events import Event as Event
-from .next_trial import (
+from .next_trial import by_disagreement as by_disagreement
+from .recover import (
+    Journal as Journal,
     NextTrial as NextTrial,
-    Situation as Situation,
-    by_disagreement as by_disagreement,
+    RecoveryLoop as RecoveryLoop,
     by_repair as by_repair,
 )
-from .recovery import Recovery as Recovery
-from .repair.paper_repair import RepairSearch as RepairSearch
+from .repair import RepairSearch as RepairSearch
 from .repertoire.evaluation import (
     Evaluate as Evaluate,
     simulated_evaluation as simulated_evaluation,
@@ -18,6 +17,10 @@ from .repertoire.make import (
     reevaluate as reevaluate,
 )
 from .repertoire.repertoire import Repertoire as Repertoire
-from .scores.energy import ENERGY as ENERGY
-from .scores.fitness import DISPLACEMENT as DISPLACEMENT, Score as Score
-from .scores.joint_limits import upright_within as upright_within
+from .result import Database as Database, Recovery as Recovery
+from .scores import (
+    DISPLACEMENT as DISPLACEMENT,
+    ENERGY as ENERGY,
+    Score as Score,
+    upright_within as upright_within,
+)

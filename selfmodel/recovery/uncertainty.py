@@ -1,18 +1,29 @@
-"""Uncertainty of a self-model: assumed before the first trial, estimated from healthy trials."""
+"""Uncertainty of a self-model: assumed, estimated from healthy trials, weighted by later trials.
 
+Calibration predicts a tenth of a second at a time; the small differences of single limbs that make
+a robot walk in a curve show only over a whole trial. Each trial that the recovery makes is compared
+with rollouts of its controller under a sample of models (importance sampling). Continuous
+self-modelling after Bongard, Zykov and Lipson, *Resilient machines through continuous
+self-modeling* (Science 2006).
+"""
+
+import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.batch_memory import batch_bytes
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
-from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.initial_pose import StartSpread, start_spread
-from selfmodel.simulation.model_distribution import LogNormal, exact
+from selfmodel.simulation.model_distribution import LogNormal, Weighted, exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import encoder_noise
@@ -51,6 +62,36 @@ ASSUMED_DELAYS = (0, 1, 2)
 MIN_SHARE = 0.5
 """Smallest deviation of the initial pose, as a fraction of the noise with which it was measured: a
 pose within the noise is not distinguished from the reference pose."""
+
+MODELS = 128
+"""Largest number of models of the sample. Each trial is simulated once per model."""
+
+SAMPLE_COST = 1 / 12
+"""Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
+
+BATCH = 24
+"""Number of models that are simulated together, unless there are more threads: as fast as all, in a
+fifth of the memory (quadruped)."""
+
+REPEATS = 16
+"""Rollouts of one model, which measure how far noise alone moves the path."""
+
+MARKS = 5
+"""Times at which the path is compared, evenly spaced to the end of the trial."""
+
+INDEPENDENT = 3.0
+"""Independent differences that all differences of a trial count as: one for each of forward,
+sideways and heading, because those at successive times are strongly correlated."""
+
+MAX_DIFFERENCE = 6.0
+"""Bound on a difference, in standard deviations: after a fall, paths differ by any amount."""
+
+SHARE_OF_SPREAD = 0.15
+"""Error of every model's path, relative to the spread of the models' paths: no model is exact."""
+
+MIN_EFFECTIVE = 1 / 8
+"""Smallest effective size of the weighted sample, relative to its size; below it, the likelihood is
+flattened."""
 
 
 def assumed_uncertainty(robot: Robot) -> Uncertainty:
@@ -113,14 +154,14 @@ def estimated_uncertainty(
         start=StartSpread(angle, angle / 2 if np.isnan(tilts).all() else _deviation(tilts)),
     )
     if calibration is None:
-        known = replace(found, models=assumed.models, delays=assumed.delays)
+        known = dataclasses.replace(found, models=assumed.models, delays=assumed.delays)
         return found if found.is_none else known
     if calibration.error_before < EXACT_ERROR:
         return found
     deviations = CALIBRATED * calibration.deviations
     bodies = np.full(robot.model.nbody, BODIES)
     contacts = CONTACTS if robot.has_fitted_contacts else 0.0
-    return replace(found, models=LogNormal(deviations, bodies, contacts))
+    return dataclasses.replace(found, models=LogNormal(deviations, bodies, contacts))
 
 
 def _touch(anatomy: Anatomy) -> BoolArray:
@@ -185,3 +226,178 @@ def _start_variance(logged: FloatArray, simulated: FloatArray) -> float:
 def _deviation(variances: Sequence[float]) -> float:
     known = [variance for variance in variances if np.isfinite(variance)]
     return float(np.sqrt(np.mean(known))) if known else 0.0
+
+
+class Posterior:
+    """The uncertainty of a self-model, updated by trials. It simulates nothing until it is needed.
+
+    Args:
+        simulator: Self-model, calibrated if there is a calibration.
+        healthy: Trials of the healthy robot, at least one.
+        calibration: Fit of the self-model to the healthy trials; None without one.
+        settings: The paper's numbers, which set the cost.
+        rng: Random number generator of the sample.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        healthy: Sequence[Trial],
+        calibration: Calibration | None,
+        settings: Settings,
+        rng: np.random.Generator,
+    ) -> None:
+        self._models = max(2, min(MODELS, round(SAMPLE_COST * settings.evaluations)))
+        self._simulator, self._healthy, self._calibration = simulator, healthy, calibration
+        self._rng = rng
+        self._likelihoods: dict[Any, FloatArray] = {}  # by hypothesis, and content of the trial
+
+    @cached_property
+    def _uncertainty(self) -> Uncertainty:
+        return estimated_uncertainty(self._simulator, self._healthy, self._calibration)
+
+    @cached_property
+    def _conditions(self) -> tuple[Condition, ...]:
+        """A condition per model, then ``REPEATS`` with the model of the first one."""
+        count = self._models + REPEATS
+        drawn = draw_conditions((INTACT,), self._uncertainty, count, self._rng)
+        repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[self._models :]]
+        return (*drawn[: self._models], *repeats)
+
+    def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> Uncertainty:
+        """Returns an uncertainty whose models are weighted by their predictions of trials.
+
+        Args:
+            trials: Trials of controllers; those of the stage ``before`` are of the healthy robot.
+                Trials whose base was not observed are left out.
+            hypothesis: Faults of the robot in all other trials.
+        """
+        sample = [condition.model for condition in self._conditions[: self._models]]
+        if not any(model.differs for model in sample):
+            return self._uncertainty
+        known = [trial for trial in trials if np.isfinite(_observed(trial)).all()]
+        likelihood = np.zeros(self._models)
+        for trial in known:
+            likelihood += self._likelihood(
+                trial, INTACT if trial.plan.stage == "before" else hypothesis
+            )
+        models = Weighted(sample, flattened_weights(likelihood))
+        return dataclasses.replace(self._uncertainty, models=models)
+
+    def _likelihood(self, trial: Trial, hypothesis: Hypothesis) -> FloatArray:
+        key = (hypothesis, trial.content)
+        if key not in self._likelihoods:
+            conditions = [
+                dataclasses.replace(own, hypothesis=hypothesis) for own in self._conditions
+            ]
+            paths = _paths(self._simulator, self._uncertainty, trial, conditions)
+            observed = _observed(trial)
+            # Relative to the first step, a value has the noise of two measurements.
+            measured = np.sqrt(2) * np.repeat(encoder_noise(observed), MARKS)
+            self._likelihoods[key] = log_likelihood(
+                _path(observed), paths[: self._models], paths[self._models :], measured
+            )
+        return self._likelihoods[key]
+
+
+def log_likelihood(
+    observed: FloatArray, paths: FloatArray, repeats: FloatArray, measured: FloatArray
+) -> FloatArray:
+    """Returns the logarithm of the likelihood of each model, ``(models,)``.
+
+    Args:
+        observed: Path of the trial, ``(values,)``.
+        paths: Path predicted by each model, ``(models, values)``; NaN if its simulation diverged.
+        repeats: Paths of one model with different noise, ``(repeats, values)``.
+        measured: Standard deviation of the measurement of the path, ``(values,)``.
+    """
+    # The noise is that of the trial and that of the rollout.
+    noise = np.hypot(np.sqrt(2) * np.nanstd(repeats, axis=0), measured)
+    scale = np.hypot(noise, SHARE_OF_SPREAD * np.nanstd(paths, axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        differences = np.abs(paths - observed) / scale
+    differences = np.nan_to_num(differences, nan=MAX_DIFFERENCE, posinf=MAX_DIFFERENCE)
+    squares = np.square(np.minimum(differences, MAX_DIFFERENCE))
+    return np.asarray(-0.5 * INDEPENDENT * squares.mean(axis=1), dtype=np.float64)
+
+
+def flattened_weights(likelihood: FloatArray) -> FloatArray:
+    """Returns the weights of models, ``(models,)``.
+
+    The likelihood is flattened until the effective size of the sample is large enough.
+
+    Args:
+        likelihood: Logarithm of the likelihood of each model, ``(models,)``.
+    """
+    temperature = 1.0
+    while True:
+        weights = np.exp((likelihood - likelihood.max()) / temperature)
+        weights /= weights.sum()
+        if 1 / np.square(weights).sum() >= MIN_EFFECTIVE * len(weights):
+            return np.asarray(weights)
+        temperature *= 1.5
+
+
+def _paths(
+    simulator: Simulator,
+    uncertainty: Uncertainty,
+    trial: Trial,
+    conditions: Sequence[Condition],
+) -> FloatArray:
+    """Returns the path of a trial's controller under each condition, ``(conditions, values)``.
+
+    The path of a simulation that diverged is NaN. The models of a batch take bounded memory.
+    """
+    affordable = batch_bytes() // int(simulator.robot.model.nbuffer)
+    size = max(1, min(max(BATCH, simulator.threads), affordable))
+    paths = []
+    for first in range(0, len(conditions), size):
+        outcome = simulator.run_under(
+            conditions[first : first + size],
+            uncertainty,
+            [trial.plan.controller],
+            trial.behaviour.steps,
+            ("base_position", "base_orientation"),
+        )
+        simulated = outcome.behaviour
+        position, orientation = simulated["base_position"][0], simulated["base_orientation"][0]
+        paths += [
+            np.full(3 * MARKS, np.nan) if diverged else _path(_track(*own))
+            for *own, diverged in zip(position, orientation, outcome.diverged[0], strict=True)
+        ]
+    return np.array(paths)
+
+
+def _observed(trial: Trial) -> FloatArray:
+    """Returns forward and sideways position, m, and heading, rad, of a trial, ``(steps, 3)``.
+
+    Steps at which the base was not observed are interpolated; all are NaN if it never was.
+    """
+    logged = trial.behaviour
+    track = _track(logged["base_position"], logged["base_orientation"])
+    steps = np.arange(len(track))
+    for column in track.T:
+        known = np.isfinite(column)
+        if known.any():
+            column[:] = np.interp(steps, steps[known], column[known])
+    return track
+
+
+def _track(position: FloatArray, orientation: FloatArray) -> FloatArray:
+    """Returns forward and sideways position, m, and heading, rad, ``(steps, 3)``.
+
+    Args:
+        position: ``(steps, 3)``.
+        orientation: ``(steps, 4)``; NaN where unknown.
+    """
+    ahead = directions(orientation)
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    known = np.isfinite(heading)
+    heading[known] = np.unwrap(heading[known])
+    return np.column_stack([position[:, :2], heading])
+
+
+def _path(track: FloatArray) -> FloatArray:
+    """Returns a track at the marks, relative to its first step, ``(3 * MARKS,)``."""
+    marks = np.linspace(0, len(track) - 1, MARKS + 1).round().astype(np.intp)[1:]
+    return np.asarray((track[marks] - track[0]).T.ravel())

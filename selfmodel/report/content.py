@@ -11,8 +11,7 @@ from selfmodel.diagnosis.sentences import confidence_sentence, fit_sentence, rig
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search, as_json
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.report.charts import (
     BarChart,
     Estimate,

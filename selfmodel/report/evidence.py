@@ -13,8 +13,12 @@ from selfmodel.diagnosis.evidence import simulate
 from selfmodel.diagnosis.preparation import prepared_trial
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.logs.controllers import controller_bytes
-from selfmodel.recovery.disagreement import EARLY_STEPS, disagreements
-from selfmodel.recovery.next_trial import candidates_to_separate, discriminating_controller
+from selfmodel.recovery.next_trial import (
+    EARLY_STEPS,
+    candidates_to_separate,
+    disagreements,
+    discriminating_controller,
+)
 from selfmodel.report.charts import (
     Attachment,
     BarChart,

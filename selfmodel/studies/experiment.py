@@ -23,10 +23,10 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.plugins import NEXT_TRIAL, PAPER, repair
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.random_streams import gap_stream
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.recovery.repertoire.repertoire import Repertoire
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -115,9 +115,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     journal = create_journal(
         experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
-    recovery = recover(
-        healthy=healthy,
-        damaged=damaged,
+    recovery = RecoveryLoop(
         simulator=simulator,
         choose_comparator=experiment.choose_comparator,
         run_trial=TrialRunner(
@@ -140,7 +138,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         next_trial=NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
         make_repair=repair(experiment.repair, experiment.search, experiment.repertoire),
-    )
+    ).run(healthy, damaged)
     return Outcome(
         recovery=recovery,
         stats=simulator.stats,

@@ -15,10 +15,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.recordings.tables.table import FORMATS, is_table, read_table
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.scores.fitness import Score
-from selfmodel.recovery.scores.joint_limits import upright_within
-from selfmodel.recovery.scores.tracking import TRACKING, Reference, tracking
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import TRACKING, UPRIGHT, Reference, Score, tracking, upright_within
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import Entry

@@ -27,7 +27,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop

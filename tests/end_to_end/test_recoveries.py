@@ -14,8 +14,7 @@ from benchmarks.recoveries.table import table
 from selfmodel import load_robot, recover, simulated_robot
 from selfmodel.experiments.grid import Cell, processes, run_grid
 from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.settings import Settings
 
 FAULTS = ("intact", "break:front_left_knee")

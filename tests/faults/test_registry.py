@@ -17,7 +17,7 @@ from selfmodel.faults.registry import (
     PAPER_KINDS,
 )
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot

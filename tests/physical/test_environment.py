@@ -21,8 +21,8 @@ from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.environment import EnvironmentRobot, StepTimer
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.recover import RecoveryLoop
+from selfmodel.recovery.result import Recovery
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -256,9 +256,7 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
 
     def recovery(folder: str, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
         journal = create_journal(tmp_path / folder, QUADRUPED.anatomy, calibrated=False)
-        return recover(
-            healthy=healthy,
-            damaged=damaged,
+        return RecoveryLoop(
             simulator=Simulator(QUADRUPED, 2),
             choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             run_trial=TrialRunner(journal.trials, QUADRUPED, settings),
@@ -266,7 +264,7 @@ def test_a_recovery_is_the_same_through_environments(tmp_path: Path):
             settings=settings,
             seed=0,
             on_event=lambda _event: None,
-        )
+        ).run(healthy, damaged)
 
     envs = [load("quadruped", "walk", {"hypothesis": text}) for text in ("intact", truth)]
     driven_ones = [EnvironmentRobot(env, QUADRUPED, observe=motion_capture(env)) for env in envs]

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -13,19 +13,19 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.database import Database
-from selfmodel.recovery.disagreement import EARLY_STEPS, Disagreement
 from selfmodel.recovery.events import DiscriminatingTrial, Event
 from selfmodel.recovery.next_trial import (
+    EARLY_STEPS,
     GENERATIONS,
-    Situation,
+    Disagreement,
     by_disagreement,
-    by_repair,
-    candidates,
     candidates_to_separate,
     discriminating_controller,
 )
-from selfmodel.recovery.repair.candidate_controller import CandidateController
+from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
+from selfmodel.recovery.repair import CandidateController
+from selfmodel.recovery.result import Database
+from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
@@ -33,7 +33,7 @@ from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.drivers import random_controllers
+from tests.helpers.drivers import random_controllers, random_cpgs
 
 SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
 
@@ -120,16 +120,23 @@ def test_a_controller_that_was_tried_is_no_candidate(
 ):
     tried = random_controllers(quadruped, known, seed % 97)
     numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
-    pool = candidates(tried, numbers, np.random.default_rng(seed))
+    pool = untried_mutants(tried, tried, numbers, np.random.default_rng(seed))
 
     assert not set(pool) & set(tried)
     assert 1 <= len(pool) == len(set(pool)) <= numbers.population
 
 
+def test_mutants_are_of_the_kind_of_their_parents(quadruped: Robot):
+    newest, older = random_cpgs(quadruped, 2)
+    found = untried_mutants([newest], [newest, older], SMALL, np.random.default_rng(0))
+
+    assert {one.design for one in found} == {cpg_for(quadruped)}
+
+
 def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
     tried = random_controllers(quadruped, 3)
     numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
-    pool = candidates(tried, numbers, np.random.default_rng(0))
+    pool = untried_mutants(tried, tried, numbers, np.random.default_rng(0))
     kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool]
 
     assert np.all(np.sum(kin, axis=1) == 1)
@@ -141,7 +148,7 @@ def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
     touch = parse("sensor:front_left_touch", quadruped.anatomy)
     found = diagnosis("intact", robot=quadruped, verdict="explained")
     found = dataclasses.replace(found, undetectable=(touch,))
-    first = candidates(known, SMALL, np.random.default_rng(1))
+    first = untried_mutants(known, known, SMALL, np.random.default_rng(1))
     best = Disagreement([INTACT, touch], simulator, SMALL.steps).most_discriminative(first)
     bred = discriminating_controller(found, known, simulator, SMALL, np.random.default_rng(1))
 
@@ -166,35 +173,38 @@ def test_the_controller_that_disagrees_most_is_not_tried_a_second_time(quadruped
         older.append(best)
 
 
-def situation_of(
-    robot: Robot, tried: Sequence[Controller], found: Sequence[Controller]
-) -> Situation:
-    """A situation after trials of some controllers, in which the repair finds others."""
+def loop_of(
+    robot: Robot,
+    tried: Sequence[Controller],
+    found: Sequence[Controller],
+    diagnoses: Sequence[Diagnosis] = (),
+    on_event: Callable[[Event], None] = lambda _event: None,
+) -> RecoveryLoop:
+    """A recovery after trials of some controllers, in which the repair finds others."""
     empty = Behaviour(robot.anatomy.names, np.zeros(1), {})
     trials = [
         Trial(TrialPlan(f"{i:02d}-after", "after", one, 1, 0), robot.name, empty, f"{i:02d}-after")
         for i, one in enumerate(tried)
     ]
-    return Situation(
-        known=Database(tuple(trials)),
-        trials_left=1,
-        simulator=Simulator(robot, 1),
-        settings=SMALL,
-        rng=np.random.default_rng(0),
-        repaired=lambda: [CandidateController(one, np.zeros(1)) for one in found],
-        on_event=lambda _event: None,
+    unused = dict.fromkeys(("choose_comparator", "run_trial", "journal"))
+    loop = RecoveryLoop(
+        simulator=Simulator(robot, 1), settings=SMALL, seed=0, on_event=on_event, **unused
     )
+    loop.known = Database(tuple(trials), tuple(diagnoses))
+    loop.trials_left, loop.rng = 1, np.random.default_rng(0)
+    loop.repaired = lambda: tuple(CandidateController(one, np.zeros(1)) for one in found)
+    return loop
 
 
 def test_a_repair_that_was_tried_is_followed_by_the_next_best(quadruped: Robot):
     first, second, third = random_controllers(quadruped, 3)
-    assert by_repair(situation_of(quadruped, [first], [first, second, third])) == second
-    assert by_repair(situation_of(quadruped, [second, first], [first, second, third])) == third
+    assert by_repair(loop_of(quadruped, [first], [first, second, third])) == second
+    assert by_repair(loop_of(quadruped, [second, first], [first, second, third])) == third
 
 
 def test_if_all_repairs_were_tried_a_mutant_of_the_best_is_next(quadruped: Robot):
     first, second = random_controllers(quadruped, 2)
-    chosen = by_repair(situation_of(quadruped, [first, second], [second, first]))
+    chosen = by_repair(loop_of(quadruped, [first, second], [second, first]))
     alike = np.mean(chosen.genome == second.genome)
     assert 0.5 < alike < 1
 
@@ -263,19 +273,10 @@ def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
     told = diagnosis("jam:front_left_knee", "intact", robot=quadruped, verdict=verdict)
     diagnoses = [dataclasses.replace(told, undetectable=tuple(besides[:count])) for count in unseen]
     found = diagnoses[-1]
-    empty = Behaviour(quadruped.anatomy.names, np.zeros(1), {})
-    tried = Trial(TrialPlan("01-after", "after", gait, 1, 0), "quadruped", empty, "01-after")
     events: list[Event] = []
-    situation = Situation(
-        known=Database((tried,), tuple(diagnoses)),
-        trials_left=trials_left,
-        simulator=Simulator(quadruped, 1),
-        settings=SMALL,
-        rng=np.random.default_rng(0),
-        repaired=lambda: (CandidateController(compensating, np.zeros(1)),),
-        on_event=events.append,
-    )
+    loop = loop_of(quadruped, [gait], [compensating], diagnoses, events.append)
+    loop.trials_left = trials_left
 
-    assert by_repair(situation) == compensating
-    assert (by_disagreement(situation) != compensating) == asks
+    assert by_repair(loop) == compensating
+    assert (by_disagreement(loop) != compensating) == asks
     assert events == ([DiscriminatingTrial(candidates_to_separate(found))] if asks else [])

@@ -25,10 +25,10 @@ from selfmodel.logs.mcap.contents import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.next_trial import NextTrial, Situation, by_repair, discriminating_controller
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.next_trial import discriminating_controller
+from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.result import Recovery
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.outcome import SimulationResult
@@ -102,9 +102,7 @@ def recovery(
     """A small recovery from a failure."""
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
     healthy, damaged = (Sealed(one) for one in physical) if sealed else physical
-    return recover(
-        healthy=healthy,
-        damaged=damaged,
+    return RecoveryLoop(
         simulator=simulator,
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(robot),
@@ -116,7 +114,7 @@ def recovery(
         gait=gait,
         next_trial=next_trial,
         make_repair=RepairSearch,
-    )
+    ).run(healthy, damaged)
 
 
 def test_a_recovery_tells_the_papers_story(robot: Robot):
@@ -196,9 +194,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
     for hidden in (truth, INTACT):
         events: list[Event] = []
         damaged = Replay(SimulatedRobot(quadruped, truth), hidden)
-        recover(
-            healthy=SimulatedRobot(quadruped),
-            damaged=damaged,
+        RecoveryLoop(
             simulator=Simulator(quadruped, 2),
             choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
             run_trial=in_memory(quadruped),
@@ -207,7 +203,7 @@ def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped
             seed=1,
             on_event=events.append,
             kinds=PAPER_KINDS,
-        )
+        ).run(SimulatedRobot(quadruped), damaged)
         diagnoses.append([event for event in events if isinstance(event, Diagnosis)])
 
     assert diagnoses[0] == diagnoses[1]
@@ -234,7 +230,7 @@ def test_every_search_starts_from_what_the_database_holds(
             started.append([np.asarray(seed).tobytes() for seed in seeds])
             super().__init__(length, draw, settings, rng, seeds)
 
-    monkeypatch.setattr("selfmodel.recovery.repair.paper_repair.Evolution", Spy)
+    monkeypatch.setattr("selfmodel.recovery.repair.Evolution", Spy)
     monkeypatch.setattr("selfmodel.diagnosis.diagnose.Evolution", Spy)
     events: list[Event] = []
     truth = parse("break:back_left_knee", quadruped.anatomy)
@@ -299,9 +295,7 @@ def recovery_in_files(
     class SealedJournal:
         add = staticmethod(journal.add)
 
-    outcome = recover(
-        healthy=SimulatedRobot(robot),
-        damaged=SimulatedRobot(robot, truth),
+    outcome = RecoveryLoop(
         simulator=Simulator(robot, 2),
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=TrialRunner(journal.trials, robot, BUDGET, hidden).__call__,
@@ -310,7 +304,7 @@ def recovery_in_files(
         seed=1,
         on_event=lambda _: None,
         kinds=PAPER_KINDS,
-    )
+    ).run(SimulatedRobot(robot), SimulatedRobot(robot, truth))
     return outcome, journal
 
 
@@ -353,11 +347,13 @@ def test_each_trial_is_read_from_its_log_once_and_is_all_that_is_known(
 
 
 def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robot):
-    met: list[Situation] = []
+    met: list[tuple[int, int, int, float]] = []
     given = random_controllers(quadruped, 3)
 
-    def choose(situation: Situation) -> Controller:
-        met.append(situation)
+    def choose(loop: RecoveryLoop) -> Controller:
+        known = loop.known
+        now = loop.trials_left, len(known.diagnoses), len(known.evidence), loop.rng.random()
+        met.append(now)
         return given[len(met) - 1]
 
     truth = parse("break:back_left_knee", quadruped.anatomy)
@@ -365,10 +361,8 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
     outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events, next_trial=choose)
 
     assert [trial.plan.controller for trial in outcome.trials[2:]] == given
-    assert [situation.trials_left for situation in met] == [3, 2, 1]
-    assert [len(situation.known.diagnoses) for situation in met] == [1, 2, 3]
-    assert [len(situation.known.evidence) for situation in met] == [1, 2, 3]
-    assert len({situation.rng.random() for situation in met}) == 3
+    assert [now[:3] for now in met] == [(3, 1, 1), (2, 2, 2), (1, 3, 3)]
+    assert len({now[3] for now in met}) == 3
     assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
 
 
@@ -376,15 +370,9 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
 def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
     quadruped: Robot,
 ):
-    def ask(situation: Situation) -> Controller:
-        diagnosis = situation.known.diagnoses[-1]
-        return discriminating_controller(
-            diagnosis,
-            situation.known.controllers,
-            situation.simulator,
-            situation.settings,
-            situation.rng,
-        )
+    def ask(loop: RecoveryLoop) -> Controller:
+        diagnosis, known = loop.known.diagnoses[-1], loop.known.controllers
+        return discriminating_controller(diagnosis, known, loop.simulator, loop.settings, loop.rng)
 
     truth = parse("sensor:front_left_touch", quadruped.anatomy)
     gait = random_controllers(quadruped, 1)[0]

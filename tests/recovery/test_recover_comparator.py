@@ -8,7 +8,7 @@ import pytest
 from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import recover
+from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -28,9 +28,7 @@ def test_a_comparator_that_refuses_the_healthy_trial_ends_the_recovery_before_th
         raise InputError("no position")
 
     with pytest.raises(InputError, match="no position"):
-        recover(
-            healthy=SimulatedRobot(quadruped),
-            damaged=SimulatedRobot(quadruped),
+        RecoveryLoop(
             simulator=Simulator(quadruped, 1),
             choose_comparator=refuse,
             run_trial=in_memory(quadruped),
@@ -40,5 +38,5 @@ def test_a_comparator_that_refuses_the_healthy_trial_ends_the_recovery_before_th
             on_event=events.append,
             calibrate=lambda _trials: pytest.fail("calibrated"),
             gait=random_controllers(quadruped, 1)[0],
-        )
+        ).run(SimulatedRobot(quadruped), SimulatedRobot(quadruped))
     assert [event.plan.stage for event in events if isinstance(event, Trial)] == ["before"]

@@ -8,14 +8,15 @@ import pytest
 
 from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.next_trial import by_repair, candidates, discriminating_controller
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.recovery import Recovery
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.robot.designs import DESIGNS, cpg_for
+from selfmodel.recovery.next_trial import discriminating_controller
+from selfmodel.recovery.recover import RecoveryLoop, by_repair
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.result import Recovery
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -30,16 +31,14 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
     """A small recovery whose self-model was fitted, and written with fewer digits by that."""
     fitted = with_parameters(robot, dataclasses.replace(nominal(robot), friction=1.1))
 
-    def choose(situation):  # noqa: ANN001, ANN202  # as recover declares it
+    def choose(loop: RecoveryLoop) -> Controller:
         if next_trial == "repair":
-            return by_repair(situation)
-        known = situation.known
-        rest = (situation.simulator, situation.settings, situation.rng)
+            return by_repair(loop)
+        known = loop.known
+        rest = (loop.simulator, loop.settings, loop.rng)
         return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
 
-    return recover(
-        healthy=SimulatedRobot(robot),
-        damaged=SimulatedRobot(robot, parse("break:back_left_knee", robot.anatomy)),
+    return RecoveryLoop(
         simulator=Simulator(robot, 1),
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(robot),
@@ -51,6 +50,8 @@ def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
         calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
         next_trial=choose,
         make_repair=RepairSearch,
+    ).run(
+        SimulatedRobot(robot), SimulatedRobot(robot, parse("break:back_left_knee", robot.anatomy))
     )
 
 
@@ -87,13 +88,5 @@ def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quad
     for kind in ("network", "cpg"):
         design = DESIGNS[kind](quadruped, None)
         search = RepairSearch(Simulator(quadruped, 1), FEW, design)
-        found = search.best(INTACT, seeds, np.random.default_rng(0), lambda _generation: None)
-        assert found.design == design
-
-
-def test_candidates_are_of_the_newest_controller_s_kind(quadruped: Robot):
-    (network,), (newest, older) = random_controllers(quadruped, 1), random_cpgs(quadruped, 2)
-    found = candidates([newest, network, older], FEW, np.random.default_rng(0))
-
-    assert not {newest, older, network} & set(found)
-    assert {one.design for one in found} == {cpg_for(quadruped)}
+        rest = None, seeds, np.random.default_rng(0), lambda _generation: None
+        assert {one.controller.design for one in search((INTACT,), *rest)} == {design}

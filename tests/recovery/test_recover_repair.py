@@ -15,9 +15,9 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery import recover as module
-from selfmodel.recovery.recover import recover
-from selfmodel.recovery.repair.candidate_controller import CandidateController
-from selfmodel.recovery.scores.fitness import Score
+from selfmodel.recovery.recover import RecoveryLoop
+from selfmodel.recovery.repair import CandidateController
+from selfmodel.recovery.scores import Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
@@ -79,9 +79,7 @@ def found(quadruped: Robot, monkeypatch: pytest.MonkeyPatch) -> dict[str, object
 
     monkeypatch.setattr(module, "DiagnosticSearch", lambda *_rest, **_options: StubDiagnosis())
     monkeypatch.setattr(module, "Posterior", Watched)
-    recovery = recover(
-        healthy=SimulatedRobot(quadruped),
-        damaged=SimulatedRobot(quadruped, best),
+    recovery = RecoveryLoop(
         simulator=Simulator(quadruped, 1),
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(quadruped),
@@ -91,7 +89,7 @@ def found(quadruped: Robot, monkeypatch: pytest.MonkeyPatch) -> dict[str, object
         on_event=lambda _event: None,
         score=Score("end", ("base_position",), judge),
         make_repair=lambda *_given: stub,
-    )
+    ).run(SimulatedRobot(quadruped), SimulatedRobot(quadruped, best))
     return {"recovery": recovery, "repair": stub, "asked": asked, "judged": judged}
 
 

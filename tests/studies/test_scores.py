@@ -12,11 +12,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.scores.energy import ENERGY
-from selfmodel.recovery.scores.fitness import Score
-from selfmodel.recovery.scores.joint_limits import upright_within
-from selfmodel.recovery.scores.tracking import Reference
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import ENERGY, UPRIGHT, Reference, Score, upright_within
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -9,7 +9,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.interface import TimedRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
@@ -97,7 +97,7 @@ def test_a_repair_for_the_return_finds_another_controller_than_one_for_the_way()
     stands = RepairSearch(simulator, settings, score=score)
     goes = RepairSearch(simulator, settings)
     found = [
-        repair.best(INTACT, (), np.random.default_rng(0), lambda _: None)
+        repair((INTACT,), None, (), np.random.default_rng(0), lambda _: None)[0].controller
         for repair in (stands, goes)
     ]
     shown = simulator.run([(INTACT, one) for one in found], STEPS, score.record).behaviour

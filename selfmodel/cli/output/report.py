@@ -14,7 +14,7 @@ from selfmodel.diagnosis.sentences import confidence_sentence, right_or_wrong
 from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
 from selfmodel.logs.results import RecoveryResult, ScoreResult, TrialResult
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 from selfmodel.studies.experiment import Experiment, Outcome
 

@@ -22,7 +22,7 @@ from selfmodel.experiments.study.files import as_dicts
 from selfmodel.experiments.study.gaits import read_gait
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.events import Event
-from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

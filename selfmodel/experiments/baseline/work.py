@@ -22,11 +22,11 @@ from selfmodel.recovery.baselines.genome_search import genome_search
 from selfmodel.recovery.baselines.measurement import Track
 from selfmodel.recovery.baselines.problem import Fitness, Problem
 from selfmodel.recovery.baselines.registry import BASELINES
-from selfmodel.recovery.repair.cma_es import CmaEs
-from selfmodel.recovery.repair.robust_fitness import RobustFitness
+from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import make_repertoire
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.robust_repair import RobustFitness
+from selfmodel.recovery.scores import UPRIGHT
 from selfmodel.recovery.uncertainty import noise_of_gap
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings

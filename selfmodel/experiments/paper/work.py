@@ -7,6 +7,7 @@ default.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,9 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.scores import DISPLACEMENT
+from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -107,7 +109,8 @@ def evolve_on_robot(cell: Cell, needs: Mapping[str, Path], _folder: Path) -> dic
 
     # A stream that no repair of the recovery draws from: the control is an independent search.
     stream = repair_stream(cell.seed, given.settings.trials + 1)
-    RepairSearch(simulator, given.settings).best(given.truth, [given.gait], stream, keep)
+    assumed = partial(assumed_uncertainty, given.robot)
+    RepairSearch(simulator, given.settings)([given.truth], assumed, [given.gait], stream, keep)
     return {"evolution": as_dicts(rows)}
 
 

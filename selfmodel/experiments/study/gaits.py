@@ -16,7 +16,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.files import replace_file
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -7,7 +7,7 @@ from selfmodel.experiments.grid import Cell
 from selfmodel.experiments.grid.cell import with_needs
 from selfmodel.experiments.study.gaits import EVOLVE
 from selfmodel.plugins import PAPER
-from selfmodel.recovery.repair.robust_repair import rollouts_of
+from selfmodel.recovery.robust_repair import rollouts_of
 from selfmodel.settings import Settings
 
 

@@ -15,7 +15,7 @@ from selfmodel.experiments.suite.rows import SuiteRow
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.sensors import silent_neurons
-from selfmodel.recovery.scores.upright import falls_of
+from selfmodel.recovery.falls import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import Experiment, run

@@ -8,7 +8,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.recovery.baselines.problem import Fitness, Search
-from selfmodel.recovery.repair.genome_search import MakeSearch
+from selfmodel.recovery.robust_repair import MakeSearch
 from selfmodel.settings import Settings
 
 KEPT = 50

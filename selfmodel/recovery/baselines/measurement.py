@@ -6,7 +6,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.scores.falls import first_falls, held_at_the_end
+from selfmodel.recovery.falls import first_falls, held_at_the_end
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample, collect
 

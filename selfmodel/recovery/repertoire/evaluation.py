@@ -9,7 +9,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.scores.upright import falls_of
+from selfmodel.recovery.falls import falls_of
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement

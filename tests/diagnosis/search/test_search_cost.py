@@ -10,9 +10,9 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.sequential_diagnosis import simulated_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import simulated_steps
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers

@@ -22,7 +22,7 @@ from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.scores.falls import first_falls
+from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot

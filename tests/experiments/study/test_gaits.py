@@ -6,19 +6,21 @@ from pathlib import Path
 import pytest
 
 from selfmodel.controllers.controller import Controller
+from selfmodel.evolution import Evolution
 from selfmodel.experiments.study.gaits import evolve, gait_cell, read_gait
 from selfmodel.experiments.study.planned_robots import planned
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.repair.robust_repair import RobustRepair
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.robust_repair import RobustRepair
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+
+NOISY_EA = partial(Evolution, noisy=True)
 
 TINY = Settings(steps=40, generations=3).scaled(8)
 
@@ -29,15 +31,14 @@ def evolved(folder: Path, robot: Robot, **options: str) -> Controller:
 
 
 def test_the_default_is_the_gait_of_the_papers_repair_to_the_bit(quadruped: Robot, tmp_path: Path):
-    expected = RepairSearch(Simulator(quadruped, 1), TINY).best(
-        INTACT, (), repair_stream(3, 0), lambda _generation: None
-    )
+    given = None, (), repair_stream(3, 0), lambda _generation: None
+    expected = RepairSearch(Simulator(quadruped, 1), TINY)((INTACT,), *given)[0].controller
 
     assert evolved(tmp_path, quadruped) == expected
 
 
 @pytest.mark.parametrize(
-    ("search", "options"), [(None, {}), ("cma-es", {}), ("ea", {"make_search": NoisyEa})]
+    ("search", "options"), [(None, {}), ("cma-es", {}), ("ea", {"make_search": NOISY_EA})]
 )
 def test_the_robust_repair_evolves_the_first_gait_of_a_robust_recovery(
     search: str | None, options: dict[str, type], quadruped: Robot, tmp_path: Path

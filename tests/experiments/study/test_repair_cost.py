@@ -14,7 +14,7 @@ from selfmodel.experiments.suite.plan import Study, cells
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import UPRIGHT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

@@ -1,20 +1,23 @@
 """Small problems for the tests of baselines."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
+from selfmodel.evolution import Evolution
 from selfmodel.recovery.baselines.genome_search import genome_search
 from selfmodel.recovery.baselines.measurement import Track
 from selfmodel.recovery.baselines.problem import Problem
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from tests.helpers.robots.stub_robot import StubRobot
+
+NOISY_EA = partial(Evolution, noisy=True)
 
 LEVEL = np.array([0.0, 0.0, 1.0])
 """Normal of a level ground."""
@@ -47,7 +50,7 @@ def problem_of(
         "evaluate": evaluate,
         "healthy": fitness,
         "hidden": fitness,
-        "search": genome_search(NoisyEa, Settings().scaled(8)),
+        "search": genome_search(NOISY_EA, Settings().scaled(8)),
         "repertoire": repertoire_of(robot, [0.2, 1.5, 0.9], [[0.1] * 4, [0.5] * 4, [0.9] * 4]),
     }
     return Problem(**{**parts, **given})

@@ -1,20 +1,24 @@
 """Promises of the searches of baselines: their cost, and the best first."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller
+from selfmodel.evolution import Evolution
 from selfmodel.recovery.baselines.genome_search import KEPT, genome_search
-from selfmodel.recovery.repair.cma_es import CmaEs
-from selfmodel.recovery.repair.genome_search import MakeSearch
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
+from selfmodel.recovery.cma_es import CmaEs
+from selfmodel.recovery.robust_repair import MakeSearch
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from tests.recovery.baselines.problems import fitness
 
+NOISY_EA = partial(Evolution, noisy=True)
 
-@pytest.mark.parametrize("make", [CmaEs, NoisyEa])
+
+@pytest.mark.parametrize("make", [CmaEs, NOISY_EA])
 @pytest.mark.parametrize("evaluations", [8, 30, 200])
 def test_a_search_spends_its_evaluations_and_returns_the_best_first(
     quadruped: Robot, make: MakeSearch, evaluations: int

@@ -1,9 +1,12 @@
 """What every baseline promises: its budget, its seed, and the best trial so far."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from selfmodel.api import simulated_robot
+from selfmodel.evolution import Evolution
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.baselines.genome_search import genome_search
@@ -15,7 +18,6 @@ from selfmodel.recovery.baselines.problem import (
     Problem,
 )
 from selfmodel.recovery.baselines.registry import BASELINES
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
 from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
 from selfmodel.recovery.repertoire.make import make_repertoire
 from selfmodel.recovery.repertoire.repertoire import Repertoire
@@ -24,6 +26,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from tests.recovery.baselines.problems import LEVEL
+
+NOISY_EA = partial(Evolution, noisy=True)
 
 STEPS = 25
 SMALL = BaselineSettings(trials=3, evaluations=8, searches=2, population=4, period=1)
@@ -58,7 +62,7 @@ def run(
         evaluate=simulated_evaluation(Simulator(robot, 1), INTACT, STEPS),
         healthy=fitness_on(Track(simulated_robot(robot), robot, LEVEL, STEPS)),
         hidden=fitness_on(track()),
-        search=genome_search(NoisyEa, Settings().scaled(4)),
+        search=genome_search(NOISY_EA, Settings().scaled(4)),
         repertoire=repertoire,
     )
     seen: list[BaselineTrial] = []

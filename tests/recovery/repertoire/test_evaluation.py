@@ -6,9 +6,9 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
+from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.repertoire import evaluation
 from selfmodel.recovery.repertoire.evaluation import duty_factors, feet_of, simulated_evaluation
-from selfmodel.recovery.scores.upright import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement

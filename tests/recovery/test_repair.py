@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.errors import WorkError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.repair.paper_repair import RepairSearch
+from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
@@ -22,9 +22,8 @@ SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
 def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
     seeds = random_controllers(quadruped, 20, seed=3)
     simulator = Simulator(quadruped, 2)
-    best = RepairSearch(simulator, SMALL).best(
-        INTACT, seeds, np.random.default_rng(0), lambda _: None
-    )
+    given = assumed, seeds, np.random.default_rng(0), lambda _: None
+    best = RepairSearch(simulator, SMALL)((INTACT,), *given)[0].controller
     runs = [(INTACT, seed) for seed in seeds]
     behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
 
@@ -37,9 +36,6 @@ def test_its_candidates_are_the_survivors_with_their_fitness_best_first(quadrupe
     numbers = dataclasses.replace(SMALL, generations=2, mutation=0.01)
     given = seeds, np.random.default_rng(0), lambda _: None
     found = RepairSearch(simulator, numbers)([INTACT], assumed, *given)
-    again = seeds, np.random.default_rng(0), lambda _: None
-    assert found[0].controller == RepairSearch(simulator, numbers).best(INTACT, *again)
-
     runs = [(INTACT, one.controller) for one in found]
     fitness = forward_displacement(simulator.run(runs, 200, ["base_position"]).behaviour)
     assert [one.predicted for one in found] == fitness.tolist() == sorted(fitness)[::-1]
@@ -55,4 +51,4 @@ def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
     few = dataclasses.replace(Settings().scaled(4), generations=1, steps=20)
     search = RepairSearch(Simulator(unstable(quadruped), 2), few)
     with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite, wi"):
-        search.best(INTACT, (), np.random.default_rng(0), lambda _: None)
+        search((INTACT,), assumed, (), np.random.default_rng(0), lambda _: None)

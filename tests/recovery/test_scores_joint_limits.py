@@ -8,8 +8,7 @@ from selfmodel.arguments import robot_entry
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.scores.joint_limits import upright_within
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import UPRIGHT, upright_within
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.simulation.simulator import Simulator

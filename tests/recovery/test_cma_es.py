@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import draw_genomes
-from selfmodel.recovery.repair.cma_es import MIN_POPULATION, PRUNED_AFTER, STARTS, CmaEs
+from selfmodel.recovery.cma_es import MIN_POPULATION, PRUNED_AFTER, STARTS, CmaEs
 from selfmodel.settings import Settings
 
 LENGTH = 6

@@ -15,7 +15,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator_choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.recovery import Recovery
+from selfmodel.recovery.result import Recovery
 from selfmodel.robot.parameters import nominal
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration

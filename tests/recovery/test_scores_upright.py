@@ -6,9 +6,8 @@ import pytest
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.scores.falls import FALLEN_TIME
-from selfmodel.recovery.scores.fitness import DISPLACEMENT
-from selfmodel.recovery.scores.upright import UPRIGHT, fall_of, falls_of
+from selfmodel.recovery.falls import FALLEN_TIME, fall_of, falls_of
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

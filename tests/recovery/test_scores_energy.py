@@ -4,8 +4,7 @@ import numpy as np
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.scores.energy import ENERGY, WORK_WEIGHT, joint_work
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import ENERGY, UPRIGHT, WORK_WEIGHT, joint_work
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

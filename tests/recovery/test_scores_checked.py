@@ -8,8 +8,7 @@ import pytest
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.recovery.scores.checked import LARGEST, checked
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
+from selfmodel.recovery.scores import DISPLACEMENT, LARGEST, Score, checked
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 

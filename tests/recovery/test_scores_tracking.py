@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.scores.tracking import Reference, tracking
+from selfmodel.recovery.scores import Reference, tracking
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_cpgs

@@ -9,30 +9,33 @@ import pytest
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import Generation
+from selfmodel.evolution import Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.repair.candidate_controller import CandidateController
-from selfmodel.recovery.repair.genome_search import SHORT_STEPS
-from selfmodel.recovery.repair.noisy_ea import NoisyEa
-from selfmodel.recovery.repair.paper_repair import RepairSearch
-from selfmodel.recovery.repair.robust_fitness import RobustFitness, robust
-from selfmodel.recovery.repair.robust_repair import (
+from selfmodel.recovery.cma_es import STARTS
+from selfmodel.recovery.repair import CandidateController, RepairSearch
+from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.robust_repair import (
     COST,
     FIRST_COST,
+    SHORT_STEPS,
+    RobustFitness,
     RobustRepair,
+    from_repertoire,
+    robust,
     rollouts_of,
 )
-from selfmodel.recovery.scores.fitness import DISPLACEMENT, Score
-from selfmodel.recovery.scores.joint_limits import upright_within
-from selfmodel.recovery.scores.upright import UPRIGHT
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, upright_within
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable
+from tests.recovery.repertoire.test_repertoire import ORIGIN
 
+NOISY_EA = partial(Evolution, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
@@ -163,7 +166,7 @@ def test_the_number_of_threads_changes_nothing(quadruped: Robot):
 
 
 def test_the_papers_ea_can_be_its_search(quadruped: Robot):
-    found, generations = repaired(quadruped, Simulator(quadruped, 2), make_search=NoisyEa)
+    found, generations = repaired(quadruped, Simulator(quadruped, 2), make_search=NOISY_EA)
     assert np.isfinite(found[0].scores).all()
     assert generations[0].evaluations == SMALL.population
     assert generations[-1].number == generations[-1].total
@@ -207,7 +210,7 @@ def test_a_candidate_whose_simulations_mostly_diverge_is_none(
     whole = RobustFitness.__call__
     monkeypatch.setattr(RobustFitness, "__call__", partly)
     monkeypatch.setattr(
-        "selfmodel.recovery.repair.robust_repair._comparisons", lambda _: ((8, 10), (4, 10))
+        "selfmodel.recovery.robust_repair._comparisons", lambda _: ((8, 10), (4, 10))
     )
     if number is None:
         with pytest.raises(WorkError, match="got 16 of 40 with the best 4 of"):
@@ -224,7 +227,9 @@ def test_the_least_search_finds_a_controller_that_is_not_known(
     least = dataclasses.replace(Settings().scaled(population), generations=generations, steps=10)
     design, rng = network_for(quadruped), np.random.default_rng(0)
     known = [Controller(design, genome) for genome in draw_genomes(rng, (3, design.weights))]
-    repair = RobustRepair(Simulator(quadruped, 1), least, design, DISPLACEMENT, make_search=NoisyEa)
+    repair = RobustRepair(
+        Simulator(quadruped, 1), least, design, DISPLACEMENT, make_search=NOISY_EA
+    )
     found = repair((INTACT,), partial(assumed_uncertainty, quadruped), known, rng, lambda _: None)
 
     assert found
@@ -233,9 +238,13 @@ def test_the_least_search_finds_a_controller_that_is_not_known(
 
 def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadruped: Robot):
     least = dataclasses.replace(Settings().scaled(12), generations=1, steps=100)
-    known = RepairSearch(Simulator(quadruped, 2), SMALL, score=DISPLACEMENT).best(
-        INTACT, (), np.random.default_rng(5), lambda _generation: None
-    )
+    known = RepairSearch(Simulator(quadruped, 2), SMALL, score=DISPLACEMENT)(
+        (INTACT,),
+        partial(assumed_uncertainty, quadruped),
+        (),
+        np.random.default_rng(5),
+        lambda _generation: None,
+    )[0].controller
     found = RobustRepair(Simulator(quadruped, 2), least, network_for(quadruped), DISPLACEMENT)(
         (INTACT,),
         partial(assumed_uncertainty, quadruped),
@@ -247,3 +256,97 @@ def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadrupe
 
     assert min(different) <= 5, "one in a hundred weights of a mutant is drawn anew"
     assert known not in [own.controller for own in found]
+
+
+def test_the_mean_and_the_lower_tail_count_alike():
+    scores = np.array([[0.0, 10.0, 10.0, 10.0], [7.0, 7.0, 7.0, 7.0], [4.0, 4.0, 4.0, 8.0]])
+    np.testing.assert_allclose(robust(scores), [(7.5 + 0) / 2, 7, (5 + 4) / 2])
+    np.testing.assert_allclose(robust(np.array([[3.0]])), [3.0])
+
+
+def test_scores_are_those_of_each_condition(quadruped: Robot):
+    fitness = RobustFitness(
+        Simulator(quadruped, 1), DISPLACEMENT, (INTACT,), assumed_uncertainty(quadruped)
+    )
+    drivers = random_controllers(quadruped, 3)
+    scores = fitness(drivers, 4, 50, np.random.default_rng(0))
+
+    assert scores.shape == (3, 4)
+    assert len(np.unique(scores)) == 12
+    np.testing.assert_array_equal(
+        fitness(drivers[1:2], 4, 50, np.random.default_rng(0)), scores[1:2]
+    )
+
+
+def test_a_simulation_that_diverges_scores_minus_infinity(quadruped: Robot):
+    fitness = RobustFitness(
+        Simulator(unstable(quadruped), 1), DISPLACEMENT, (INTACT,), assumed_uncertainty(quadruped)
+    )
+    scores = fitness(random_controllers(quadruped, 2), 2, 50, np.random.default_rng(0))
+
+    assert np.isneginf(scores).all()
+    assert np.isneginf(robust(scores)).all()
+
+
+def test_one_diverged_rollout_does_not_reject_a_controller():
+    some, none = [5.0, 5.0, 5.0, -np.inf], [-np.inf] * 4
+    assert np.argsort(-robust(np.array([none, some]))).tolist() == [1, 0]
+    assert np.isfinite(robust(np.array([some]))).all()
+
+
+GAITS = Settings().scaled(40)
+
+
+def repertoire(robot: Robot, gaits: int) -> Repertoire:
+    design = network_for(robot)
+    genomes = np.round(draw_genomes(np.random.default_rng(5), (gaits, design.weights)), 2)
+    return Repertoire(design, genomes, np.arange(gaits, dtype=float), np.zeros((gaits, 4)), ORIGIN)
+
+
+def test_the_first_generation_is_known_controllers_and_distinct_gaits(quadruped: Robot):
+    found, known = repertoire(quadruped, 1000), np.full(68, 0.3)
+    make = from_repertoire(found)
+    asked = make(68, draw_genomes, GAITS, np.random.default_rng(0), [known]).ask()
+
+    assert len(asked) == 1 + round(GAITS.evaluations / 8 * 5)  # 200 of 1,000 steps each
+    assert (asked[0] == known).all()
+    gaits = {own.tobytes() for own in found.genomes}
+    drawn = [own.tobytes() for own in asked[1:]]
+    assert set(drawn) <= gaits
+    assert len(set(drawn)) == len(drawn)
+
+
+@pytest.mark.parametrize(("gaits", "asked"), [(3, STARTS), (60, 60), (200, 200)])
+def test_a_small_repertoire_is_simulated_once_and_its_runs_start_from_different_gaits(
+    quadruped: Robot, gaits: int, asked: int
+):
+    make = from_repertoire(repertoire(quadruped, gaits))
+    search = make(68, draw_genomes, GAITS, np.random.default_rng(0))
+    first = search.ask()
+    assert len(first) == asked
+    assert len({own.tobytes() for own in first}) == gaits
+    if gaits > STARTS:
+        search.tell(first.sum(axis=1))
+        starts = [group.mean(axis=0) for group in np.split(search.ask(), STARTS)]
+        near = {int(np.abs(first - start).mean(axis=1).argmin()) for start in starts}
+        assert len(near) == STARTS
+
+
+def test_the_sample_is_random_and_its_cost_is_bounded(quadruped: Robot):
+    make = from_repertoire(repertoire(quadruped, 1000))
+    short = dataclasses.replace(GAITS, steps=100)
+    samples = [make(68, draw_genomes, short, np.random.default_rng(seed)).ask() for seed in (0, 1)]
+    assert len(samples[0]) == round(GAITS.evaluations / 8)
+    assert not np.array_equal(*samples)
+
+
+def test_its_runs_stay_near_the_best_gaits(quadruped: Robot):
+    found = repertoire(quadruped, 300)
+    search = from_repertoire(found)(68, draw_genomes, GAITS, np.random.default_rng(0))
+    fitness = search.ask().sum(axis=1)
+    search.tell(fitness)
+    groups = np.split(search.ask(), STARTS)
+
+    for group in groups:
+        distance = np.abs(found.genomes - group.mean(axis=0)).mean(axis=1).min()
+        assert distance < 0.1

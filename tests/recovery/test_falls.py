@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.recovery.scores.falls import FALLEN_HEIGHT, FALLEN_TIME, first_falls
+from selfmodel.recovery.falls import FALLEN_HEIGHT, FALLEN_TIME, first_falls
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Names
 

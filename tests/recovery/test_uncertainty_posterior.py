@@ -10,7 +10,7 @@ import selfmodel
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.posterior import (
+from selfmodel.recovery.uncertainty import (
     MIN_EFFECTIVE,
     MODELS,
     Posterior,

@@ -14,12 +14,8 @@ from selfmodel.controllers.network import Network
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery import disagreement
-from selfmodel.recovery.disagreement import (
-    EARLY_STEPS,
-    Disagreement,
-    disagreements,
-)
+from selfmodel.recovery import next_trial as disagreement
+from selfmodel.recovery.next_trial import EARLY_STEPS, Disagreement, disagreements
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.outcome import SimulationResult

@@ -19,7 +19,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writing.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.sequential_diagnosis import diagnose_trials
+from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

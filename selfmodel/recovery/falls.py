@@ -5,8 +5,12 @@ import math
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import directions
+from selfmodel.trials.trial import Trial
 
 FALLEN_HEIGHT = 0.5
 """Height below which a base has fallen, as a fraction of its standing height. A base that starts on
@@ -18,6 +22,39 @@ FALLEN_TILT = np.radians(60)
 FALLEN_TIME = 0.25
 """Time over which a fall is judged, s: a base that has fallen is low or tilted in more than half of
 the measurements. A low stride or a wrong measurement is shorter."""
+
+
+def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> IndexArray:
+    """Returns the first step at which each run has fallen, or the number of steps without a fall.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the robot, of which a slope tilts the ground.
+        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
+
+    Returns:
+        Step indices, ``(...)``.
+    """
+    return first_falls(behaviour, build(robot, hypothesis).normal, robot.standing_height)
+
+
+def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
+    """Returns the step at which the robot fell in a trial; None if it did not, or cannot fall.
+
+    A fixed base cannot fall, and a base that was not observed is not known to have fallen. A trial
+    that ended early may have ended by a fall: its last pose counts as if it remained.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the physical robot.
+        trial: The trial.
+    """
+    if robot.has_fixed_base:
+        return None
+    logged = trial.behaviour
+    judged = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
+    fall = int(falls_of(robot, hypothesis, judged))
+    return fall if fall < logged.steps else None
 
 
 def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:

@@ -1,4 +1,4 @@
-"""CMA-ES with raced starts, a ``GenomeSearch``.
+"""CMA-ES with raced starts: a search over genomes whose fitness is noisy.
 
 Source: Hansen, *The CMA evolution strategy: a tutorial* (arXiv:1604.00772); the implementation is
 that of the library ``cma``.
@@ -12,7 +12,6 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.evolution import Draw, check_fitness, first_generation
-from selfmodel.recovery.repair.genome_search import Rollouts
 from selfmodel.settings import Settings
 
 DEVIATION = 0.4
@@ -107,11 +106,6 @@ class CmaEs:
         self.generation += 1
         self.evaluations += len(fitness)
         self._asked = np.concatenate([run.ask() for run in self._runs])
-
-    @property
-    def rollouts(self) -> Rollouts:
-        """Rollouts that the generation needs."""
-        return "whole" if self._runs else "short"
 
     def _started(self, fitness: FloatArray) -> list["_Run"]:
         """Returns the runs from the best seeds and the best random genomes."""

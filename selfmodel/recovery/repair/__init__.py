@@ -1,1 +1,0 @@
-"""Repairs: searches for controllers that compensate for a failure."""

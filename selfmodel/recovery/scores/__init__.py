@@ -1,1 +1,0 @@
-"""Scores: fitness functions of controllers."""
