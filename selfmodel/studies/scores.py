@@ -13,7 +13,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.recordings.tables.table import FORMATS, is_table, read_table
+from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.scores import TRACKING, UPRIGHT, Reference, Score, tracking, upright_within
 from selfmodel.robot.robot import Robot

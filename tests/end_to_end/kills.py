@@ -32,7 +32,7 @@ from selfmodel.logs.salvage import salvage
 from selfmodel.logs.verify import verify
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.tasks import ROBOTS
-from tests.logs.recordings.rosbag.driver import mapping, record
+from tests.logs.recordings.driver import mapping, record
 
 
 @dataclass(frozen=True)

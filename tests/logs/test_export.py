@@ -11,12 +11,12 @@ from selfmodel.arrays import frozen
 from selfmodel.errors import InputError
 from selfmodel.logs.export import export
 from selfmodel.logs.recordings.importer import import_recording
-from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
-from selfmodel.logs.recordings.mapping.suggest import suggest
+from selfmodel.logs.recordings.mapping_file import parse_mapping
+from selfmodel.logs.recordings.suggest import suggest
+from selfmodel.logs.recordings.tables import read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour, columns_of
 from selfmodel.trials.signals import SIGNALS
-from tests.logs.recordings.tables.tables import read_here
 
 FORMS = ("csv", "npz", "parquet")
 
@@ -70,11 +70,11 @@ def test_a_table_has_the_columns_of_a_trial(form: str, biped: Robot, tmp_path: P
 
     names = export(path, original)
 
-    assert list(names) == read_here(path)[0]
+    assert names == read_table(path, ()).names
     assert "time" in names
     assert "effort.left_hip_x" in names
     assert "effort.left_hip_y" not in names  # never observed
-    found = read_here(path, *names)[1]
+    found = read_table(path, names).columns
     for name, values in columns_of(original).items():
         np.testing.assert_array_equal(found[name], values)
     assert [each.name for each in tmp_path.iterdir()] == [path.name]

@@ -15,10 +15,9 @@ from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.recordings.importer import Recording, import_recording, write_recording
-from selfmodel.logs.recordings.mapping.mapping import RecordingMapping
-from selfmodel.logs.recordings.mapping.mapping_file import read_mapping
-from selfmodel.logs.recordings.mapping.suggest import suggest as suggest_mapping
+from selfmodel.logs.recordings.importer import ImportedTrial, import_recording, write_recording
+from selfmodel.logs.recordings.mapping_file import RecordingMapping, read_mapping
+from selfmodel.logs.recordings.suggest import suggest as suggest_mapping
 from selfmodel.robot.robot import Robot
 
 
@@ -90,35 +89,33 @@ def _import(source: Path, out: Path, path: Path, *, as_json: bool) -> None:
 
 def _mapped_robot(mapping: RecordingMapping, folder: Path) -> Robot:
     """Returns the robot of a mapping: one of selfmodel's, or of a model file beside the mapping."""
-    name, timestep = mapping.robot, mapping.control_timestep
+    name, timestep = mapping.trial.robot, mapping.trial.control_timestep
     own = not is_model(name)
     if own and timestep is not None:
-        raise mapping.document.error(
+        raise mapping.error(
             ("control_timestep",), f"{name} has a control time step of its own: remove this entry"
         )
     if not own and timestep is None:
-        raise mapping.document.error(
-            ("robot",), f"{name} has no control time step: add control_timestep, s"
-        )
+        raise mapping.error(("robot",), f"{name} has no control time step: add control_timestep, s")
     try:
         return arguments.recorded_robot(name if own else str(folder / name), timestep)
     except InputError as error:
-        raise mapping.document.error(("robot",), str(error)) from error
+        raise mapping.error(("robot",), str(error)) from error
 
 
 def _controller(mapping: RecordingMapping, folder: Path, robot: Robot) -> Controller | None:
-    if mapping.controller is None:
+    if mapping.trial.controller is None:
         return None
     try:
-        return arguments.read_controller(folder / mapping.controller, robot)
+        return arguments.read_controller(folder / mapping.trial.controller, robot)
     except InputError as error:
-        raise mapping.document.error(("controller",), str(error)) from error
+        raise mapping.error(("controller",), str(error)) from error
 
 
-def _facts(out: Path, mapping: RecordingMapping, recording: Recording) -> dict[str, Any]:
+def _facts(out: Path, mapping: RecordingMapping, recording: ImportedTrial) -> dict[str, Any]:
     return {
         "log": str(out),
-        "robot": mapping.robot,
+        "robot": mapping.trial.robot,
         "steps": recording.behaviour.steps,
         "valid": recording.valid,
         "topics": {topic: found.facts() for topic, found in recording.qualities.items()},
@@ -127,7 +124,7 @@ def _facts(out: Path, mapping: RecordingMapping, recording: Recording) -> dict[s
     }
 
 
-def _print(out: Path, recording: Recording) -> None:
+def _print(out: Path, recording: ImportedTrial) -> None:
     rows = [
         (
             topic,

@@ -14,8 +14,8 @@ from selfmodel.experiments.grid import PartEnds
 from selfmodel.logs import records
 from tests.helpers.command import SMALL, Done, selfmodel
 from tests.logs.conftest import MJCF
+from tests.logs.recordings.bags import write_bag
 from tests.logs.recordings.conftest import MAPPING, recorded
-from tests.logs.recordings.rosbag.bags import write_bag
 from tests.logs.test_damage import rewritten
 from tests.logs.test_hostile_logs import attachment, channel, note, put, says
 

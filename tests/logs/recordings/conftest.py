@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from selfmodel.isolation import Message
-from selfmodel.logs.recordings.importer import Recording, import_recording
-from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
-from selfmodel.logs.recordings.rosbag.child import read
+from selfmodel.logs.recordings import bags, tables
+from selfmodel.logs.recordings.importer import ImportedTrial, import_recording
+from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
 from tests.logs.conftest import biped  # noqa: F401 - a fixture
-from tests.logs.recordings.rosbag.bags import (
+from tests.logs.recordings.bags import (
     T0,
     Item,
     array,
@@ -97,13 +97,19 @@ def bag(tmp_path: Path) -> Path:
     return write_bag(tmp_path / "bag", recorded())
 
 
-def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> Recording:
+def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> ImportedTrial:
     """Imports a bag of the biped."""
     return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
 
 
-def decoded(path: Path) -> Message:
-    """Reads all topics of a bag as the child process does, in this process."""
-    wanted = [topic for topic, _, _ in recorded(0.02)]
-    request = {"path": str(path), "folder": str(Path.cwd()), "wanted": sorted(set(wanted))}
-    return read(Message(request))
+@pytest.fixture(autouse=True)
+def in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reads recordings without a child process, which takes a second each; ``process`` has one."""
+
+    def run(task: str, message: Message, **_: object) -> Message:
+        module = {"bags": bags, "tables": tables}[task.partition(":")[0].rpartition(".")[2]]
+        return module.read_in_child(message)
+
+    if request.node.get_closest_marker("process") is None:
+        monkeypatch.setattr(bags, "run_isolated", run)
+        monkeypatch.setattr(tables, "run_isolated", run)

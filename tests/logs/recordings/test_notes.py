@@ -7,8 +7,8 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
+from tests.logs.recordings.bags import T0, Item, joint_state, write_bag
 from tests.logs.recordings.conftest import JOINTS, MAPPING, angle, imported, recorded
-from tests.logs.recordings.rosbag.bags import T0, Item, joint_state, write_bag
 
 LOST = MAPPING.replace('left_hip_x = "LHX"', 'left_hip_x = "none"', 1)
 """Mapping of the biped whose first hinge has no encoder."""

@@ -15,15 +15,15 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.recordings.importer import import_recording
-from selfmodel.logs.recordings.mapping.mapping_file import parse_mapping
-from selfmodel.logs.recordings.mapping.suggest import suggest
+from selfmodel.logs.recordings.mapping_file import parse_mapping
+from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour, collect
 from tests.helpers.drivers import random_controllers
-from tests.logs.recordings.rosbag.driver import mapping, record
+from tests.logs.recordings.driver import mapping, record
 
 STEPS = 400
 TRUTH = "break:front_left_knee"
@@ -112,8 +112,9 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
     text = suggest(driven, quadruped, "quadruped", with_timestep=False)
     assert "CHANGE must" in text
     assert text.count("CHANGE") == 1  # nothing else
-    suggested = parse_mapping(text, "map.toml")
-    right = parse_mapping(mapping(quadruped, STEPS, None), "map.toml")
+    mapped = parse_mapping(text, "map.toml")
+    suggested = mapped.trial
+    right = parse_mapping(mapping(quadruped, STEPS, None), "map.toml").trial
     for ours, theirs in (
         (suggested.joints, right.joints),
         (suggested.commands, right.commands),
@@ -127,7 +128,7 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
     assert {k: touch.topic for k, touch in suggested.touch.items()} == {
         k: touch.topic for k, touch in right.touch.items()
     }
-    assert import_recording(driven, suggested, quadruped).behaviour.steps > STEPS
+    assert import_recording(driven, mapped, quadruped).behaviour.steps > STEPS
 
 
 @pytest.mark.process

@@ -1,0 +1,354 @@
+"""Reader of bags of ROS 1 and ROS 2, without ROS.
+
+A bag is a folder of rosbag2 with or without ``metadata.yaml``, one of its MCAP or SQLite files, or
+a ROS 1 bag. Checksums and counts of messages are verified where a file has some. A child process
+reads the files, whose content may be hostile.
+"""
+
+import re
+import shlex
+import sqlite3
+import struct
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message as McapMessage, Schema, Statistics
+from mcap.stream_reader import StreamReader
+from rosbags import rosbag1
+from rosbags.serde import SerdeError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from selfmodel.errors import InputError
+from selfmodel.files import check_regular, file_digest, read_file
+from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
+from selfmodel.logs.recordings.messages import (
+    CDR,
+    DECODERS,
+    ROS1,
+    ZSTD_MAGIC,
+    RefusedError,
+    decode,
+)
+from selfmodel.logs.recordings.recording import Column, Recording, Series, packed, unpacked
+
+if TYPE_CHECKING:
+    from selfmodel.arrays import FloatArray
+
+MAX_LOG_TIME = 2**62
+"""Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
+
+
+def read_bag(path: Path, topics: Collection[str] | None = None) -> Recording:
+    """Returns a bag, after a check of all its files.
+
+    Args:
+        path: Folder of a rosbag2 bag, with or without ``metadata.yaml``, or one of its files; or
+            a ROS 1 bag.
+        topics: Topics to decode, where their type is in ``DECODERS``; None for all. Only types and
+            counts of the others are read.
+
+    Raises:
+        InputError: The bag does not exist, is damaged, or cannot be read.
+    """
+    request = Message({"path": str(path), "topics": None if topics is None else sorted(topics)})
+    task = "selfmodel.logs.recordings.bags:read_in_child"
+    answer = run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS)
+    return unpacked(answer, Recording)
+
+
+def read_in_child(request: Message) -> Message:
+    """Task of the child process; see ``read_bag``."""
+    path, wanted = Path(request.header["path"]), request.header["topics"]
+    topics: dict[str, _Topic] = {}
+    files = bag_files(path)
+    for file in files:
+        with _explained(file):
+            for item in _stored(file):
+                decoded = wanted is None or item.topic in wanted
+                topics.setdefault(item.topic, _Topic()).add(item, decoded=decoded)
+    series = {name: topic.series() for name, topic in topics.items()}
+    return packed(Recording(series, {file.name: file_digest(file) for file in files}))
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Returns the files of a bag with its messages, in order.
+
+    Args:
+        path: Folder of a bag, with or without ``metadata.yaml``, or one of its files.
+
+    Raises:
+        InputError: The bag does not exist, lacks a file, or its list of files is damaged.
+    """
+    if not path.is_dir():
+        check_regular(path, "a bag")
+        return [path]
+    metadata = path / "metadata.yaml"
+    if not metadata.exists():
+        storage = [file for file in path.iterdir() if _STORAGE.search(file.name) and file.is_file()]
+        if not storage:
+            raise InputError(f"{path}: expected a bag, got a folder without one: {_EXPECTED}")
+        return sorted(storage, key=_natural)
+    try:
+        text = read_file(metadata, "a list of files", 2**20)
+        # The base loader returns every value as text.
+        listed = YAML(typ="base", pure=True).load(text)["rosbag2_bagfile_information"]
+        # Older versions prepend the folder.
+        files = [path / PurePath(name).name for name in listed["relative_file_paths"]]
+    except InputError:
+        raise
+    except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as failure:
+        reason = " ".join(str(failure).split())
+        raise InputError(
+            f"{metadata}: expected the list of the bag's files, got: {reason}: remove it to read "
+            f"the files that are there"
+        ) from failure
+    if missing := [file.name for file in files if not file.is_file()]:
+        raise InputError(
+            f"{metadata}: expected files that exist, got {', '.join(missing)}: add what is "
+            f"missing, or remove metadata.yaml to read the files that are there"
+        )
+    return files
+
+
+_EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
+_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sort key that orders ``bag_2`` before ``bag_10``."""
+    return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
+
+
+# ---------------------------------------------------------------- files
+
+
+class _Stored(NamedTuple):
+    """Message in a file, or without ``data`` the announcement of its topic."""
+
+    topic: str
+    type: str
+    encoding: str
+    time: int = 0
+    data: bytes | None = None
+
+
+def _stored(file: Path) -> Iterator[_Stored]:
+    """Yields topics and messages of a file in any format, compressed or not."""
+    with file.open("rb") as opened:
+        head = opened.read(16)
+        opened.seek(0)
+        if head.startswith(ZSTD_MAGIC):
+            with tempfile.TemporaryDirectory() as folder:
+                unpacked = Path(folder, file.stem)
+                with unpacked.open("wb") as target:
+                    zstandard.ZstdDecompressor().copy_stream(opened, target)
+                yield from _stored(unpacked)
+            return
+    for magic, (read, _) in _FORMATS.items():
+        if head.startswith(magic):
+            for item in read(file):
+                if not (isinstance(item.time, int) and 0 <= item.time < MAX_LOG_TIME):
+                    raise ValueError(f"a message has the log time {item.time!r} ns")
+                yield item
+            return
+    raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
+
+
+def _mcap(file: Path) -> Iterator[_Stored]:
+    types, topics = {0: ""}, {}
+    count, claimed = 0, None
+    with file.open("rb") as opened:
+        # No record is larger than its file; a damaged length would take the memory.
+        size = file.stat().st_size
+        for record in StreamReader(opened, validate_crcs=True, record_size_limit=size).records:
+            match record:
+                case Schema():
+                    types[record.id] = record.name
+                case Channel():
+                    kind = types.get(record.schema_id, "")
+                    topics[record.id] = _Stored(record.topic, kind, record.message_encoding)
+                    yield topics[record.id]
+                case McapMessage():
+                    count += 1
+                    topic = topics[record.channel_id]
+                    yield topic._replace(time=record.log_time, data=record.data)
+                case Statistics():
+                    claimed = record.message_count
+        # The library skips records of a damaged type: their messages would be missing silently.
+        if claimed not in (None, count):
+            raise ValueError(f"its statistics have {claimed} messages, its records {count}")
+        if opened.read(1):
+            raise ValueError("bytes follow its end")
+
+
+def _sqlite(file: Path) -> Iterator[_Stored]:
+    for suffix in ("-wal", "-journal"):
+        beside = file.with_name(file.name + suffix)
+        if beside.is_file() and beside.stat().st_size:
+            raise InputError(
+                f"{file}: its recorder did not close it, and {beside.name} has data that are not "
+                f"in it yet: merge both with `sqlite3 {shlex.quote(str(file))} "
+                f"'PRAGMA wal_checkpoint(TRUNCATE)'`"
+            )
+    # Immutable: SQLite cannot create its lock files on a read-only disk.
+    address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(address, uri=True)) as database:
+        tables = (
+            "SELECT count(*) FROM sqlite_schema WHERE name IN ('topics', 'messages') AND rootpage"
+        )
+        if database.execute(tables).fetchone() != (2,):  # a view has no page, and may be endless
+            raise ValueError("it has no tables of topics and messages")
+        # Reading a page that is damaged may skip its messages silently.
+        (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+        if verdict != "ok":
+            raise ValueError(verdict)
+        texts = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        topics = {
+            number: _Stored(str(n), str(t), str(e)) for number, n, t, e in database.execute(texts)
+        }
+        yield from topics.values()
+        rows = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+        for number, time, data in database.execute(rows):
+            yield topics[number]._replace(time=time, data=bytes(memoryview(data)))
+
+
+def _ros1(file: Path) -> Iterator[_Stored]:
+    with rosbag1.Reader(file) as reader:
+        topics = {c.id: _Stored(c.topic, c.msgtype, ROS1) for c in reader.connections}
+        yield from topics.values()
+        count = 0
+        for connection, time, data in reader.messages():
+            count += 1
+            yield topics[connection.id]._replace(time=time, data=data)
+        # The library reads what the index has; the chunks have counts of their own.
+        claimed = sum(sum(chunk.connection_counts.values()) for chunk in reader.chunk_infos)
+        if claimed != count or len(reader.chunks) != len(reader.chunk_infos):
+            raise ValueError(f"its chunks have {claimed} messages, its index {count}")
+
+
+_FORMATS: Mapping[bytes, tuple[Callable[[Path], Iterator[_Stored]], str]] = MappingProxyType(
+    {
+        b"\x89MCAP0\r\n": (_mcap, "mcap recover"),
+        b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
+        b"#ROSBAG V": (_ros1, "rosbag reindex"),
+    }
+)
+"""Readers by the first bytes of a file, and tools that recover its intact part."""
+
+_FAILURES = (
+    McapError,
+    rosbag1.ReaderError,
+    SerdeError,
+    sqlite3.Error,
+    zstandard.ZstdError,
+    ValueError,  # checksums, invalid text
+    TypeError,  # a column of another type
+    LookupError,
+    AssertionError,  # the index of ROS 1
+    OverflowError,
+    RuntimeError,  # lz4
+    EOFError,  # bz2
+    OSError,  # bz2, and a position beyond every file
+    struct.error,
+)
+"""Exceptions that the libraries and their decompressors raise for damaged bytes."""
+
+
+@contextmanager
+def _explained(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except _FAILURES as failure:
+        if isinstance(failure, OSError) and failure.filename is not None:
+            raise InputError(
+                f"{file}: expected a bag that can be read, got: {failure.strerror}"
+            ) from failure
+        reason = ": ".join(filter(None, (type(failure).__name__, str(failure))))
+        tools = " or ".join(f"`{tool}`" for _, tool in _FORMATS.values())
+        raise InputError(
+            f"{file}: the bag is damaged, or ends too early: {reason}: record it again, or recover "
+            f"its intact part with the tool of its format, {tools}"
+        ) from failure
+
+
+# ---------------------------------------------------------------- topics
+
+
+@dataclass
+class _Topic:
+    """Topic of a bag, with the messages that were decoded.
+
+    Attributes:
+        types: Message types, one in nearly every bag.
+        count: Number of messages.
+        stamps: Time stamps of the decoded messages, ns; 0 without a stamp.
+        logged: Log times of these, ns.
+        layouts: Indices and rows of these by the names in them, nearly always the same.
+        refused: Numbers of messages left out, by reason.
+    """
+
+    types: dict[str, None] = field(default_factory=dict)
+    count: int = 0
+    stamps: list[int] = field(default_factory=list)
+    logged: list[int] = field(default_factory=list)
+    layouts: dict[tuple[str, ...], tuple[list[int], list["FloatArray"]]] = field(
+        default_factory=dict
+    )
+    refused: Counter[str] = field(default_factory=Counter)
+
+    def add(self, item: _Stored, *, decoded: bool) -> None:
+        """Adds a message, or an announcement."""
+        package, _, name = item.type.rpartition("/")
+        kind = item.type if package.endswith("/msg") else f"{package}/msg/{name}"  # old bags
+        known = item.encoding in (CDR, ROS1)
+        self.types[(kind if package else name) + ("" if known else f" in {item.encoding!r}")] = None
+        if item.data is None:
+            return
+        self.count += 1
+        if decoded and known and kind in DECODERS:
+            try:
+                stamp, (names, rows) = decode(item.data, kind, item.encoding)
+            except RefusedError as refused:
+                self.refused[str(refused)] += 1
+                return
+            indices, blocks = self.layouts.setdefault(names, ([], []))
+            indices.append(len(self.stamps))
+            blocks.append(rows)
+            self.stamps.append(stamp)
+            self.logged.append(item.time)
+
+    def series(self) -> Series:
+        """Returns the messages as arrays."""
+        parts: dict[str, list[Column]] = {}
+        for names, (indices, blocks) in self.layouts.items():
+            index, values = np.array(indices, dtype=np.int64), np.array(blocks)
+            for k, name in enumerate(names):
+                parts.setdefault(name, []).append(Column(index, values[:, k]))
+        return Series(
+            type=" and ".join(self.types),
+            count=self.count,
+            stamps=np.array(self.stamps, dtype=np.int64),
+            logged=np.array(self.logged, dtype=np.int64),
+            names=tuple(parts),
+            columns={name: _in_order(some) for name, some in parts.items()},
+            refused=self.refused,
+        )
+
+
+def _in_order(parts: list[Column]) -> Column:
+    """Column of messages with other names, in the order of the messages."""
+    index = np.concatenate([part.index for part in parts])
+    order = np.argsort(index)
+    return Column(index[order], np.concatenate([part.values for part in parts])[order])

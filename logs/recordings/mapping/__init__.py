@@ -1,1 +1,0 @@
-"""Mapping from a recording to the parts of a robot: read, checked and suggested."""

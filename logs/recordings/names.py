@@ -1,0 +1,206 @@
+"""Names in recordings: similarity to names of a model, and what the columns of a table are."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import SequenceMatcher
+from types import MappingProxyType
+
+CERTAIN_SIMILARITY = 0.75
+"""Minimum similarity of a certain match, of at most 1, if no other name is ``CERTAIN_LEAD``."""
+
+MIN_SIMILARITY = 0.3
+"""Minimum similarity of a match."""
+
+CERTAIN_LEAD = 0.1
+"""Minimum lead over the second most similar name of a certain match."""
+
+LONGEST = 200
+"""Length of the longest name that is compared, characters."""
+
+_WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        word: tuple(meaning.split())
+        for words, meaning in {
+            "fl lf": "front left",
+            "fr rf": "front right",
+            "ml lm": "middle left",
+            "mr rm": "middle right",
+            "bl lb hl lh rl": "back left",
+            "br rb hr rh rr": "back right",
+            "rear hind": "back",
+            "fore": "front",
+            "mid": "middle",
+            "l": "left",
+            "r": "right",
+            "hfe thigh femur upper": "shoulder",
+            "kfe calf shank tibia lower": "knee",
+            "haa": "hip",
+            "foot ft contact force wrench sole": "touch",
+            "joint motor servo actuator link position": "",  # which identify no joint
+        }.items()
+        for word in words.split()
+    }
+)
+
+_SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
+"""Sets of exclusive words: names with two words of one set never match."""
+
+
+def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, tuple[str, bool]]:
+    """Returns the most similar offered name for each wanted name, each used once.
+
+    Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
+    ``front_left_knee``.
+
+    Args:
+        wanted: Names of the model.
+        offered: Names in the recording.
+
+    Returns:
+        Offered name, and whether the match is certain, by wanted name; names without a match are
+        left out.
+    """
+    scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
+    found: dict[str, tuple[str, bool]] = {}
+    used: set[str] = set()
+    for (ours, theirs), score in sorted(scores.items(), key=lambda item: -item[1]):
+        if score < MIN_SIMILARITY or ours in found or theirs in used:
+            continue
+        competing = [scores[ours, other] for other in offered if other != theirs]
+        competing += [scores[other, theirs] for other in wanted if other != ours]
+        lead = score - max(competing, default=0.0)
+        found[ours] = theirs, score >= CERTAIN_SIMILARITY and lead >= CERTAIN_LEAD
+        used.add(theirs)
+    return found
+
+
+def likeness(ours: str, theirs: str) -> float:
+    """Returns the similarity of two names, 0 to 1, which is 1 for the same words or initials.
+
+    It is 0 for names longer than ``LONGEST``: its time is the square of their length.
+    """
+    if max(len(ours), len(theirs)) > LONGEST:
+        return 0.0
+    if "".join(word[0] for word in words_of(ours)) == theirs.lower():
+        return 1.0
+    first, second = (
+        {meaning for word in words_of(name) for meaning in _WORDS.get(word, (word,))}
+        for name in (ours, theirs)
+    )
+    if any((first & sides) and (second & sides) and not first & second & sides for sides in _SIDES):
+        return 0.0
+    common = len(first & second)
+    words = 2 * common / (len(first) + len(second)) if first or second else 0.0
+    letters = SequenceMatcher(None, "".join(sorted(first)), "".join(sorted(second))).ratio()
+    return 0.9 * words + 0.1 * letters
+
+
+def words_of(name: str) -> list[str]:
+    """Returns the words of a name: ``FLKnee_2`` has ``fl``, ``knee`` and ``2``."""
+    return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
+
+
+# ---------------------------------------------------------------- columns of a table
+
+
+def _sets(words: Mapping[str, str]) -> Mapping[str, frozenset[str]]:
+    return MappingProxyType({name: frozenset(text.split()) for name, text in words.items()})
+
+
+_QUANTITIES = _sets(
+    {
+        "command": "command commands cmd target targets desired des setpoint goal "
+        "reference ref action actions ctrl control",
+        "velocity": "velocity velocities vel qd dq qvel qdot",
+        "effort": "effort efforts torque torques tau",
+        "sensor": "sensor sensors reading readings",
+        "position": "position positions pos q qpos angle angles theta",
+    }
+)
+"""Words of each quantity, in the order of the decision: ``position_target`` is a command."""
+
+_VECTORS = _sets(
+    {
+        "orientation": "orientation quat quaternion rot rotation q",
+        "angular_velocity": "angular gyro omega gyroscope",
+        "linear_velocity": "velocity vel linear twist v",
+        "position": "position pos odom pose p",
+    }
+)
+"""Words of the quantities of a base or an IMU, in the order of the decision."""
+
+_OTHERS = _sets(
+    {
+        "time": "time t timestamp stamp ts elapsed epoch sec secs seconds",
+        "unit": "s ms us ns sec",
+        "filler": "rad deg degrees nm joint state states m",
+        "imu": "imu gyro gyroscope",
+    }
+)
+_COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW])[\])]?$")
+
+
+@dataclass(frozen=True)
+class Classified:
+    """Columns of a table by their quantity.
+
+    Attributes:
+        times: Columns that may be the time.
+        parts: Columns by quantity and by the rest of their name, which may be a joint's. The
+            quantities are ``command``, ``velocity``, ``effort``, ``sensor`` and ``position``.
+        vectors: Columns of each vector of ``base`` and of ``imu``.
+        others: All other columns.
+    """
+
+    times: list[str] = field(default_factory=list)
+    parts: dict[str, dict[str, str]] = field(default_factory=dict)
+    vectors: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict)
+    others: list[str] = field(default_factory=list)
+
+
+def classified(names: Sequence[str]) -> Classified:
+    """Returns the columns of a table by their quantity.
+
+    Args:
+        names: Names of the columns.
+    """
+    found = Classified(vectors=_vectors(names))
+    used = {n for vectors in found.vectors.values() for some in vectors.values() for n in some}
+    for name in (name for name in names if name not in used):
+        words = words_of(name)
+        if set(words) & _OTHERS["time"] and set(words) <= _OTHERS["time"] | _OTHERS["unit"]:
+            found.times.append(name)
+            continue
+        for quantity, known in _QUANTITIES.items():
+            if known & set(words):
+                fillers = _OTHERS["filler"].union(*_QUANTITIES.values())
+                label = "_".join(word for word in words if word not in fillers)
+                found.parts.setdefault(quantity, {}).setdefault(label, name)
+                break
+        else:
+            found.others.append(name)
+    return found
+
+
+def unit_of_time(name: str) -> str:
+    """Returns the unit of time in the name of a column; "" if there is none."""
+    return next((word for word in words_of(name) if word in ("ms", "us", "ns")), "")
+
+
+def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
+    groups: dict[str, dict[str, str]] = {}
+    for name in names:
+        if match := _COMPONENT.fullmatch(name):
+            groups.setdefault(match["group"], {}).setdefault(match["axis"].lower(), name)
+    found: dict[str, dict[str, tuple[str, ...]]] = {"base": {}, "imu": {}}
+    for group, axes in groups.items():
+        words = set(words_of(group))
+        order = "wxyz" if len(axes) == 4 else "xyz"
+        for quantity, known in _VECTORS.items():
+            width = 4 if quantity == "orientation" else 3
+            if words & known and set(axes) == set(order) and len(order) == width:
+                body = "imu" if words & _OTHERS["imu"] else "base"
+                found[body].setdefault(quantity, tuple(axes[axis] for axis in order))
+                break
+    return found

@@ -1,0 +1,91 @@
+"""Recording of a robot: series of numbers by topic, of a bag or of a table."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from selfmodel.arrays import FloatArray
+from selfmodel.isolation import Message
+
+IntArray = NDArray[np.int64]
+
+Numbers = NDArray[Any]
+"""Array of float64 or of int64."""
+
+TABLE = "table"
+"""Topic of all columns of a table, which have their times in common."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Numbers of one name on a topic.
+
+    Attributes:
+        index: Indices of the messages with that name, ``(m,)``.
+        values: Numbers, ``(m, width)``.
+    """
+
+    index: IntArray
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Messages of a topic, or the rows of a table.
+
+    Attributes:
+        type: Message type, such as ``sensor_msgs/msg/JointState``, or format of the table.
+        count: Number of messages or rows.
+        stamps: Time stamps of the decoded messages, ``(n,)`` ns; 0 without a stamp.
+        logged: Log times, ``(n,)`` ns; the time column of a table.
+        names: Names of all columns.
+        columns: Columns by name, those that were read; each message may have other names.
+        refused: Numbers of messages left out, by reason.
+    """
+
+    type: str
+    count: int
+    stamps: IntArray
+    logged: IntArray
+    names: tuple[str, ...]
+    columns: Mapping[str, Column]
+    refused: Mapping[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Content of a bag or of a table.
+
+    Attributes:
+        series: Series by topic; ``TABLE`` is the only topic of a table.
+        digests: SHA-256 of each file by its name: most recorders write no checksums.
+    """
+
+    series: Mapping[str, Series]
+    digests: Mapping[str, str]
+
+
+Content = TypeVar("Content")
+
+
+def packed(content: object) -> Message:
+    """Returns a recording or a table as a message between processes."""
+
+    def encoded(array: Numbers) -> tuple[str, tuple[int, ...], bytes]:
+        return array.dtype.str, array.shape, array.tobytes()
+
+    return Message({}, {"content": msgspec.msgpack.encode(content, enc_hook=encoded)})
+
+
+def unpacked(message: Message, kind: type[Content]) -> Content:
+    """Returns what ``packed`` has packed."""
+
+    def decoded(_kind: type, item: tuple[str, tuple[int, ...], bytes]) -> Numbers:
+        dtype, shape, data = item
+        return np.frombuffer(data, dtype=dtype).reshape(shape)
+
+    return msgspec.msgpack.decode(message.buffers["content"], type=kind, dec_hook=decoded)

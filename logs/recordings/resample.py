@@ -1,0 +1,259 @@
+"""Series of a recording on one clock, resampled at the control steps, with NaN in gaps."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.logs.recordings.recording import Column, IntArray, Series
+
+MAX_LATENCY = 60.0
+"""Maximum median difference of stamps and log times of one clock, s."""
+
+MAX_MEASUREMENT = 1e12
+"""Magnitude above which a value is no measurement, in any unit; its square is finite."""
+
+MAX_PERIOD_RATIO = 1.5
+"""Minimum gap between two samples, in usual (median) periods."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clocked:
+    """Times of a topic's messages.
+
+    Attributes:
+        times: Times, ``(n,)`` ns.
+        usable: Flags, ``(n,)``; False for a stamp far from all other stamps.
+        fallbacks: Number of messages without a stamp, which have their log time.
+        latency: Delay from stamp to log time, ``(k,)`` s, of the messages with a usable stamp.
+    """
+
+    times: IntArray
+    usable: BoolArray
+    fallbacks: int
+    latency: FloatArray
+
+
+class ClocksApartError(ValueError):
+    """The stamps of a topic and its log times are of different clocks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Time series of one quantity; one without samples was not recorded.
+
+    Attributes:
+        times: Times, ``(m,)`` ns, strictly increasing.
+        values: Values, ``(m, width)``, finite.
+    """
+
+    times: IntArray
+    values: FloatArray
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.times)
+
+    def scaled(self, scale: float, offset: float = 0.0) -> "Track":
+        """Returns the track in another unit."""
+        if scale == 1 and offset == 0:
+            return self  # 0 would change the sign of a zero
+        return Track(self.times, self.values * scale + offset)
+
+
+NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
+
+
+def clocked(series: Series, clock: str) -> Clocked:
+    """Returns the times of a topic's messages.
+
+    Args:
+        series: Messages of the topic.
+        clock: ``header`` for stamps, with log times for messages without a stamp; else log times.
+
+    Raises:
+        ClocksApartError: Stamps and log times differ by more than ``MAX_LATENCY``.
+    """
+    stamped = series.stamps > 0
+    latency = (series.logged - series.stamps)[stamped] / 1e9
+    everything = np.ones(len(stamped), dtype=bool)
+    apart = float(np.median(latency)) if len(latency) else 0.0
+    if clock != "header":
+        usable_latency = latency if abs(apart) <= MAX_LATENCY else latency[:0]
+        return Clocked(series.logged, everything, 0, usable_latency)
+    if abs(apart) > MAX_LATENCY:
+        raise ClocksApartError(
+            f"the stamps and the times at which they were recorded are {abs(apart):.0f} s apart "
+            f"(median), so they are of different clocks"
+        )
+    usable = everything.copy()
+    usable[stamped] = np.abs(latency) <= MAX_LATENCY
+    return Clocked(
+        times=np.where(stamped, series.stamps, series.logged),
+        usable=usable,
+        fallbacks=int(np.sum(~stamped)),
+        latency=latency[np.abs(latency) <= MAX_LATENCY],
+    )
+
+
+def track(clock: Clocked, columns: Sequence[Column], numbers: slice) -> Track:
+    """Returns the time series of some numbers of columns, sorted, with distinct times.
+
+    Rows with a value that is NaN, infinite or above ``MAX_MEASUREMENT`` are left out.
+
+    Args:
+        clock: Times of the topic.
+        columns: Columns of the topic, with the same messages.
+        numbers: Slice of their numbers, side by side.
+    """
+    index = columns[0].index
+    values = np.concatenate([column.values for column in columns], axis=1)[:, numbers]
+    known = clock.usable[index] & (np.abs(values) <= MAX_MEASUREMENT).all(axis=1)
+    # unique() keeps the first of equal times, in the order of the recording.
+    times, first = np.unique(clock.times[index][known], return_index=True)
+    return Track(times, values[known][first])
+
+
+# ---------------------------------------------------------------- interpolation
+
+Method = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
+
+
+def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: int) -> FloatArray:
+    """Returns a track at the control steps, ``(steps, width)``; NaN where it was not observed.
+
+    Args:
+        track: The track.
+        origin: Time of the first step, ns.
+        steps: Times after the first step, ``(steps,)`` ns.
+        method: Interpolation, such as ``linear``.
+        width: Numbers of the quantity.
+    """
+    if not len(track):
+        return np.full((len(steps), width), np.nan)
+    # float64 represents nanoseconds exactly for a hundred days.
+    times = (track.times - origin).astype(np.float64)
+    return method(times, track.values, steps.astype(np.float64), reach(times))
+
+
+def reach(times: FloatArray | IntArray) -> float:
+    """Returns the maximum distance of two samples between which a series is interpolated.
+
+    Args:
+        times: Times of the samples, ``(m,)``, increasing.
+    """
+    return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns linearly interpolated values.
+
+    Args:
+        times: Times of the samples, ``(m,)``, strictly increasing; in any unit, as ``at``.
+        values: Samples, ``(m, width)``.
+        at: Times of the steps, ``(steps,)``.
+        limit: See ``reach``.
+
+    Returns:
+        Values, ``(steps, width)``; exactly the sample at the time of a sample.
+    """
+    before, after, share, valid = _bracket(times, at, limit)
+    result = np.full((len(at), values.shape[1]), np.nan)
+    low, high = values[before[valid]], values[after[valid]]
+    part = share[valid, np.newaxis]
+    result[valid] = np.where(part == 0, low, low + part * (high - low))  # -0 + 0 is 0
+    return result
+
+
+def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns angles interpolated along the shorter arc; a jump by more than pi is a wrap-around.
+
+    The arguments are those of ``linear``; angles in rad.
+    """
+    return linear(times, np.unwrap(values, axis=0), at, limit)
+
+
+def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns orientations interpolated along the shortest arc.
+
+    The arguments are those of ``linear``; unit quaternions of either sign, ``(m, 4)``.
+
+    Returns:
+        Unit quaternions, ``(steps, 4)``; the sample to rounding at the time of a sample.
+    """
+    before, after, share, valid = _bracket(times, at, limit)
+    result = np.full((len(at), 4), np.nan)
+    low, high = values[before[valid]], values[after[valid]]
+    cosine = np.sum(low * high, axis=1, keepdims=True)
+    high = np.where(cosine < 0, -high, high)
+    # The angle from both chords: exact for small angles, where that of a cosine is not.
+    half = np.arctan2(
+        np.linalg.norm(high - low, axis=1, keepdims=True),
+        np.linalg.norm(high + low, axis=1, keepdims=True),
+    )
+    part = share[valid, np.newaxis]
+    # sin(x)/sin(a) as sinc, which has its limit at 0.
+    sine = np.sinc(2 * half / np.pi)
+    turned = (
+        (1 - part) * np.sinc((1 - part) * 2 * half / np.pi) * low
+        + part * np.sinc(part * 2 * half / np.pi) * high
+    ) / sine
+    result[valid] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return result
+
+
+def slerp_or_sample(
+    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+) -> FloatArray:
+    """Returns orientations as ``slerp``, with the bits of the sample at the time of a sample."""
+    before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, None)
+    exact = times[before] == at
+    return np.where(exact[:, np.newaxis], values[before], slerp(times, values, at, limit))
+
+
+def hold(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+    """Returns the last sample before each step (zero-order hold), of an age up to the limit.
+
+    The arguments are those of ``linear``.
+    """
+    before = np.searchsorted(times, at, side="right") - 1
+    result = np.full((len(at), values.shape[1]), np.nan)
+    held = before >= 0
+    held[held] = at[held] - times[before[held]] <= limit
+    result[held] = values[before[held]]
+    return result
+
+
+def hold_forever(
+    times: FloatArray, values: FloatArray, at: FloatArray, _limit: float
+) -> FloatArray:
+    """Returns the last sample before each step, of any age: a command stands until the next."""
+    return hold(times, values, at, np.inf)
+
+
+def hold_outside_gaps(
+    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+) -> FloatArray:
+    """Returns the last sample before each step where ``linear`` has one."""
+    return np.where(
+        np.isnan(linear(times, values, at, limit)), np.nan, hold(times, values, at, np.inf)
+    )
+
+
+def _bracket(
+    times: FloatArray, at: FloatArray, limit: float
+) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
+    """Samples before and after each time, the fraction between them, and its validity."""
+    last = len(times) - 1
+    before = np.searchsorted(times, at, side="right") - 1
+    inside = before >= 0
+    before = np.clip(before, 0, last)
+    after = np.minimum(before + 1, last)
+    period = times[after] - times[before]
+    exact = inside & (times[before] == at)
+    valid = exact | (inside & (after > before) & (period <= limit))
+    share = np.zeros(len(at))
+    between = valid & ~exact
+    share[between] = (at[between] - times[before[between]]) / period[between]
+    return before, after, share, valid

@@ -1,1 +1,0 @@
-"""Reader of recordings of ROS 1 and ROS 2, without ROS."""

@@ -1,1 +1,0 @@
-"""Reader of recordings as tables: columns of numbers by name, of CSV, NPZ and Parquet files."""

@@ -1,0 +1,357 @@
+"""Bags of every form are read, and whatever is damaged is refused."""
+
+import hashlib
+import os
+import re
+import shutil
+import sqlite3
+import struct
+from collections.abc import Callable
+from contextlib import closing, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from selfmodel.errors import InputError
+from selfmodel.logs.recordings.bags import read_bag
+from selfmodel.logs.recordings.messages import DECODERS
+from selfmodel.logs.recordings.suggest import suggest
+from selfmodel.robot.robot import Robot
+from tests.logs.recordings.bags import (
+    FORMS,
+    ROS,
+    ROS1_FORMS,
+    T0,
+    array,
+    ros1_payload,
+    spoilt,
+    storage,
+    write_bag,
+    write_ros1,
+)
+from tests.logs.recordings.conftest import imported, recorded
+
+GENUINE = Path(__file__).parents[4] / "shared" / "samples" / "rosbag2"
+"""Bags of ROS 2's own recorder, which are not in the repository."""
+
+
+def signals(path: Path, robot: Robot) -> dict[str, bytes]:
+    behaviour = imported(path, robot).behaviour
+    return {name: values.tobytes() for name, values in behaviour.signals.items()}
+
+
+@pytest.fixture
+def expected(bag: Path, biped: Robot) -> dict[str, bytes]:
+    """The made-up recording in its plainest form."""
+    return signals(bag, biped)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_of_rosbag2_is_the_same_trial(
+    form: str, biped: Robot, expected: dict, tmp_path: Path
+):
+    folder = write_bag(tmp_path / "walk", recorded(), form)
+    assert signals(folder, biped) == expected
+    bare = tmp_path / f"no 1 of #2?{storage(folder).name}"  # signs that an address would escape
+    shutil.copy(storage(folder), bare)
+    assert signals(bare, biped) == expected
+    (folder / "metadata.yaml").unlink()
+    assert signals(folder, biped) == expected
+
+
+@pytest.mark.parametrize("form", ROS1_FORMS)
+def test_a_ros_1_bag_is_the_same_trial(form: str, biped: Robot, bag: Path, tmp_path: Path):
+    ros1, ros2 = (
+        imported(write_ros1(tmp_path / "a.bag", recorded(), form), biped),
+        imported(bag, biped),
+    )
+
+    for signal, values in ros2.behaviour.signals.items():
+        assert ros1.behaviour[signal].tobytes() == values.tobytes(), signal
+    assert (ros1.qualities, ros1.notes, ros1.origin) == (ros2.qualities, ros2.notes, ros2.origin)
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "ros1"])
+@pytest.mark.parametrize("chunked", [True, False])
+def test_other_writers_of_mcap_are_read(
+    *, encoding: str, chunked: bool, biped: Robot, expected: dict, tmp_path: Path
+):
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.LZ4, use_chunking=chunked)
+        writer.start("another")
+        channels = {}
+        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in channels:
+                # Old recordings leave out the middle of the name.
+                schema = writer.register_schema(kind.replace("/msg/", "/"), "ros2msg", b"")
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            cdr = encoding == "cdr"
+            data = bytes(ROS.serialize_cdr(message, kind) if cdr else ros1_payload(message))
+            writer.add_message(channels[topic], time, data, time)
+        writer.finish()
+    assert signals(path, biped) == expected
+
+
+@pytest.mark.parametrize("listed", [True, False])
+@pytest.mark.parametrize("form", ["mcap", "sqlite-file"])
+def test_split_files_are_one_bag(
+    form: str, *, listed: bool, biped: Robot, expected: dict, tmp_path: Path
+):
+    items = sorted(recorded(), key=lambda item: item[1])
+    whole = tmp_path / "whole"
+    whole.mkdir()
+    names = []
+    for k in range(11):  # in the order of numbers, part_2 is before part_10
+        part = [item for n, item in enumerate(items) if n * 11 // len(items) == k]
+        source = storage(write_bag(tmp_path / f"part_{k}", part, form))
+        names.append(source.name)
+        shutil.move(source, whole / source.name)
+    if listed:
+        entries = "".join(f"  - old_folder/{name}\n" for name in names)
+        (whole / "metadata.yaml").write_text(
+            f"rosbag2_bagfile_information:\n  relative_file_paths:\n{entries}"
+        )
+    os.mkfifo(whole / "a.mcap.pipe")  # waits for nobody
+
+    assert signals(whole, biped) == expected
+    digests = read_bag(whole, ()).digests
+    assert list(digests) == names
+    assert digests[names[0]] == hashlib.sha256((whole / names[0]).read_bytes()).hexdigest()
+
+
+ABSENT = pytest.mark.skip(reason=f"no bags of ROS 2's own recorder in {GENUINE}")
+
+
+@pytest.mark.parametrize(
+    "path", sorted(GENUINE.glob("*.mcap")) or [pytest.param(GENUINE, marks=ABSENT)], ids=str
+)
+def test_genuine_recordings_are_read(path: Path, biped: Robot):
+    assert sum(series.count for series in read_bag(path).series.values())
+    assert "CHANGE: the bag has none" in suggest(path, biped, "b.xml", with_timestep=True)
+    with pytest.raises(InputError, match="/joint_states"):
+        imported(path, biped)
+
+
+def test_messages_in_a_foreign_encoding_are_counted_and_left_out(biped: Robot, tmp_path: Path):
+    path = tmp_path / "foreign.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        channel = writer.register_channel("/joint_states", "wrong_format", schema)
+        writer.add_message(channel, T0, b"?", T0)
+        writer.finish()
+
+    series = read_bag(path).series["/joint_states"]
+    assert (series.count, series.names) == (1, ())
+    with pytest.raises(InputError, match="wrong_format"):
+        imported(path, biped)
+
+
+# ---------------------------------------------------------------- damage
+
+
+@pytest.mark.parametrize("damage", ["flip", "cut", "garbage"])
+@pytest.mark.parametrize("form", [*FORMS, *(f"ros1-{form}" for form in ROS1_FORMS)])
+def test_no_damage_crashes(form: str, damage: str, tmp_path: Path):
+    path = (
+        write_ros1(tmp_path / "a.bag", recorded(0.1), form[5:])
+        if form.startswith("ros1-")
+        else storage(write_bag(tmp_path / "bag", recorded(0.1), form))
+    )
+    data = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        path.write_bytes(spoilt(data, damage, rng))
+        with suppress(InputError):
+            read_bag(path)
+
+
+def test_a_damaged_list_of_files_does_not_crash(bag: Path):
+    listing = bag / "metadata.yaml"
+    data = listing.read_bytes()
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        listing.write_bytes(spoilt(data, "flip", rng))
+        with suppress(InputError):
+            assert read_bag(bag, ()).series
+
+
+def test_a_bag_that_is_not_there_is_named(bag: Path, tmp_path: Path):
+    path = storage(bag)
+    path.unlink()
+    with pytest.raises(InputError, match=r"bag\.mcap"):
+        read_bag(bag)
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(InputError, match="a folder without one"):
+        read_bag(bag)
+    with pytest.raises(InputError, match="nothing"):
+        read_bag(tmp_path / "nothing")
+    path.write_bytes(b"hello")
+    with pytest.raises(InputError, match="another file"):
+        read_bag(bag)
+
+
+def test_what_a_recorder_left_beside_its_database_is_not_passed_over(tmp_path: Path):
+    database = storage(write_bag(tmp_path / "bag", recorded(0.1), "sqlite"))
+    with closing(sqlite3.connect(database)) as recorder:
+        recorder.execute("PRAGMA journal_mode=WAL")
+        recorder.execute("PRAGMA wal_autocheckpoint=0")
+        recorder.execute("DELETE FROM messages WHERE id > 5")
+        recorder.commit()
+        with pytest.raises(InputError, match=r"-wal .*wal_checkpoint"):
+            read_bag(database, ())
+
+
+ENDLESS = (
+    "DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL "
+    "SELECT k + 1 FROM n) SELECT k AS id, 1 AS topic_id, 0 AS timestamp, x'00' AS data FROM n"
+)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE messages SET topic_id = 77 WHERE id = 3",
+        "UPDATE messages SET data = 'text' WHERE id = 3",
+        "UPDATE messages SET timestamp = -1 WHERE id = 3",
+        "DROP TABLE topics",
+        ENDLESS,
+    ],
+)
+def test_impossible_content_of_a_database_is_refused(change: str, tmp_path: Path):
+    database = storage(write_bag(tmp_path / "bag", recorded(0.1), "sqlite"))
+    with closing(sqlite3.connect(database)) as connection:
+        connection.executescript(change)
+
+    with pytest.raises(InputError, match="damaged"):
+        read_bag(database)
+
+
+def a_row_fewer(data: bytearray) -> None:
+    """A page of a database with a row fewer, which SQLite reads without an error."""
+    page = max(at for at in range(0, len(data), 4096) if data[at] == 13)
+    data[page + 4] -= 1
+
+
+def a_message_fewer(data: bytearray) -> None:
+    """A record of MCAP with another type, which the library skips."""
+    data[data.index(struct.pack("<HIQ", 1, 0, T0)) - 9] = 0x45
+
+
+def another_channel(data: bytearray) -> None:
+    data[data.index(struct.pack("<HIQ", 1, 0, T0))] = 77
+
+
+def bytes_after_the_end(data: bytearray) -> None:
+    data += b"x"
+
+
+def cut(data: bytearray) -> None:
+    del data[-20:]
+
+
+def no_index(data: bytearray) -> None:
+    """A ROS 1 bag that was not closed."""
+    at = data.index(b"index_pos=") + 10
+    data[at : at + 8] = bytes(8)
+
+
+def a_shorter_index(data: bytearray) -> None:
+    """An index of one topic without its last message."""
+    at = data.index(b"count=", data.rindex(b"op=\x04")) + 6
+    (count,) = struct.unpack_from("<I", data, at)
+    end = at + 8 + 12 * count
+    del data[end - 12 : end]
+    data[at : at + 8] = struct.pack("<II", count - 1, 12 * (count - 1))
+    # The records after the index stay where they are.
+    data[end - 12 : end - 12] = bytes(12)
+
+
+def a_chunk_twice(data: bytearray) -> None:
+    first, second = (match.start() for match in list(re.finditer(rb"chunk_pos=", data))[:2])
+    data[second : second + 18] = data[first : first + 18]
+
+
+@pytest.mark.parametrize(
+    ("form", "damage"),
+    [
+        ("sqlite", a_row_fewer),
+        ("plain", a_message_fewer),
+        ("plain", another_channel),
+        ("mcap", bytes_after_the_end),
+        ("mcap", cut),
+        ("ros1", cut),
+        ("ros1", no_index),
+        ("ros1", a_shorter_index),
+        ("ros1", a_chunk_twice),
+    ],
+)
+def test_messages_that_are_missing_are_missed(
+    form: str, damage: Callable[[bytearray], None], tmp_path: Path
+):
+    if form == "plain":  # without chunks, and so without checksums
+        path = tmp_path / "plain.mcap"
+        with path.open("wb") as file:
+            writer = Writer(file, use_chunking=False, use_statistics=True)
+            writer.start("ros2")
+            schema = writer.register_schema("std_msgs/msg/Bool", "ros2msg", b"")
+            channel = writer.register_channel("/x", "cdr", schema)
+            for time in range(20):
+                writer.add_message(channel, T0 + time, b"\0\1\0\0\1", T0 + time)
+            writer.finish()
+    elif form == "ros1":
+        path = write_ros1(tmp_path / "walk.bag", recorded(0.2))
+    else:
+        path = storage(write_bag(tmp_path / "bag", recorded(0.2), form))
+    data = bytearray(path.read_bytes())
+    read_bag(path)
+    damage(data)
+    path.write_bytes(data)
+
+    with pytest.raises(InputError, match="damaged, or ends too early"):
+        read_bag(path)
+
+
+def test_a_message_that_does_not_fit_its_type_is_refused(tmp_path: Path):
+    path = storage(write_bag(tmp_path / "bag", [("/x", T0, array([1.5]))]))
+    count = struct.pack("<I4xd", 1, 1.5)
+    assert path.read_bytes().count(count) == 1
+    path.write_bytes(path.read_bytes().replace(count, struct.pack("<I4xd", 3, 1.5)))
+    with pytest.raises(InputError, match="damaged"):
+        read_bag(path)
+
+
+@pytest.mark.process
+def test_a_message_that_unpacks_to_a_terabyte_ends_in_one_sentence(tmp_path: Path):
+    path = tmp_path / "bag.mcap"
+    zeros = zstandard.compress(bytes(2**28))
+    payload = bytes(ROS.serialize_cdr(array([]), array([]).__msgtype__))
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema(array([]).__msgtype__, "ros2msg", b"")
+        channel = writer.register_channel("/x", "cdr", schema)
+        # A frame that says that it has 2**40 bytes.
+        bomb = b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 2**40) + zeros[13:]
+        for data in (payload, bomb):
+            writer.add_message(channel, T0, data, T0)
+        writer.finish()
+
+    with pytest.raises(InputError, match=r"bag\.mcap"):
+        read_bag(path)
+
+
+@pytest.mark.parametrize("store", [store for store in Stores if store.name.startswith("ROS2")])
+def test_the_types_that_are_read_are_alike_in_every_ros_2(store: Stores):
+    other = get_typestore(store)
+    for kind in DECODERS:
+        assert other.generate_msgdef(kind, ros_version=2) == ROS.generate_msgdef(
+            kind, ros_version=2
+        )

@@ -1,0 +1,196 @@
+"""What is suggested is right where it is sure, and marked where it is not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from selfmodel.logs.recordings.mapping_file import parse_mapping
+from selfmodel.logs.recordings.names import classified, likeness, matched
+from selfmodel.logs.recordings.suggest import suggest
+from selfmodel.robot.robot import Robot
+from tests.logs.recordings.bags import T0, array, joint_state, write_bag
+from tests.logs.recordings.conftest import imported, recorded
+from tests.logs.recordings.table_files import HINGES, write_csv, write_npz
+
+LEGS = ("front_left", "front_right", "back_left", "back_right")
+MODEL = [f"{leg}_{part}" for leg in LEGS for part in ("shoulder", "knee")]
+
+
+@pytest.mark.parametrize(
+    "legs", [("FL", "FR", "RL", "RR"), ("LF", "RF", "LH", "RH"), ("fl", "fr", "hl", "hr")]
+)
+@pytest.mark.parametrize(
+    ("told", "parts"),
+    [
+        ("{}_{}_joint", ("thigh", "calf")),
+        ("{}_{}", ("HFE", "KFE")),
+        ("joint/{}/{}", ("shoulder", "knee")),
+        ("{}{}", ("Shoulder", "Knee")),
+    ],
+)
+def test_the_usual_names_are_known(told: str, parts: tuple, legs: tuple):
+    names = [told.format(leg, part) for leg in legs for part in parts]
+    found = matched(MODEL, names[::-1])
+    assert [found[name][0] for name in MODEL] == names
+    assert all(sure for _, sure in found.values())
+
+
+def test_sides_are_never_confused():
+    assert likeness("front_left_knee", "FR_knee") == 0
+    assert likeness("front_left_knee", "RL_knee") == 0
+    assert "front_left_knee" not in matched(["front_left_knee"], ["FR_knee", "arm"])
+
+
+def test_a_name_of_a_million_letters_is_not_compared():
+    assert matched(["front_left_knee"], ["front_left_knee" * 10**5]) == {}
+
+
+def test_a_name_that_might_be_either_is_a_guess():
+    found = matched(["left_hip_x", "left_hip_y"], ["L_hip"])
+    assert [sure for _, sure in found.values()] == [False]
+
+
+def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
+    text = suggest(bag, biped, "biped.xml", with_timestep=True)
+    assert 'order = ["LHX", "LHY", "RHX", "RHY"]  # CHECK: the bag has no names' in text
+    assert "control_timestep = 0.01" in text
+    assert "# No topic is similar to right_touch" in text
+    assert 'left_hip_x = "LHX"\n' in text
+    assert imported(bag, biped, text).behaviour.steps == 99
+
+
+def test_what_the_bag_lacks_must_be_filled_in(biped: Robot, tmp_path: Path):
+    items = [("/joints", T0, joint_state(T0, ["arm"], [0.0])), ("/x", T0, array([0.0]))]
+    text = suggest(write_bag(tmp_path / "bag", items), biped, "biped.xml", with_timestep=True)
+    assert 'left_hip_x = "?"  # CHANGE: the bag has arm' in text
+    assert 'order = ["arm"]  # CHECK' in text
+    assert "no position of the base" in text
+
+
+def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tmp_path: Path):
+    items = [item for item in recorded() if item[0] == "/joint_states"]
+    items += [("/joint_cmd", time, message) for _, time, message in items]
+    items += [("/arm/joints", T0, joint_state(T0, ["elbow"], [0.0])), ("/lamp_cmd", T0, array([0]))]
+    bag = write_bag(tmp_path / "bag", items)
+    mapping = parse_mapping(suggest(bag, biped, "b.xml", with_timestep=True), "m").trial
+    assert (mapping.joints.topic, mapping.commands.topic) == ("/joint_states", "/joint_cmd")
+
+
+def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
+    names = ['LHX\n"', "left\x1b[31m_hip_y\\", "right hip é x", "RHY"]
+    items = [("/joints", T0, joint_state(T0, names, [0.0] * 4))]
+    items.append(("/x\n\x7f", T0, joint_state(T0, names[:1], [0.0])))
+    text = suggest(write_bag(tmp_path / "bag", items), biped, "b.xml", with_timestep=True)
+    assert all(char.isprintable() or char == "\n" for char in text)
+    for number in range(text.count('"?"')):
+        text = text.replace('"?"', f'"{number}"', 1)
+    told = {link.name for link in parse_mapping(text, "m").trial.joints.links.values()}
+    assert {names[1], names[2], names[3]} <= told
+
+
+def test_a_hinge_for_which_no_joint_is_left_has_no_encoder(biped: Robot, tmp_path: Path):
+    items = [item for item in recorded() if item[0] != "/joint_states"]
+    for k in range(200):
+        stamp = T0 + k * 5_000_000
+        items.append(("/joint_states", stamp, joint_state(stamp, ["LHY", "RHX", "RHY"], [0.0] * 3)))
+    bag = write_bag(tmp_path / "bag", items)
+
+    text = suggest(bag, biped, "biped.xml", with_timestep=True)
+    assert 'left_hip_x = "none"  # CHECK: no encoder' in text
+    assert 'left_hip_x = "?"  # CHANGE' in text  # a motor has a command
+
+
+# ---------------------------------------------------------------- tables
+
+
+def suggestion(path: Path, robot: Robot) -> str:
+    return suggest(path, robot, "biped.xml", with_timestep=True)
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "command"),
+    [
+        ("position.{}", "velocity.{}", "command.{}"),
+        ("{}_pos", "{}_vel", "{}_target"),
+        ("q_{}", "dq_{}", "q_des_{}"),
+        ("joint_{}_angle", "{}.qd", "{}.cmd"),
+    ],
+)
+def test_usual_names_are_mapped(
+    position: str, velocity: str, command: str, biped: Robot, tmp_path: Path
+):
+    row = np.zeros(3)
+    found = {"timestamp_ms": np.arange(3)}
+    for form in (position, velocity, command):
+        found |= {form.format(hinge): row for hinge in HINGES}
+
+    mapping = parse_mapping(suggestion(write_csv(tmp_path / "t.csv", found), biped), "m").trial
+
+    assert (mapping.time.column, mapping.time.unit) == ("timestamp_ms", "ms")
+    for hinge in HINGES:
+        assert mapping.joints.links[hinge].name == position.format(hinge)
+        assert mapping.joints.velocities[hinge] == velocity.format(hinge)
+        assert mapping.commands.links[hinge].name == command.format(hinge)
+
+
+def test_numbered_columns_are_mapped_in_order_and_marked(biped: Robot, tmp_path: Path):
+    names = [f"q{k}" for k in range(4)] + [f"action[{k}]" for k in range(4)]
+    found = {"t": np.arange(3.0), **{name: np.zeros(3) for name in names}}
+
+    text = suggestion(write_npz(tmp_path / "t.npz", found), biped)
+
+    assert 'left_hip_y = "q1"  # CHECK: not sure' in text
+    assert 'right_hip_y = "action[3]"  # CHECK: not sure' in text
+
+
+@pytest.mark.parametrize(("period", "unit"), [(0.005, "s"), (5.0, "ms"), (5e3, "us"), (5e6, "ns")])
+def test_the_unit_of_time_is_guessed_from_the_rows(
+    period: float, unit: str, biped: Robot, tmp_path: Path
+):
+    path = write_npz(tmp_path / "t.npz", {"time": np.arange(5) * period, "q": np.zeros(5)})
+
+    assert f'unit = "{unit}"  # CHECK' in suggestion(path, biped)
+
+
+@pytest.mark.parametrize(("unit", "line"), [("deg", 'unit = "deg"\n'), ("rad", 'unit = "rad"')])
+def test_degrees_are_in_the_names_of_the_angles(unit: str, line: str, biped: Robot, tmp_path: Path):
+    names = [f"{hinge}_angle_{unit}" for hinge in HINGES]
+    path = write_csv(tmp_path / "t.csv", {name: np.zeros(2) for name in ("time", *names)})
+
+    assert f"[joints]\n{line}" in suggestion(path, biped)
+
+
+@pytest.mark.parametrize("form", ["csv", "npz"])
+def test_dates_are_nanoseconds(form: str, biped: Robot, tmp_path: Path):
+    dates = np.datetime64("2026-01-01", "ns") + np.arange(5) * np.timedelta64(5, "ms")
+    if form == "npz":
+        path = write_npz(tmp_path / "t.npz", {"time": dates})
+    else:
+        path = tmp_path / "t.csv"
+        path.write_text("\n".join(["time", *map(str, dates)]))
+
+    assert 'unit = "ns"  # CHECK' in suggestion(path, biped)
+
+
+def test_vectors_are_of_the_base_or_of_the_imu():
+    names = [f"base_quat.{axis}" for axis in "xyzw"] + [f"odom_pos_{axis}" for axis in "xyz"]
+    names += [f"gyro[{axis}]" for axis in "xyz"] + [f"imu_quat_{axis}" for axis in "wxyz"]
+
+    found = classified(names)
+
+    base, imu = found.vectors["base"], found.vectors["imu"]
+    assert base["orientation"] == tuple(f"base_quat.{axis}" for axis in "wxyz")
+    assert base["position"] == tuple(f"odom_pos_{axis}" for axis in "xyz")
+    assert imu["angular_velocity"] == tuple(f"gyro[{axis}]" for axis in "xyz")
+    assert imu["orientation"] == tuple(f"imu_quat_{axis}" for axis in "wxyz")
+
+
+def test_missing_columns_are_to_be_filled_in(biped: Robot, tmp_path: Path):
+    path = write_csv(tmp_path / "t.csv", {"left_force": np.zeros(3), "a": np.zeros(3)})
+
+    text = suggestion(path, biped)
+
+    assert 'column = "?"  # CHANGE: the table has left_force, a' in text
+    assert text.count('"?"  # CHANGE') == 9  # the time, four hinges and four motors
+    assert '[touch.left_touch]\ncolumn = "left_force"' in text
