@@ -12,9 +12,9 @@ from mcap.writer import Writer
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
-from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.contents import read_contents
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import TrialWriter
+from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

@@ -17,7 +17,7 @@ import numpy as np
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.safety import joint_limits, tilt_limit
 from selfmodel.robot.designs import network_for

@@ -1,7 +1,7 @@
 """Trial logs: one MCAP file of ROS 2 messages per physical trial, written safely, read strictly.
 
 The names of this module read logs without MuJoCo. ``selfmodel.logs.physical_trial`` runs and logs a
-trial, ``selfmodel.logs.writing.writer`` writes a log, ``selfmodel.logs.journal`` a run's folder.
+trial, ``selfmodel.logs.writer`` writes a log, ``selfmodel.logs.journal`` a run's folder.
 """
 
 from selfmodel.logs.controllers import load_controller, save_controller

@@ -23,7 +23,7 @@ from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
-from selfmodel.logs.errors import LogWriteError
+from selfmodel.logs.files import create_file
 from selfmodel.logs.npz import NPZ_FAILURES, read_array
 
 MAX_CONTROLLER_BYTES = 2**20
@@ -101,13 +101,8 @@ def save_controller(path: Path, controller: Controller) -> None:
         InputError: The file exists.
         LogWriteError: The file could not be written.
     """
-    try:
-        with path.open("xb") as file:
-            file.write(controller_bytes(controller))
-    except FileExistsError:
-        raise InputError(f"{path} exists, and is not overwritten: choose another name") from None
-    except OSError as error:
-        raise LogWriteError(path, error) from error
+    with create_file(path) as file:
+        file.write(controller_bytes(controller))
 
 
 def load_controller(path: Path) -> Controller:

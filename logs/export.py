@@ -11,7 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.logs.files import as_write_error, create_partial, publish
+from selfmodel.logs.files import create_file
 from selfmodel.trials.behaviour import Behaviour, columns_of
 
 Columns = Mapping[str, FloatArray]
@@ -33,9 +33,8 @@ def export(path: Path, behaviour: Behaviour) -> tuple[str, ...]:
     """
     write = writer_of(path)
     columns = columns_of(behaviour)
-    with as_write_error(path), create_partial(path) as file:
+    with create_file(path) as file:
         write(file, columns)
-        publish(file, path)
     return tuple(columns)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from selfmodel.errors import TrialError
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot, TimedRobot
 from selfmodel.physical.safety import HangError
 from selfmodel.robot.robot import Robot

@@ -10,7 +10,9 @@ from typing import Any
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback, played_back
 from selfmodel.errors import InputError
+from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
+from selfmodel.logs.decoding import Timing, read_behaviour, read_timing
 from selfmodel.logs.errors import (
     ANOTHER,
     IMPORT_IT,
@@ -21,10 +23,6 @@ from selfmodel.logs.errors import (
     UnsupportedError,
     salvage_it,
 )
-from selfmodel.logs.mcap.contents import Contents, read_contents
-from selfmodel.logs.messages.schemas import is_known, schema_text
-from selfmodel.logs.messages.signals import read_behaviour
-from selfmodel.logs.messages.timing import Timing, read_timing
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FINISHED,
@@ -48,6 +46,7 @@ from selfmodel.logs.records import (
     sha256,
     trial_record,
 )
+from selfmodel.logs.topics import is_known, schema_text
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPlan

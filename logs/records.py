@@ -29,19 +29,14 @@ IMPORT = "selfmodel.import"
 """Origin of an imported trial, and the quality of the recording."""
 SALVAGE = "selfmodel.salvage"
 """Origin of a salvaged trial."""
-TIED = "tied"
-"""Field of the salvage record: ``no`` for a log of an earlier version, otherwise ``yes``."""
 RESULT = "selfmodel.result"
-MANIFEST = "selfmodel.manifest"
-"""Digests of the preamble's records and files; see ``selfmodel.logs.mcap.provenance``."""
+
+SEALS, SEAL_TYPE = "/provenance", "selfmodel_msgs/msg/Seal"
+"""Topic of the digests of its batches in a log that version 0.1 wrote; it is not read."""
 
 OWN = "selfmodel."
 """Prefix of the names of selfmodel's records; each contains a digest of itself."""
 DIGEST = "sha256"
-NONCE = "nonce"
-"""Field of the trial record that a log of an earlier version does not have."""
-LAST_BATCH = "messages_sha256"
-"""Field of the result record with the digest of the last batch of messages."""
 
 MODEL_FILE = "model.xml"
 CONTROLLER_FILE = "controller.npz"
@@ -88,9 +83,6 @@ class TrialRecord:
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
             commands are known.
         model_sha256: SHA-256 of the attached model.
-        nonce: Random text that distinguishes trials with equal plans, or "" for a trial that is
-            repeated exactly: simulated, or imported. None in a log of an earlier version, whose
-            messages are not tied to their trial.
     """
 
     format: str
@@ -103,14 +95,12 @@ class TrialRecord:
     seed: int
     controller_sha256: str
     model_sha256: str
-    nonce: str | None = None
 
     def texts(self) -> dict[str, str]:
         """Returns the record as texts, the form of MCAP metadata."""
         return {
             name: value if isinstance(value, str) else repr(value)
             for name, value in dataclasses.asdict(self).items()
-            if value is not None
         }
 
 
@@ -179,7 +169,7 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
         ValueError: A field is missing or invalid; the message names the field.
     """
     fields = [field.name for field in dataclasses.fields(TrialRecord)]
-    missing = [name for name in fields if name not in texts and name != NONCE]
+    missing = [name for name in fields if name not in texts]
     if missing:
         raise ValueError(f"it lacks {', '.join(missing)}")
     stage = stage_of(texts["stage"])
@@ -205,7 +195,6 @@ def trial_record(texts: Mapping[str, str]) -> TrialRecord:
         seed=checked_seed(int(texts["seed"])),
         controller_sha256=texts["controller_sha256"],
         model_sha256=texts["model_sha256"],
-        nonce=texts.get(NONCE),
     )
 
 

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.messages.topics import WORLD
+from selfmodel.logs.topics import WORLD
 from selfmodel.robot.motion import Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer

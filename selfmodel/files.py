@@ -1,12 +1,15 @@
-"""Bounded reading of files that a user names, and their digests."""
+"""Files that a user names: bounded reading, digests, and writing that is complete or absent."""
 
 import hashlib
 import os
 import re
+import secrets
 import stat
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from selfmodel.errors import InputError
 
@@ -65,6 +68,76 @@ def file_digest(path: Path) -> str:
     check_regular(path, "a file")
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextmanager
+def new_file(path: Path, *, replace: bool = False) -> Iterator[IO[bytes]]:
+    """Opens a file that gets its name once all of it is on the disk.
+
+    Until then it has a random name in the same folder, so that two writers of one file do not mix,
+    and no remainder of a killed process is in the way. A link of that name is not followed.
+
+    Args:
+        path: Name of the file.
+        replace: Whether a file that has the name is replaced.
+
+    Raises:
+        FileExistsError: The name is taken, and is not to be replaced.
+        OSError: Writing failed. In any case, no file is left, or the old one.
+    """
+    part = path.with_name(f".selfmodel-{secrets.token_hex(8)}.part")
+    try:
+        with part.open("xb") as file:
+            yield file
+            sync(file)
+        if replace:
+            part.replace(path)
+        else:
+            give_name(part, path)
+    except BaseException:
+        with suppress(OSError):  # the first error is the reason
+            part.unlink(missing_ok=True)  # on a full disk, half a file takes space
+        raise
+    sync_folder(path.parent)
+
+
+def give_name(part: Path, path: Path) -> None:
+    """Renames a complete file, and replaces none.
+
+    Raises:
+        FileExistsError: The name is taken.
+        OSError: The file cannot be renamed.
+    """
+    try:
+        os.link(part, path)  # unlike a rename, a link never replaces a file
+    except FileExistsError:
+        raise
+    except OSError:
+        # File systems and sandboxes refuse hard links with many errors. An empty file that is
+        # created exclusively keeps the name free for a rename.
+        path.open("xb").close()
+        try:
+            part.replace(path)
+        except OSError:
+            path.unlink()
+            raise
+    else:
+        part.unlink()
+
+
+def sync(file: IO[bytes]) -> None:
+    """Flushes a file to the disk."""
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Flushes the names in a folder to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _unreadable(path: Path, what: str, error: OSError | ValueError) -> InputError:

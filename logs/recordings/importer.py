@@ -20,7 +20,7 @@ from selfmodel.logs.recordings.resample import Clocked, ClocksApartError, Track,
 from selfmodel.logs.recordings.signals import Tracks, signals, tracks_of
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table, recording_of
 from selfmodel.logs.records import Imported, TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, samples_of

@@ -19,7 +19,7 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
 from selfmodel.errors import InputError
-from selfmodel.logs.files import as_write_error, create_partial, publish, refuse_existing
+from selfmodel.logs.files import create_file, refuse_existing
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
 from selfmodel.simulation.floating.fit import FACTORS
@@ -57,9 +57,8 @@ def calibrate(
     _refuse_assets(before, robot or str(files[0]))
     trials = [log.trial for log in logs]
     fit = fit_to(before, trials, thread_count(threads))
-    with create_partial(out) as file, as_write_error(out):
+    with create_file(out) as file:
         file.write(fit.robot.mjcf.encode())
-        publish(file, out)
     result = {
         "robot": before.name,
         "logs": [str(path) for path in files],

@@ -25,7 +25,7 @@ from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
-from selfmodel.logs.atomic import partial_path
+from selfmodel.logs.files import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.robot.designs import DESIGNS

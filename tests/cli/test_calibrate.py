@@ -9,7 +9,7 @@ import pytest
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.parameters import nominal, with_parameters

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs.records import MODEL_FILE, TRIAL, TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -17,8 +17,7 @@ from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
 from tests.helpers.command import Done, selfmodel
 from tests.logs.conftest import MJCF, plan_of
-from tests.logs.test_damage import rewritten
-from tests.logs.test_hostile_logs import attach, says
+from tests.logs.edits import attach, rewritten, says
 
 BOX = '<geom type="box" size="0.3 0.3 0.3" {}/>'
 CROWD = MJCF.replace('<body name="torso"', 120 * BOX.format('pos="0 0 0.6"') + '<body name="torso"')

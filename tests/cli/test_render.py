@@ -22,7 +22,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.results import best_hypothesis
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot

@@ -28,8 +28,8 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import LogError
 from selfmodel.logs.controllers import controller_bytes
+from selfmodel.logs.inspection import verify
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.verify import verify
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.tasks import ROBOTS
 from tests.logs.recordings.driver import mapping, record

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfmodel.errors import InputError
-from selfmodel.logs.verify import verify
+from selfmodel.logs.inspection import verify
 from selfmodel.physical.safety import STOP_SIGNALS
 from tests.helpers.signalled_driver import PHASES, STEPS
 

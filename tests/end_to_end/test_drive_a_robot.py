@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from selfmodel.cli.output.plain import counted
-from selfmodel.logs.verify import verify
+from selfmodel.logs.inspection import verify
 from selfmodel.tasks.walking import environment, motion_capture
 from tests.helpers.code_blocks import blocks
 from tests.helpers.command import selfmodel

@@ -12,7 +12,7 @@ import pytest
 
 from selfmodel.logs import LogError, TrialLog, read_log
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.writing.writer import FLUSH_STEPS
+from selfmodel.logs.writer import FLUSH_STEPS
 from selfmodel.trials.signals import SIGNALS
 
 ROOT = Path(__file__).parents[2]

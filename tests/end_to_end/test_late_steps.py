@@ -16,7 +16,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error

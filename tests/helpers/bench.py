@@ -6,7 +6,7 @@ import dm_env
 import numpy as np
 
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS

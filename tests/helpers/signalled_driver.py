@@ -17,8 +17,8 @@ from typing import Any
 import dm_env
 import numpy as np
 
-from selfmodel.logs.writing.logfile import LogFile
-from selfmodel.logs.writing.writer import TrialWriter
+from selfmodel.logs.log_file import LogFile
+from selfmodel.logs.writer import TrialWriter
 from tests.helpers.bench import Bench, logged
 
 STEPS = 40

@@ -9,7 +9,7 @@ import pytest
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

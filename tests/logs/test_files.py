@@ -1,11 +1,18 @@
+"""Output files: complete or absent, of two writers one, and never through a link."""
+
 import errno
 import os
+import stat
+import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from selfmodel.logs.errors import LogWriteError
-from selfmodel.logs.files import write_new
+from selfmodel.errors import InputError
+from selfmodel.logs import LogWriteError, read_log, save_controller
+from selfmodel.logs.export import export
+from selfmodel.logs.files import create_file, make_folder, replace_file, write_new
 
 
 def refuse(monkeypatch: pytest.MonkeyPatch, owner: object, name: str, number: int) -> None:
@@ -29,46 +36,101 @@ def _file_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 @pytest.mark.usefixtures("_file_system")
 def test_a_new_file_has_its_name_and_replaces_no_file_that_has_it(tmp_path: Path):
     path = tmp_path / "a.html"
+    names = [write_new(path, data) for data in (b"1", b"2", b"3")]
 
-    assert [write_new(path, data) for data in (b"1", b"2", b"3")] == [
-        path,
-        tmp_path / "a-2.html",
-        tmp_path / "a-3.html",
-    ]
-
-    assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == {
-        "a.html": b"1",
-        "a-2.html": b"2",
-        "a-3.html": b"3",
-    }
+    assert [name.name for name in names] == ["a.html", "a-2.html", "a-3.html"]
+    assert [name.read_bytes() for name in names] == [b"1", b"2", b"3"]
+    with pytest.raises(InputError, match=r"a\.html exists"), create_file(path) as file:
+        file.write(b"new")
+    assert sorted(tmp_path.iterdir()) == sorted(names)
 
 
-def test_the_unfinished_file_of_another_program_is_kept(tmp_path: Path):
-    (tmp_path / "a.html.part").write_bytes(b"of another")
+def test_a_file_of_a_result_may_be_read_by_others_as_the_users_mask_allows(tmp_path: Path):
+    replace_file(tmp_path / "a.csv", b"1")
+    (tmp_path / "b.csv").touch()
 
-    assert write_new(tmp_path / "a.html", b"new") == tmp_path / "a.html"
-
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.html", "a.html.part"]
-    assert (tmp_path / "a.html.part").read_bytes() == b"of another"
+    modes = {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
+    assert len(modes) == 1
 
 
-def test_of_a_full_disk_nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("name", ["results.csv", "results.csv.part"])
+def test_no_link_that_lies_in_the_way_is_followed(tmp_path: Path, name: str):
+    precious = tmp_path / "precious"
+    precious.write_text("of the user")
+    (tmp_path / name).symlink_to(precious)
+
+    replace_file(tmp_path / "results.csv", b"new")
+
+    assert precious.read_text() == "of the user"
+    assert (tmp_path / "results.csv").read_bytes() == b"new"
+    assert not (tmp_path / "results.csv").is_symlink()
+
+
+def test_two_writers_of_one_result_do_not_mix(tmp_path: Path):
+    path = tmp_path / "result.json"
+    whole = [bytes([letter]) * 10**6 for letter in b"abcd"]
+    writers = [threading.Thread(target=replace_file, args=(path, data)) for data in whole]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+
+    assert path.read_bytes() in whole
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_export_is_not_blocked_by_the_remainder_of_a_killed_one(log: Path, tmp_path: Path):
+    behaviour = read_log(log).trial.behaviour
+    (tmp_path / "t.csv.part").write_text("half")
+    (tmp_path / ".selfmodel-0123.part").write_text("half")
+    export(tmp_path / "t.csv", behaviour)
+
+    assert len((tmp_path / "t.csv").read_text().splitlines()) == behaviour.steps + 1
+
+
+@pytest.mark.parametrize("write", [replace_file, write_new])
+def test_of_a_full_disk_nothing_is_left_but_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write: object
+):
+    (tmp_path / "a.html").write_bytes(b"old")
     refuse(monkeypatch, os, "fsync", errno.ENOSPC)
 
     with pytest.raises(LogWriteError, match="the disk is full"):
-        write_new(tmp_path / "a.html", b"new")
+        write(tmp_path / "a.html", b"new")
+
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"old"]
+
+
+def test_a_new_file_that_fails_leaves_nothing(tmp_path: Path):
+    def interrupted() -> None:
+        with create_file(tmp_path / "a.csv") as file:
+            file.write(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
 
     assert list(tmp_path.iterdir()) == []
+    with (
+        pytest.raises(InputError, match="there is no folder"),
+        create_file(tmp_path / "no" / "a.csv"),
+    ):
+        pass
 
 
-def test_a_finished_file_that_cannot_get_its_name_is_kept_and_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    refuse(monkeypatch, os, "link", errno.EPERM)
-    refuse(monkeypatch, Path, "replace", errno.EIO)
+def test_the_names_of_new_folders_are_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    synced: list[Path] = []
+    monkeypatch.setattr("selfmodel.logs.files.sync_folder", synced.append)
+    make_folder(tmp_path / "run" / "trials")
 
-    with pytest.raises(LogWriteError, match=r"the finished file is .*a\.html\.part: rename it"):
-        write_new(tmp_path / "a.html", b"new")
+    assert (tmp_path / "run" / "trials").is_dir()
+    assert set(synced) == {tmp_path, tmp_path / "run"}
 
-    assert [one.name for one in tmp_path.iterdir()] == ["a.html.part"]
-    assert (tmp_path / "a.html.part").read_bytes() == b"new"
+
+def test_a_controller_is_saved_once(log: Path, tmp_path: Path):
+    controller = read_log(log).trial.plan.controller
+    save_controller(tmp_path / "c.npz", controller)
+
+    with pytest.raises(InputError, match=r"c\.npz exists"):
+        save_controller(tmp_path / "c.npz", controller)
+    assert np.load(tmp_path / "c.npz")["genome"].tolist() == controller.genome.tolist()

@@ -11,12 +11,11 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, files, read_log
-from selfmodel.logs.messages.topics import topics
+from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, log_file, read_log
+from selfmodel.logs.contents import read_undamaged
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.salvage.rescue import rescue
-from selfmodel.logs.writing import logfile
-from selfmodel.logs.writing.writer import FLUSH_STEPS, write_trial
+from selfmodel.logs.topics import topics
+from selfmodel.logs.writer import FLUSH_STEPS, write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample
@@ -26,7 +25,7 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from tests.logs.conftest import MJCF, made_up, plan_of
@@ -49,7 +48,7 @@ def steps_kept(part: Path, robot: Robot) -> int:
     """How many steps an unfinished file holds whole, having checked that they are the true ones."""
     with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
         read_log(part)
-    contents = rescue(part).contents
+    contents = read_undamaged(part)[0]
     assert set(contents.attachments) == {"model.xml", "controller.npz", "settings.json"}
     for topic in topics(robot.anatomy.names, robot.root):
         messages = contents.topics[topic.name]
@@ -93,7 +92,7 @@ def test_a_trial_that_ends_before_its_first_step_leaves_what_was_planned(
             stopping(biped, 0, RuntimeError("gone")),
             TrialHeader(Settings()),
         )
-    contents = rescue(tmp_path / "a.mcap.part").contents
+    contents = read_undamaged(tmp_path / "a.mcap.part")[0]
     assert contents.metadata["selfmodel.trial"]["name"] == "00-before"
 
 
@@ -189,12 +188,12 @@ def test_a_full_disk_is_said_as_such_with_the_name_of_the_file(
     room, folder = int(share * log.stat().st_size), log.parent / "full"
     folder.mkdir()
 
-    def create(path: Path) -> io.BufferedWriter:
-        raw = FullDisk(files.partial_path(path), "xb")
+    def opened(path: Path, mode: str) -> io.BufferedWriter:
+        raw = FullDisk(path, mode)
         raw.room = room
         return io.BufferedWriter(raw)
 
-    monkeypatch.setattr(logfile, "create_partial", create)
+    monkeypatch.setattr(Path, "open", opened)
     plan = plan_of(biped, STEPS)
     with pytest.raises(LogWriteError, match=r"a\.mcap\.part: the disk is full") as caught:
         write_trial(
@@ -230,7 +229,7 @@ def test_a_disk_that_fills_while_a_trial_is_interrupted_does_not_hide_why(
 
     def samples() -> Iterator[Sample]:
         yield from made_up(biped, 20)
-        monkeypatch.setattr(logfile.Writer, "add_message", fail)
+        monkeypatch.setattr(log_file.Writer, "add_message", fail)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt) as caught:

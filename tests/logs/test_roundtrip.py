@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log, read_truth
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import TrialWriter, write_trial
+from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from selfmodel.logs.mcap.contents import read_contents
+from selfmodel.logs.contents import read_contents
 from selfmodel.logs.viewers import _roll_pitch_yaw, body_names, urdf
 from selfmodel.robot.mjcf.document.document import parse_xml
 from selfmodel.robot.mjcf.document.files import InMemory

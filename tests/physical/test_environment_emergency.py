@@ -11,9 +11,9 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
 from selfmodel.logs import read_log
+from selfmodel.logs.inspection import verify
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.verify import verify
-from selfmodel.logs.writing.writer import TrialWriter, write_trial
+from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.safety import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import selfmodel
-from selfmodel.logs.verify import verify
+from selfmodel.logs.inspection import verify
 from selfmodel.physical.safety import (
     STOP_SIGNALS,
     HeldIterator,

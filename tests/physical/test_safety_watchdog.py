@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError, TrialError
-from selfmodel.logs.verify import verify
+from selfmodel.logs.inspection import verify
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.safety import Terminated, Watchdog
 from selfmodel.trials.signals import SIGNALS

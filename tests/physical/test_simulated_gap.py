@@ -14,7 +14,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.gap import NoisyMeasurement, draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot

@@ -16,7 +16,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
 from selfmodel.recovery.recover import diagnose_trials

@@ -8,7 +8,7 @@ app = group(
     {
         "info": ("selfmodel.cli.logs.info:info", "Show what logs contain."),
         "verify": ("selfmodel.cli.logs.verify:verify", "Check every checksum, count and digest."),
-        "salvage": ("selfmodel.cli.logs.salvage:salvage", "Save the complete data of a bad log."),
+        "salvage": ("selfmodel.cli.logs.salvage:salvage", "Save the good steps of a bad log."),
         "import": ("selfmodel.cli.logs.import_:import_", "Import a recording as a log."),
         "export": ("selfmodel.cli.logs.export:export", "Write a log's signals as a table."),
     },

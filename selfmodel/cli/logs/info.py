@@ -13,8 +13,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.cli.view import layout_path
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
-from selfmodel.logs.info import Info, has_truth, read_info
-from selfmodel.logs.mcap.provenance import UNTIED
+from selfmodel.logs.inspection import Info, read_info
 from selfmodel.logs.salvage import salvageable_steps
 
 
@@ -86,7 +85,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "records": list(found.records),
         "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
         "clock": _clock(found.log),
-        "truth": "hidden" if has_truth(found) else "unknown",
+        "truth": "hidden" if found.has_truth else "unknown",
         "source": dict(found.source),
         "digest": found.digest,
     }
@@ -118,7 +117,7 @@ def _print(one: dict[str, Any]) -> None:
         f"driven by {one['driver']}",
         f"written with {', '.join(f'{name} {text}' for name, text in one['software'].items())}",
         f"true hypothesis: {_TRUTH[one['truth']]}",
-        f"digest: {one['digest'] or f'none: {UNTIED}'}",
+        f"SHA-256 {one['digest']}",
     )
     if clock := one["clock"]:
         late, missing = (

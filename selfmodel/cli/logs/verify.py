@@ -10,12 +10,13 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError
-from selfmodel.logs.mcap.provenance import UNTIED
-from selfmodel.logs.verify import verify as check
+from selfmodel.logs.inspection import verify as check
 
 Expect = Annotated[
     str,
-    typer.Option(metavar="DIGEST", help="Digest that the one log must have, from `logs verify`."),
+    typer.Option(
+        metavar="SHA256", help="SHA-256 that the one file must have, as from `logs verify`."
+    ),
 ]
 
 
@@ -30,7 +31,7 @@ def verify(
     The exit status is 0 if every log is good, otherwise 1.
     """
     if expect and len(files) > 1:
-        raise InputError(f"--expect is the digest of one log: give one log, got {len(files)}")
+        raise InputError(f"--expect is the SHA-256 of one log: give one log, got {len(files)}")
     checked = [_checked(path, expect.lower()) for path in files]
     if as_json:
         print_json({"ok": all(one["ok"] for one in checked), "files": checked}, indent=None)
@@ -60,6 +61,6 @@ def _line(one: dict[str, Any]) -> str:
         unloaded = "" if one["model_loaded"] else " (without MuJoCo, its model was not loaded)"
         why = f" ({one['reason']})" if one["reason"] else ""
         steps = counted(one["steps"], "step")
-        tied = f"digest {one['digest']}" if one["digest"] else f"not tied to its trial: {UNTIED}"
-        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}; {tied}"
+        digest = f"SHA-256 {one['digest']}"
+        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}; {digest}"
     return f"error: {one['error']}"

@@ -23,8 +23,8 @@ from selfmodel.experiments.grid.cell_file import (
     read_cell,
 )
 from selfmodel.experiments.grid.checks import refused_versions
+from selfmodel.files import sync_folder
 from selfmodel.logs import result_files
-from selfmodel.logs.atomic import sync_folder
 from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
 

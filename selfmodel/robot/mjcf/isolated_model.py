@@ -1,6 +1,7 @@
 """Compiles a foreign model in a child process, before this process does: MuJoCo may crash."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 
 import mujoco
@@ -40,7 +41,9 @@ def build_and_step(request: Message) -> Message:
         robot = Robot(
             "robot", request.header["mjcf"], request.header["control_timestep"], request.buffers
         )
-        mujoco.mj_step(robot.model, mujoco.MjData(robot.model))
+        data = mujoco.MjData(robot.model)
+    with suppress(mujoco.FatalError):  # such as too many contacts: a simulation that diverges
+        mujoco.mj_step(robot.model, data)
     return Message({})
 
 

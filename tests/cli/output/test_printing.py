@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from mcap.records import McapRecord, Metadata
+from mcap.records import Attachment, Channel, McapRecord, Metadata
 
 from selfmodel.cli.output.grid_display import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
@@ -14,10 +14,9 @@ from selfmodel.experiments.grid import PartEnds
 from selfmodel.logs import records
 from tests.helpers.command import SMALL, Done, selfmodel
 from tests.logs.conftest import MJCF
+from tests.logs.edits import rewritten, says
 from tests.logs.recordings.bags import write_bag
 from tests.logs.recordings.conftest import MAPPING, recorded
-from tests.logs.test_damage import rewritten
-from tests.logs.test_hostile_logs import attachment, channel, note, put, says
 
 FORGED = "ok: other.mcap"
 EVIL = f"x\n{FORGED}\r{FORGED}\x85{FORGED}\u2028{FORGED}\x1b[2K\x08\x7f\u202eend\udc80"
@@ -62,19 +61,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         check(selfmodel(*short, stage, "--out", name, cwd=folder))
         rewritten(folder / name, hostile)
     data = (folder / f"{EVIL}.mcap").read_bytes()
-    put(
-        folder / f"{EVIL}.mcap",
-        note(EVIL_TEXT),
-        attachment(EVIL_TEXT, b""),
-        channel(90, EVIL_TEXT),
-    )
+    more = [
+        Metadata(EVIL_TEXT, {}),
+        Attachment(0, 0, EVIL_TEXT, "", b""),
+        Channel(90, EVIL_TEXT, "", {}, 0),
+    ]
+    rewritten(folder / f"{EVIL}.mcap", lambda record: record, more=more)
     (folder / f"cut {EVIL}.mcap").write_bytes(data[: len(data) * 3 // 4])
     (folder / f"after {EVIL}.mcap").write_bytes(data)
     (folder / f"status {EVIL}.mcap").write_bytes(data)
     rewritten(folder / f"status {EVIL}.mcap", says(records.RESULT, status=EVIL_TEXT))
     twice = folder / f"twice {EVIL}.mcap"
     twice.write_bytes(data)
-    put(twice, note(EVIL_TEXT), note(EVIL_TEXT))
+    rewritten(twice, lambda record: record, more=[Metadata(EVIL_TEXT, {})] * 2)
     escaped = EVIL_NAME.replace("\n", "&#10;").replace("\r", "&#13;")
     model = MJCF.replace("left_leg", escaped).replace("left_hip_x", f"hip {escaped}")
     (folder / f"{EVIL}.xml").write_text(model)

@@ -8,7 +8,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.mjcf.load import load_mjcf

@@ -7,23 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.opcode import Opcode
 
 from selfmodel.errors import InputError
-from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, read_log
-from selfmodel.logs.mcap.contents import read_contents
-from selfmodel.logs.messages.topics import TIMING
-from selfmodel.logs.records import LAST_BATCH, MAX_TEXT, RESULT, TRIAL, TrialHeader
+from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, log_file, read_log
+from selfmodel.logs.contents import read_contents
+from selfmodel.logs.records import MAX_TEXT, RESULT, TRIAL, TrialHeader
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.writing import logfile
-from selfmodel.logs.writing.writer import write_trial
+from selfmodel.logs.topics import TIMING
+from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Sample, collect
 from selfmodel.trials.signals import SIGNALS
 from tests.logs.conftest import STEPS, made_up, plan_of, timed
-from tests.logs.salvage.test_salvage import spoiled
-from tests.logs.test_damage import metadata, rewritten
+from tests.logs.edits import rewritten, says
 
 
 def write(path: Path, robot: Robot, samples: Iterator[Sample], **options: object) -> Path:
@@ -58,7 +55,7 @@ def test_without_a_clock_a_log_is_what_it_was(log: Path):
     contents = read_contents(log)
     assert contents.metadata[TRIAL]["format"] == "1"
     assert TIMING.name not in contents.topics
-    assert set(contents.metadata[RESULT]) == {"status", "steps", "displacement", LAST_BATCH}
+    assert set(contents.metadata[RESULT]) == {"status", "steps", "displacement"}
 
 
 @pytest.mark.parametrize("has", [True, False])
@@ -66,23 +63,6 @@ def test_samples_with_and_without_a_clock_do_not_mix(biped: Robot, tmp_path: Pat
     samples = made_up(biped, STEPS)
     with pytest.raises(InputError, match=r"the sample of step 0 has (a|no) moment"):
         write(tmp_path / "a.mcap", biped, timed(samples) if has else samples, timed=not has)
-
-
-def test_of_a_damaged_log_the_steps_that_are_lost_are_late_and_missing(clocked: Path):
-    true = read_log(clocked).timing
-    spoiled(clocked, Opcode.CHUNK, 2)  # steps 1 to 50
-    told = salvage(clocked, clocked.with_name("saved.mcap"))
-    saved = read_log(clocked.with_name("saved.mcap"))
-
-    assert told.missing["/timing"] == 50
-    assert true is not None
-    assert saved.timing is not None
-    assert saved.timing.missing[1:51].all()
-    assert saved.timing.late[1:51].all()
-    assert np.isnan(saved.timing.elapsed[1:51]).all()
-    for kept in (slice(1), slice(51, None)):
-        for name in ("elapsed", "late", "missing"):
-            assert np.array_equal(getattr(saved.timing, name)[kept], getattr(true, name)[kept])
 
 
 @pytest.mark.parametrize(
@@ -162,7 +142,7 @@ def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: 
 
 
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
-    rewritten(clocked, metadata(RESULT, reason="x" * (MAX_TEXT + 1)))
+    rewritten(clocked, says(RESULT, reason="x" * (MAX_TEXT + 1)))
     with pytest.raises(SchemaMismatchError, match="at most 1000 characters in reason"):
         read_log(clocked)
 
@@ -184,7 +164,7 @@ def test_ctrl_c_while_steps_are_written_leaves_what_can_be_salvaged(
     def samples() -> Iterator[Sample]:
         for k, sample in enumerate(timed(made_up(biped, STEPS))):
             if k == 50:  # the next one is written with the 49 before
-                monkeypatch.setattr(logfile.LogFile, "messages", interrupt)
+                monkeypatch.setattr(log_file.LogFile, "messages", interrupt)
             yield sample
 
     with pytest.raises(KeyboardInterrupt):
@@ -202,7 +182,7 @@ def test_a_disk_that_is_full_as_a_trial_is_stopped_does_not_hide_why(
 
     def samples() -> Iterator[Sample]:
         yield from timed(made_up(biped, 20))
-        monkeypatch.setattr(logfile.LogFile, "metadata", fail)
+        monkeypatch.setattr(log_file.LogFile, "metadata", fail)
         raise FallError
 
     with pytest.raises(FallError) as caught:
@@ -226,7 +206,7 @@ def test_a_file_that_comes_to_exist_as_a_trial_is_stopped_does_not_hide_why(
 
 
 def test_a_status_that_nobody_knows_is_refused(clocked: Path):
-    rewritten(clocked, metadata(RESULT, status="paused"))
+    rewritten(clocked, says(RESULT, status="paused"))
     with pytest.raises(UnsupportedError, match="the trial is 'paused'"):
         read_log(clocked)
 

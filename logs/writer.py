@@ -1,21 +1,49 @@
-"""Writer of a trial's log, while the trial runs."""
+"""Writer of a trial's log, while the trial runs: a kill loses at most the last steps."""
 
 import itertools
+import platform
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import mcap
+import mujoco
+import numpy as np
+
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError, describe
-from selfmodel.logs.atomic import partial_path
+from selfmodel.logs.controllers import controller_bytes
+from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
-from selfmodel.logs.records import FINISHED, STOPPED, Result, TrialHeader, checked_name
-from selfmodel.logs.writing.encoder import Encoder, empty_rows, sample_rows
-from selfmodel.logs.writing.logfile import LogFile
-from selfmodel.logs.writing.preamble import write_preamble
+from selfmodel.logs.files import partial_path
+from selfmodel.logs.log_file import LogFile
+from selfmodel.logs.records import (
+    CONTROLLER_FILE,
+    FINISHED,
+    FORMAT,
+    GAP,
+    HIDDEN,
+    IMPORT,
+    MAPPING_FILE,
+    MODEL_FILE,
+    SETTINGS_FILE,
+    SOFTWARE,
+    STOPPED,
+    TIMED_FORMAT,
+    TRIAL,
+    TRUTH,
+    Result,
+    TrialHeader,
+    TrialRecord,
+    checked_name,
+    settings_json,
+    sha256,
+)
+from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
+from selfmodel.logs.viewers import urdf
 from selfmodel.physical.safety import (
     cleanup,
     handle_stop_signals,
@@ -26,6 +54,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Names
 from selfmodel.trials.trial import TrialPlan
+from selfmodel.version import __version__
 
 FLUSH_STEPS = 50
 """Steps between two flushes, the most that a kill can lose. The file is 1 % larger than without."""
@@ -114,7 +143,7 @@ class TrialWriter:
         self._log = LogFile(self.path)
         with ExitStack() as undo:
             undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
-            write_preamble(self._log, self._robot, self._plan, self._header)
+            _write_preamble(self._log, self._robot, self._plan, self._header)
             self._channels = [
                 self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
             ]
@@ -228,3 +257,58 @@ def _check_ends(robot: str, names: Names, driver: CommandSource) -> None:
             f"expected a controller for {robot}, with the sensors {names.sensors} and motors "
             f"{names.motors}, got one for {sensors} and {motors}"
         )
+
+
+def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
+    """Writes the records, attachments and robot description that precede the first step.
+
+    Args:
+        log: File to write to.
+        robot: Robot as its model describes it.
+        plan: Plan of the trial.
+        header: Other content of the preamble.
+
+    Raises:
+        LogWriteError: The disk is full, or failed.
+    """
+    driver = plan.controller
+    controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
+    model = robot.mjcf.encode()
+    record = TrialRecord(
+        format=TIMED_FORMAT if header.timed else FORMAT,
+        name=plan.name,
+        stage=plan.stage,
+        robot=robot.name,
+        root=robot.root,
+        control_timestep=robot.control_timestep,
+        steps=plan.steps,
+        seed=plan.seed,
+        controller_sha256=sha256(controller) if controller else "",
+        model_sha256=sha256(model),
+    )
+    log.metadata(TRIAL, record.texts())
+    log.metadata(SOFTWARE, _software())
+    truths = {TRUTH: header.hidden, GAP: header.gap}
+    if known := {name: text for name, text in truths.items() if text is not None}:
+        log.metadata(HIDDEN, known)
+    log.attach(MODEL_FILE, model)
+    for name, data in robot.assets.items():
+        log.attach(name, data)
+    if controller:
+        log.attach(CONTROLLER_FILE, controller)
+    log.attach(SETTINGS_FILE, settings_json(header.settings))
+    if header.imported is not None:
+        log.metadata(IMPORT, header.imported.facts)
+        log.attach(MAPPING_FILE, header.imported.mapping.encode())
+    channel = log.channel(DESCRIPTION, DESCRIPTION_TYPE)
+    log.messages([channel], [(0, 0, 0, description(urdf(robot)))])
+
+
+def _software() -> dict[str, str]:
+    return {
+        "selfmodel": __version__,
+        "mujoco": mujoco.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "mcap": mcap.__version__,
+    }

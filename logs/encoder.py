@@ -8,7 +8,7 @@ from operator import itemgetter
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.messages.topics import TIMING, Part, frames_stride, topics, transforms
+from selfmodel.logs.topics import TIMING, Part, frames_stride, topics, transforms
 from selfmodel.logs.viewers import (
     Kinematics,
     body_names,

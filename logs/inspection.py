@@ -1,0 +1,146 @@
+"""Summary and verification of a log, without simulation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from selfmodel.files import file_digest
+from selfmodel.logs.contents import Messages, read_contents
+from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
+from selfmodel.logs.reader import TrialLog, interpret, read_log
+from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
+from selfmodel.robot.mjcf.untrusted import checked_model
+from selfmodel.trials.signals import SIGNALS, Signal
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """Summary of one topic of a log.
+
+    Attributes:
+        type: Type of the messages.
+        messages: Number of messages.
+        rate: Mean message rate, 1/s; 0 for a single message.
+    """
+
+    type: str
+    messages: int
+    rate: float
+
+
+@dataclass(frozen=True, eq=False)
+class Info:
+    """Summary of a log.
+
+    Attributes:
+        log: Trial, model and settings.
+        bytes: Size of the file, bytes.
+        topics: Topics by name.
+        attachments: Sizes of the attachments by name, bytes.
+        records: Names of the metadata records.
+        observed: Fraction of observed numbers by signal, in [0, 1].
+        driver: Description of the controller, or of its replacement by recorded commands.
+        source: Origin of an imported or salvaged trial; empty for other trials.
+        digest: SHA-256 of the file.
+    """
+
+    log: TrialLog
+    bytes: int
+    topics: Mapping[str, TopicInfo]
+    attachments: Mapping[str, int]
+    records: tuple[str, ...]
+    observed: Mapping[Signal, float]
+    driver: str
+    source: Mapping[str, str]
+    digest: str
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether the log contains the hidden faults of a simulated robot, for scoring."""
+        return HIDDEN in self.records
+
+
+def read_info(path: Path) -> Info:
+    """Returns the summary of a log, without the hidden faults of a simulated robot.
+
+    Args:
+        path: The log.
+
+    Raises:
+        LogError: The file is damaged, or not a trial log.
+        InputError: The file does not exist.
+    """
+    contents = read_contents(path)
+    log = interpret(path, contents)
+    behaviour = log.trial.behaviour
+    return Info(
+        log=log,
+        bytes=path.stat().st_size,
+        topics={name: _topic(messages) for name, messages in contents.topics.items()},
+        attachments={name: len(data) for name, data in contents.attachments.items()},
+        records=tuple(contents.metadata),
+        observed={
+            signal: float(np.mean(~np.isnan(behaviour[signal]))) if behaviour[signal].size else 1.0
+            for signal in SIGNALS
+        },
+        driver=log.trial.plan.controller.summary,
+        source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
+        digest=file_digest(path),
+    )
+
+
+def _topic(messages: Messages) -> TopicInfo:
+    times = [time for time, _ in messages.times]
+    span = (times[-1] - times[0]) * 1e-9 if len(times) > 1 else 0.0
+    return TopicInfo(messages.type, len(times), (len(times) - 1) / span if span else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """Result of a verification.
+
+    Attributes:
+        log: Content of the log.
+        model_loaded: Whether MuJoCo is installed and has loaded the model.
+        digest: SHA-256 of the file.
+    """
+
+    log: TrialLog
+    model_loaded: bool
+    digest: str
+
+
+def verify(path: Path, expected: str = "") -> Verified:
+    """Verifies a log.
+
+    Verified are the checks of ``read_log``; that the model names no other files; and, if MuJoCo is
+    installed, that the model loads and is of the robot of the messages.
+
+    Args:
+        path: The log.
+        expected: SHA-256 that the file must have, or "".
+
+    Raises:
+        LogError: A check failed.
+        InputError: The file does not exist.
+    """
+    log, digest = read_log(path), file_digest(path)
+    if expected not in ("", digest):
+        what = f"expected the file with the SHA-256 {expected}, this one has {digest}"
+        raise CorruptError(path, what, advice="get the expected log from its origin again")
+    try:
+        checked_model(log.mjcf, log.assets)
+    except ValueError as error:
+        raise SchemaMismatchError(path, str(error), good=GOOD) from error
+    return Verified(log, _loads(log), digest)
+
+
+def _loads(log: TrialLog) -> bool:
+    try:
+        from selfmodel.logs.robots import robot_of  # noqa: PLC0415  # it needs MuJoCo
+    except ImportError:
+        return False
+    robot_of(log)
+    return True

@@ -1,1 +1,0 @@
-"""Writing of a trial log while the trial runs."""

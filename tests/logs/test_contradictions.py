@@ -1,0 +1,260 @@
+"""Sound files whose content is no trial, or of an impossible one, are refused by name."""
+
+import io
+import struct
+import zipfile
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from typer.testing import CliRunner
+
+from selfmodel.cli.logs import app
+from selfmodel.logs import (
+    CorruptError,
+    IncompleteError,
+    LogError,
+    SchemaMismatchError,
+    UnsupportedError,
+    read_log,
+    reader,
+)
+from selfmodel.logs.contents import Contents, read_contents
+from selfmodel.logs.inspection import verify
+from selfmodel.logs.records import CONTROLLER_FILE, HIDDEN, MODEL_FILE, RESULT, SOFTWARE, TRIAL
+from selfmodel.logs.salvage import salvageable_steps
+from tests.logs.edits import Change, attach, holds, rewritten, says, without
+
+HALF_A_SECOND = 50 * 10**7
+
+
+def replaced(name: str, old: bytes, new: bytes) -> Change:
+    return holds(name, lambda data: data.replace(old, new))
+
+
+def at_half_a_second(change: Callable[[Message], Message | None]) -> Change:
+    def changed(record: McapRecord) -> McapRecord | None:
+        found = isinstance(record, Message) and record.log_time == HALF_A_SECOND
+        return change(record) if found else record
+
+    return changed
+
+
+def later(record: Message) -> Message:
+    record.log_time += 1
+    return record
+
+
+def stamped(record: Message) -> Message:
+    record.data = record.data[:4] + b"\1" + record.data[5:]  # a second later
+    return record
+
+
+def forged(record: McapRecord) -> McapRecord:
+    if isinstance(record, Metadata) and record.name == TRIAL:
+        return Metadata(name=TRIAL, metadata={**record.metadata, "seed": "8"})
+    return record
+
+
+def renamed(record: McapRecord) -> McapRecord:
+    if isinstance(record, Message):
+        record.data = record.data.replace(b"left_touch", b"left_torch")
+    return record
+
+
+def moved(record: McapRecord) -> McapRecord:
+    if isinstance(record, Channel) and record.topic == "/odom":
+        record.topic = "/odometry"
+    return record
+
+
+def twice(record: McapRecord) -> McapRecord:
+    if isinstance(record, Channel) and record.topic == "/tf":
+        record.topic = "/odom"
+    return record
+
+
+def retyped(record: McapRecord) -> McapRecord:
+    if isinstance(record, Schema) and record.name == "nav_msgs/msg/Odometry":
+        record.name = "nav_msgs/msg/Path"
+    return record
+
+
+def redefined(record: McapRecord) -> McapRecord:
+    if isinstance(record, Schema) and record.name == "nav_msgs/msg/Odometry":
+        record.data += b"float64 more\n"
+    return record
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "match"),
+    [
+        (without(Metadata, TRIAL), SchemaMismatchError, r"selfmodel\.trial"),
+        (without(Metadata, RESULT), IncompleteError, "did not finish; 625 messages"),
+        (says(TRIAL, format="3"), UnsupportedError, "'3'"),
+        (says(TRIAL, format="2"), SchemaMismatchError, "/timing"),
+        (says(TRIAL, stage="later"), SchemaMismatchError, "stage"),
+        (says(TRIAL, steps="many"), SchemaMismatchError, "many"),
+        (says(TRIAL, steps=str(10**15)), IncompleteError, "after 120 of 1000000000000000"),
+        (says(TRIAL, steps="9" * 5000), SchemaMismatchError, "steps"),
+        (says(TRIAL, name="x" * 10**7), SchemaMismatchError, "name"),
+        (says(TRIAL, control_timestep="0.02"), SchemaMismatchError, "times on /joint_states"),
+        *[
+            (says(TRIAL, control_timestep=step), SchemaMismatchError, "control_timestep")
+            for step in ("nan", "1e-300", "1e300", "-0.01", "0", "inf")
+        ],
+        *[
+            (says(TRIAL, seed=seed), SchemaMismatchError, r"selfmodel\.trial")
+            for seed in ("-1", str(2**63), "1.5", "nan", "9" * 900)
+        ],
+        (says(TRIAL, root="hip"), SchemaMismatchError, "on /odom: message 0"),
+        (says(RESULT, status="lost"), UnsupportedError, "'lost'"),
+        (says(RESULT, status="interrupted", steps="119"), CorruptError, "120 messages"),
+        (says(RESULT, steps="119"), IncompleteError, "after 119 of 120 steps"),
+        (says(RESULT, steps="-1"), IncompleteError, "after -1 of 120 steps"),
+        (says(RESULT, displacement="1.5"), CorruptError, r"1\.5 m"),
+        (says(RESULT, displacement="1e999"), CorruptError, "inf m"),
+        (without(Attachment, MODEL_FILE), SchemaMismatchError, r"model\.xml"),
+        (replaced(MODEL_FILE, b"0.6", b"0.7"), CorruptError, r"model\.xml"),
+        (replaced(CONTROLLER_FILE, b"<f8", b"<f4"), CorruptError, r"controller\.npz"),
+        (replaced("settings.json", b"steps", b"stops"), SchemaMismatchError, "'stops'"),
+        (at_half_a_second(later), SchemaMismatchError, "times on /joint_states"),
+        (at_half_a_second(stamped), SchemaMismatchError, "times on /joint_states"),
+        (at_half_a_second(lambda _: None), CorruptError, "119 messages on /joint_states"),
+        (forged, CorruptError, r"digest of the record selfmodel\.trial"),
+        (renamed, SchemaMismatchError, "controller"),
+        (moved, SchemaMismatchError, "/odom"),
+        (twice, CorruptError, "'/odom' twice"),
+        (retyped, SchemaMismatchError, "nav_msgs/msg/Odometry in cdr on /odom"),
+        (redefined, SchemaMismatchError, "definition of nav_msgs/msg/Odometry"),
+    ],
+)
+def test_a_log_that_contradicts_itself_is_refused_by_name(
+    log: Path, change: Change, error: type[LogError], match: str
+):
+    rewritten(log, lambda record: record)
+    read_log(log)  # rewriting alone harms nothing
+    rewritten(log, change)
+    with pytest.raises(error, match=match) as refusal:
+        read_log(log)
+    assert len(str(refusal.value)) < 4000
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(b"[" * 10**5, b'{"a":' * 10**5, b"null", b"\xff\xfe\xff", b'{"\\ud800": 1}'),
+        *(b'{"steps": -5}', b'{"steps": true}', b'{"steps": ' + b"9" * 5000 + b"}"),
+        *(b'{"mutation": NaN}', b'{"mutation": Infinity}', b'{"mutation": 1e400}'),
+    ],
+)
+def test_settings_that_are_none_are_refused(log: Path, data: bytes):
+    rewritten(log, holds("settings.json", lambda _: data))
+    with pytest.raises(LogError, match="an attachment"):
+        read_log(log)
+
+
+def archive(genome: bytes, hidden: int = 3, more: dict[str, bytes] | None = None) -> bytes:
+    """A controller's file with any bytes in the place of its weights."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, array in (
+            ("kind", np.array("network")),
+            ("sensors", np.array(["left_touch", "right_touch", "left_angle"])),
+            ("motors", np.array(["left_hip_x", "left_hip_y", "right_hip_x", "right_hip_y"])),
+            ("hidden", np.array(hidden)),
+        ):
+            member = io.BytesIO()
+            np.save(member, array)
+            packed.writestr(f"{name}.npy", member.getvalue())
+        packed.writestr("genome.npy", genome)
+        for name, data in (more or {}).items():
+            packed.writestr(name, data)
+    return file.getvalue()
+
+
+def weights(shape: str, kind: str = "<f8", data: bytes = b"") -> bytes:
+    header = f"{{'descr': {kind!r}, 'fortran_order': False, 'shape': {shape}}}".ljust(117) + "\n"
+    return b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + data
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (archive(weights("(10**12,)")), "expected a controller"),
+        (archive(weights("(1000000000000,)")), "does not fit its size"),
+        (archive(weights("(-1,)")), "expected a controller"),
+        (archive(weights("(1,)", "|O", b"cposix\nsystem\n.")), "does not fit its size"),
+        (archive(weights("(0,)"), hidden=10**9), "got a genome of shape"),
+        (archive(bytes(10**8)), "unpacks to more than"),
+        (archive(b"", more={"../../x.npy": b"x"}), r"it holds \.\./\.\./x\.npy"),
+        (b"PK\5\6" + bytes(18), "it holds nothing"),
+    ],
+)
+def test_a_controller_that_is_none_is_refused(log: Path, data: bytes, match: str):
+    attach(log, CONTROLLER_FILE, "controller_sha256", data)
+    with pytest.raises(LogError, match=match):
+        read_log(log)
+
+
+def test_verify_looks_into_the_model(log: Path):
+    attach(log, MODEL_FILE, "model_sha256", b'<mujoco><include file="/etc/passwd"/></mujoco>')
+    read_log(log)  # nothing loads it
+    with pytest.raises(LogError, match=r"<include> \('/etc/passwd'\)"):
+        verify(log)
+
+
+def test_verify_compares_the_digest_of_the_file(log: Path):
+    digest = verify(log).digest
+
+    assert verify(log, digest).model_loaded
+    with pytest.raises(CorruptError, match=f"{'0' * 64}.*{digest}"):
+        verify(log, "0" * 64)
+
+
+def test_the_hidden_record_may_say_anything_or_be_missing(log: Path):
+    before = read_log(log).trial.behaviour
+    for change in (says(HIDDEN, truth="no notation at all"), without(Metadata, HIDDEN)):
+        rewritten(log, change)
+        after = read_log(log).trial.behaviour
+        assert all(after[signal].tobytes() == before[signal].tobytes() for signal in after.signals)
+
+
+def test_the_hidden_record_does_not_reach_the_reader(log: Path, monkeypatch: pytest.MonkeyPatch):
+    reached = []
+
+    def watched(path: Path, unread: Collection[str]) -> Contents:
+        contents = read_contents(path, unread)
+        reached.append(HIDDEN in contents.metadata)
+        return contents
+
+    monkeypatch.setattr(reader, "read_contents", watched)
+    read_log(log)
+    assert reached == [False]
+
+
+def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
+    evil = "../../etc/\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
+    rewritten(log, says(TRIAL, robot=evil, name=evil))
+    more = [
+        Attachment(0, 0, evil, "x", b"x"),
+        Metadata(name=evil, metadata={}),
+        Channel(id=90, message_encoding="", metadata={}, schema_id=0, topic=evil),
+    ]
+    rewritten(log, says(SOFTWARE, **{evil: evil}), more=more)
+    assert read_log(log).trial.robot == evil
+    for command in ("info", "verify"):
+        result = CliRunner().invoke(app, [command, str(log)])
+        assert result.exit_code == 0
+        assert all(char.isprintable() or char == "\n" for char in result.output)
+    assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]
+
+
+def test_a_log_of_many_topics_is_read(log: Path):
+    channels = [Channel(k, f"/t{k}", "", {}, 0) for k in range(100, 5100)]
+    rewritten(log, lambda record: record, more=channels)
+
+    assert read_log(log).trial.behaviour.steps == 120
+    assert salvageable_steps(log) == 120
