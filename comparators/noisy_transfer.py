@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.comparators.observed import observed_signals
-from selfmodel.comparators.windows import padded_windows
+from selfmodel.comparators.sensor_series import observed_signals, padded_windows
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import ENSEMBLE_DEVIATION_FLOORS, Signal, comparable
@@ -107,10 +106,6 @@ class PreparedFeatures:
     request: Ensemble
     features: Mapping[Signal, TrialFeatures]
     weight: FloatArray
-
-    def distances(self, simulated: Behaviour) -> FloatArray:
-        """Returns the mean loss of the windows, ``(n,)``."""
-        return np.asarray(self.losses(simulated).mean(axis=1))
 
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each window with an observation, ``(n, windows)``."""

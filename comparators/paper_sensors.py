@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparators.bounded import bounded
-from selfmodel.comparators.sensor_series import PreparedSeries, SensorSeries
+from selfmodel.comparators.sensor_series import PreparedSeries, SensorSeries, geman_mcclure
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.trial import Trial
@@ -66,10 +65,6 @@ class PreparedPaperSensors:
     displacement: float
     request: ClosedLoop
 
-    def distances(self, simulated: Behaviour) -> FloatArray:
-        """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
-        return np.asarray(self.losses(simulated).mean(axis=1))
-
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each window, and of the displacement if the trial has one.
 
@@ -81,7 +76,7 @@ class PreparedPaperSensors:
             return windows
         pieces = windows.shape[1] + 1
         large = max(RELATIVE_ERROR * abs(self.displacement), MIN_ERROR)
-        end = bounded((forward_displacement(simulated) - self.displacement) / large)
+        end = geman_mcclure((forward_displacement(simulated) - self.displacement) / large)
         return np.column_stack(
             [
                 windows * ((1 - DISPLACEMENT_SHARE) * pieces / (pieces - 1)),

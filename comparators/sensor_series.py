@@ -1,14 +1,12 @@
 """Difference of sensor and motion time series over a whole trial."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.comparators.bounded import bounded
-from selfmodel.comparators.observed import observed_signals
-from selfmodel.comparators.windows import padded_windows
+from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SERIES_SPREAD_FLOORS, Signal, comparable
@@ -117,10 +115,6 @@ class PreparedSeries:
     weight: FloatArray
     relative_decay: FloatArray
 
-    def distances(self, simulated: Behaviour) -> FloatArray:
-        """Returns the distance of each simulation, ``(n,)``, from 0 to 1."""
-        return np.asarray(self.losses(simulated).mean(axis=1))
-
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each window, weighted so that their mean is the distance.
 
@@ -135,7 +129,7 @@ class PreparedSeries:
             values = comparable(signal, simulated[signal])
             for lag, rows in enumerate(lagged):
                 blocks = _block_sums(values[:, rows] - columns.logged, columns.observed)
-                terms = bounded(blocks / columns.scale).reshape(runs, windows, -1)
+                terms = geman_mcclure(blocks / columns.scale).reshape(runs, windows, -1)
                 loss[lag] += (terms * columns.share).sum(axis=2)
         return np.asarray(loss.min(axis=0) / self.weight * self.relative_decay)
 
@@ -166,6 +160,63 @@ def _spread(logged: FloatArray, observed: BoolArray, floor: float) -> FloatArray
     known = np.where(observed, logged, 0)
     centred = np.where(observed, logged - known.sum(axis=0) / count, 0)
     return np.asarray(np.maximum(np.sqrt((centred * centred).sum(axis=0) / count), floor))
+
+
+def observed_signals(
+    trial: Trial, signals: Iterable[Signal], comparator: str
+) -> tuple[Signal, ...]:
+    """Returns the signals with at least one finite value in the trial.
+
+    Args:
+        trial: The logged trial.
+        signals: The signals that the comparator can use.
+        comparator: Name of the comparator, for the error.
+
+    Raises:
+        TrialRefusedError: The trial has none of the signals.
+    """
+    wanted = tuple(signals)
+    found = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
+    if not found:
+        raise TrialRefusedError(
+            f"{trial.path}: {comparator} needs at least one of {', '.join(wanted)}, and the log "
+            f"has none of them",
+            "leave this log out, or give another comparator",
+        )
+    return found
+
+
+def padded_windows(
+    values: FloatArray | BoolArray, length: int, observed: BoolArray | None = None
+) -> FloatArray:
+    """Returns time series cut into windows, the last filled up with 0.
+
+    Args:
+        values: ``(..., steps, columns)``.
+        length: Steps of a window.
+        observed: Mask that broadcasts to ``values``; values outside of it may be NaN and become 0.
+
+    Returns:
+        ``(..., windows, length, columns)``.
+    """
+    *batch, steps, columns = values.shape
+    windows = -(-steps // length)
+    padded = np.zeros((*batch, windows * length, columns))
+    np.copyto(padded[..., :steps, :], values, where=True if observed is None else observed)
+    return padded.reshape(*batch, windows, length, columns)
+
+
+def geman_mcclure(residuals: FloatArray) -> FloatArray:
+    """Returns the Geman-McClure loss u² / (1 + u²), which no single outlier can dominate.
+
+    Source: Geman and McClure, "Statistical methods for tomographic image reconstruction", Bulletin
+    of the International Statistical Institute 52 (1987).
+
+    Args:
+        residuals: Residuals over the size that counts as large, any shape.
+    """
+    squared = residuals * residuals
+    return squared / (1 + squared)
 
 
 SENSOR_SERIES = SensorSeries()

@@ -10,7 +10,7 @@ import sys
 from gravity import GRAVITY
 from heading_comparator import HEADING
 
-from selfmodel.diagnosis.evidence import simulate
+from selfmodel.diagnosis.losses import simulate
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
@@ -27,7 +27,7 @@ broken = parse("break:front_left_knee", robot.anatomy)
 check_comparator(HEADING, trial, shown(prepared.request, trial))
 simulated = simulate(Simulator(robot, threads=2), prepared.request, trial, [INTACT, broken])
 check_comparator(HEADING, trial, simulated.behaviour)
-print(f"{HEADING.name}: {prepared.distances(simulated.behaviour)}")
+print(f"{HEADING.name}: {prepared.losses(simulated.behaviour).mean(axis=1)}")
 
 check_fault_kind(GRAVITY, robot)
 print(f"{GRAVITY.name}: {len(GRAVITY.candidates(robot.anatomy))} faults that may be proposed")

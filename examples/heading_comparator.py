@@ -3,8 +3,8 @@
 Usage, from this folder:
 selfmodel recover quadruped --case 2 --comparator heading_comparator:HEADING
 
-Its distance is a mean over the steps of the trial, so the prepared trial also has losses. Losses
-are optional and make a paired test between two hypotheses possible.
+It has a loss of each step of the trial, whose mean is the distance. Losses make a paired test
+between two hypotheses possible; a comparator of one number per trial has ``distances`` instead.
 """
 
 from dataclasses import dataclass
@@ -55,10 +55,6 @@ class PreparedHeading:
     observed: BoolArray
     logged: tuple[FloatArray, FloatArray]
     request: ClosedLoop = REQUEST
-
-    def distances(self, simulated: Behaviour) -> FloatArray:
-        """Returns the distance of each simulation, ``(n,)``, rad."""
-        return np.asarray(self.losses(simulated).mean(axis=1))
 
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each observed step, ``(n, steps)``, rad."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.serialization import diagnosis_from_dict
+from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind

@@ -97,8 +97,8 @@ class ScoreResult(Struct, frozen=True):
 class DiagnosisResult(Struct, frozen=True, kw_only=True):
     """A diagnosis, as in the result of a recovery and in the output of ``diagnose --json``.
 
-    ``diagnosis.serialization`` has the meaning of ``diagnosis``, and of all from ``verdict`` to
-    ``detectable``; ``Calibration.to_dict`` that of ``calibration``.
+    ``diagnosis.diagnosis.output_of`` has the meaning of ``diagnosis``, and of all from ``verdict``
+    to ``detectable``; ``Calibration.to_dict`` that of ``calibration``.
 
     Attributes:
         robot: Name of the robot.

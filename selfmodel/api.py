@@ -24,8 +24,8 @@ from selfmodel.arguments import (
     trials_of,
 )
 from selfmodel.controllers.controller import CommandSource, Controller, Design
+from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.comparator_choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -483,7 +483,9 @@ def set_up_diagnosis(
     count = thread_count(threads)
     fit = fitted(nominal, reference, count) if calibrate and reference else None
     simulator = Simulator(fit.robot if fit else nominal, count)
-    search = DiagnosticSearch(simulator, chosen.comparator, settings, kinds, intact=reference)
+    search = DiagnosticSearch(
+        simulator, chosen.comparator, settings, kinds, healthy_trials=reference
+    )
     drawn = first.plan.seed if seed is None else seed
     return LogDiagnosis(tuple(to_explain), tuple(reference), chosen, fit, search, drawn)
 

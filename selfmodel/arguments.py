@@ -9,12 +9,8 @@ from selfmodel import plugins
 from selfmodel.comparators import PREFERENCE
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.choice import ComparatorChoice, best_comparator, given_comparator
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.comparator_choice import (
-    ComparatorChoice,
-    best_comparator,
-    given_comparator,
-)
 from selfmodel.errors import InputError
 from selfmodel.faults import KINDS, FaultKind
 from selfmodel.faults.hypothesis import Hypothesis

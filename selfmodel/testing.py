@@ -1,6 +1,6 @@
 """Contract checks of plug-ins: of a comparator, and of a fault kind."""
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -8,12 +8,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
-from selfmodel.diagnosis.comparator import (
-    Comparator,
-    HingewiseTrial,
-    PiecewiseTrial,
-    PreparedTrial,
-)
+from selfmodel.diagnosis.comparator import Comparator, Losses, PiecewiseTrial, PreparedTrial
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -37,7 +32,7 @@ DEPENDS_ON_BATCH = (
 def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour) -> None:
     """Checks that a comparator fulfils ``Comparator``, and its trials ``PreparedTrial``.
 
-    If the prepared trial has losses, it is checked as a ``PiecewiseTrial``.
+    If the prepared trial has losses, they and their parts are checked too.
 
     Example:
         >>> import selfmodel
@@ -68,40 +63,67 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
     logged = _copied(trial.behaviour)
     prepared, again = comparator.prepare(trial), comparator.prepare(trial)
     for one in (prepared, again):
-        if not isinstance(one, PreparedTrial):
+        if not isinstance(one, PreparedTrial | PiecewiseTrial):
             raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
-                f"prepare must return an object with request and distances, got {one!r}"
+                f"prepare must return an object with request and losses or distances, got {one!r}"
             )
     _check_request(prepared.request, trial)
     if not _is_same_request(prepared.request, again.request):
         raise ValueError("the same trial must be prepared with the same request")
     requested = _as_requested(prepared.request, trial, simulated)
     before = _copied(requested)
-    runs = len(requested[prepared.request.record[0]])
-    distances = _checked_distances(prepared, requested, runs)
-    _check_pure(
-        ("distances", "the distance"), distances, requested, prepared.distances, again.distances
-    )
-    if isinstance(prepared, PiecewiseTrial):
-        _check_pieces(prepared, again, requested, distances)
-    if isinstance(prepared, HingewiseTrial):
-        _check_hinges(prepared, requested)
+    if isinstance(prepared, PiecewiseTrial) != isinstance(again, PiecewiseTrial):
+        raise ValueError("a trial that is prepared again must have losses again")
+    _check_comparison(prepared, again, requested)
     if not _is_same(before, requested):
         raise ValueError("a comparator must not change its arguments")
     if not _is_same(logged, trial.behaviour):
         raise ValueError("a comparator must not change the trial")
 
 
-def _check_hinges(prepared: HingewiseTrial, simulated: Behaviour) -> None:
-    losses = np.asarray(prepared.losses_by_hinge(simulated))
-    expected = (*np.shape(prepared.losses(simulated)), len(simulated.names.hinges))
-    if losses.shape != expected:
+def _check_comparison(
+    prepared: PreparedTrial | PiecewiseTrial,
+    again: PreparedTrial | PiecewiseTrial,
+    simulated: Behaviour,
+) -> None:
+    """Checks the numbers of a comparison, and that they depend on the trial and each run alone."""
+    runs = len(simulated[prepared.request.record[0]])
+    parts = _parts(prepared, simulated)
+    for what, values in parts.items():
+        _check_numbers(what, values, runs)
+    for other in (prepared, again):
+        for what, values in _parts(other, simulated).items():
+            if not np.array_equal(values, parts[what], equal_nan=True):
+                raise ValueError(f"the same trial and arguments must give the same {what}")
+    for run in range(runs):
+        for what, values in _parts(prepared, _only(simulated, run)).items():
+            if not np.array_equal(values, parts[what][run : run + 1], equal_nan=True):
+                raise ValueError(f"the {what} of run {run} {DEPENDS_ON_BATCH}")
+
+
+def _parts(prepared: PreparedTrial | PiecewiseTrial, simulated: Behaviour) -> dict[str, FloatArray]:
+    """Returns everything that a comparison returns, by its name."""
+    if not isinstance(prepared, PiecewiseTrial):
+        return {"distances": np.asarray(prepared.distances(simulated))}
+    found = prepared.losses(simulated)
+    losses = found if isinstance(found, Losses) else Losses(np.asarray(found))
+    parts = {f"losses of {name}": part for name, part in losses.by_signal.items()}
+    by_hinge = {} if losses.by_hinge is None else {"losses of hinges": losses.by_hinge}
+    return {"losses": losses.total, **parts, **by_hinge}
+
+
+def _check_numbers(what: str, values: FloatArray, runs: int) -> None:
+    dimensions = {"distances": 1, "losses of hinges": 3}.get(what, 2)
+    if values.ndim != dimensions or len(values) != runs or 0 in values.shape[1:2]:
+        shape = ("n", "1 or more pieces", "hinges")[:dimensions]
         raise ValueError(
-            f"the losses of hinges must have shape (n, pieces, hinges) = {expected}, got "
-            f"{losses.shape}"
+            f"{what} must have shape ({', '.join(shape)}) with n = {runs}, got {values.shape}"
         )
-    if np.isinf(losses).any() or (losses < 0).any():
-        raise ValueError("the losses of hinges must be finite and at least 0, or NaN if unknown")
+    unknown = np.isnan(values) if what == "losses of hinges" else np.zeros_like(values, dtype=bool)
+    if not ((np.isfinite(values) & (values >= 0)) | unknown).all():
+        raise ValueError(f"{what} must be finite and at least 0, got {values}")
+    if (values[0][~unknown[0]] != 0).any():
+        raise ValueError(f"{what} of a run that reproduces the trial must be 0, got {values[0]}")
 
 
 def shown(request: Request, trial: Trial) -> Behaviour:
@@ -225,14 +247,13 @@ def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behav
                 f"for a request of {type(request).__name__}, {signal} must have shape "
                 f"(n, {', '.join(map(str, lengths))}, width), got {simulated[signal].shape}"
             )
-    return Behaviour(
-        simulated.names, simulated.time, {signal: simulated[signal] for signal in request.record}
-    )
+    signals = {signal: simulated[signal] for signal in request.record}
+    return replace(simulated, signals=signals)
 
 
 def _copied(behaviour: Behaviour) -> Behaviour:
     signals = {signal: values.copy() for signal, values in behaviour.signals.items()}
-    return Behaviour(behaviour.names, behaviour.time, signals)
+    return replace(behaviour, signals=signals)
 
 
 def _is_same(one: Behaviour, other: Behaviour) -> bool:
@@ -243,65 +264,12 @@ def _is_same(one: Behaviour, other: Behaviour) -> bool:
 
 
 def _only(simulated: Behaviour, run: int) -> Behaviour:
-    return Behaviour(
-        simulated.names,
-        simulated.time,
-        {signal: values[run : run + 1] for signal, values in simulated.signals.items()},
+    return replace(
+        simulated,
+        signals={signal: values[run : run + 1] for signal, values in simulated.signals.items()},
+        welded=None if simulated.welded is None else simulated.welded[run : run + 1],
+        detached=None if simulated.detached is None else simulated.detached[run : run + 1],
     )
-
-
-def _checked_distances(prepared: PreparedTrial, simulated: Behaviour, runs: int) -> FloatArray:
-    distances = prepared.distances(simulated)
-    if distances.shape != (runs,):
-        raise ValueError(f"expected a distance for each of {runs} runs, got {distances.shape}")
-    if not np.all(np.isfinite(distances)) or np.any(distances < 0):
-        raise ValueError(f"distances must be finite and at least 0, got {distances}")
-    if distances[0] != 0:
-        raise ValueError(
-            f"the distance of a run that reproduces the trial must be 0, got {distances[0]}"
-        )
-    return distances
-
-
-def _check_pure(
-    words: tuple[str, str],
-    expected: FloatArray,
-    simulated: Behaviour,
-    compare: Callable[[Behaviour], FloatArray],
-    compare_again: Callable[[Behaviour], FloatArray],
-) -> None:
-    """Checks that a comparison depends on the trial and each run alone."""
-    plural, of_one_run = words
-    if not np.array_equal(expected, compare(simulated)):
-        raise ValueError(f"the same arguments must give the same {plural}")
-    if not np.array_equal(expected, compare_again(simulated)):
-        raise ValueError(f"a trial that is prepared again must give the same {plural}")
-    for run in range(len(expected)):
-        if not np.array_equal(compare(_only(simulated, run)), expected[run : run + 1]):
-            raise ValueError(f"{of_one_run} of run {run} {DEPENDS_ON_BATCH}")
-
-
-def _check_pieces(
-    prepared: PiecewiseTrial, again: PreparedTrial, simulated: Behaviour, distances: FloatArray
-) -> None:
-    if not isinstance(again, PiecewiseTrial):
-        raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
-            "a trial that is prepared again must have losses again"
-        )
-    losses = prepared.losses(simulated)
-    if losses.ndim != 2 or len(losses) != len(distances) or not losses.shape[1]:
-        raise ValueError(
-            f"expected losses of shape (n, pieces) = ({len(distances)}, 1 or more), got "
-            f"{losses.shape}"
-        )
-    if not np.all(np.isfinite(losses)) or np.any(losses < 0):
-        raise ValueError("losses must be finite and at least 0")
-    if not np.allclose(losses.mean(axis=1), distances, rtol=1e-12, atol=0):
-        raise ValueError(
-            f"the mean of the losses must be the distance, got {losses.mean(axis=1)} for "
-            f"{distances}"
-        )
-    _check_pure(("losses", "the losses"), losses, simulated, prepared.losses, again.losses)
 
 
 BATCH_STEPS = 20

@@ -12,7 +12,7 @@ import pytest
 import selfmodel
 from selfmodel import api
 from selfmodel.comparators import DEFAULT, FORWARD_DISPLACEMENT
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.errors import InputError
 from selfmodel.faults import BROKEN, JAMMED
 from selfmodel.trials.trial import Trial

@@ -13,8 +13,8 @@ from benchmarks.go2.sample import (
 )
 from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.verdicts.significance import is_better
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import BROKEN, JAMMED, WEAK_MOTOR
@@ -80,7 +80,7 @@ def rms_errors(nominal: Robot, fitted: Robot) -> dict[str, Any]:
 
 def better_hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
     """Returns the weak-motor hypotheses that predict the healthy robot better than ``INTACT``."""
-    evidence = Evidence(Simulator(robot, threads), COMPARATOR)
+    evidence = LossTable(Simulator(robot, threads), COMPARATOR)
     trial = trial_of(robot, *positions_and_commands(robot), FITTED, ALL)
     hypotheses = [
         Hypothesis((Fault(WEAK_MOTOR, joint.name, torque),))
@@ -107,7 +107,7 @@ def verdict_of(
     healthy = trial_of(robot, positions, commands, *healthy_part)
     settings = Settings(generations=5).scaled(40)
     search = DiagnosticSearch(
-        Simulator(robot, threads), COMPARATOR, settings, KINDS, intact=[healthy]
+        Simulator(robot, threads), COMPARATOR, settings, KINDS, healthy_trials=[healthy]
     )
     return search([trial], [], np.random.default_rng(0), lambda _: None).to_dict()
 
@@ -156,9 +156,9 @@ def injected_faults(
             damaged = with_fault(whole, robot, positions, commands, fault)
             trial = trial_of(robot, damaged.behaviour["joint_positions"], commands, *part)
             simulator = Simulator(robot, threads)
-            rough = Evidence(simulator, COMPARATOR.surrogate).losses(singles, [trial])
+            rough = LossTable(simulator, COMPARATOR.surrogate).losses(singles, [trial])
             few = [singles[i] for i in np.argsort(rough.mean(axis=1), kind="stable")[:SHORTLIST]]
-            losses = Evidence(simulator, COMPARATOR).losses([INTACT, *few], [trial])
+            losses = LossTable(simulator, COMPARATOR).losses([INTACT, *few], [trial])
             best = int(np.argmin(losses[1:].mean(axis=1)))
             significant = is_better(losses[1 + best], losses[0])
             rows.append(

@@ -1,5 +1,6 @@
 """``selfmodel diagnose``: hypotheses ranked by how well they predict logged trials."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -24,14 +25,14 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.ranking import ranking_table
 from selfmodel.cli.output.tables import print_tables
-from selfmodel.diagnosis.sentences import (
-    confidence_sentence,
+from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
+from selfmodel.diagnosis.direct_evidence import DirectEvidence, direct_evidence
+from selfmodel.diagnosis.text import (
     detectable_sentences,
     evidence_sentences,
     fit_sentence,
+    verdict_sentences,
 )
-from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
-from selfmodel.diagnosis.verdicts.direct_evidence import direct_evidence
 from selfmodel.files import file_digest
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
@@ -70,6 +71,9 @@ def diagnose(
         threads=threads,
     )
     found, diagnosis = made.inputs, made.diagnosis
+    evidence = direct_evidence(
+        diagnosis.explained(found.damaged), made.robot.anatomy, trial_names(found.damaged)
+    )
     result = LogsResult(
         robot=made.robot.name,
         model=self_model_digest(made.robot),
@@ -83,14 +87,8 @@ def diagnose(
         intact=tuple(trial.path for trial in found.healthy),
         files={str(path): file_digest(path) for path in files},
         calibration=found.calibration.to_dict() if found.calibration else None,
-        diagnosis=ranking_to_list(diagnosis.ranked),
-        **confidence_to_dict(diagnosis),
-        evidence=[
-            one.to_dict()
-            for one in direct_evidence(
-                diagnosis.explained(found.damaged), made.robot.anatomy, trial_names(found.damaged)
-            )
-        ],
+        **output_of(diagnosis),
+        evidence=to_json(evidence),
         evaluations=found.search.evaluations,
         distinct_hypotheses=found.search.distinct_hypotheses,
         seconds=perf_counter() - start,
@@ -98,19 +96,21 @@ def diagnose(
     if as_json:
         print_json(values_of(result))
     else:
-        _print(values_of(result))
+        _print(values_of(result), diagnosis, evidence)
 
 
-def _print(result: dict[str, Any]) -> None:
+def _print(
+    result: dict[str, Any], diagnosis: Diagnosis, evidence: Sequence[DirectEvidence]
+) -> None:
     print_tables(ranking_table(result["diagnosis"]))
     print_lines(
         f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
         f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
         f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
         f"Comparator {result['comparator']}: {result['comparator_reason']}.",
-        confidence_sentence(result),
-        fit_sentence(result),
-        *detectable_sentences(result),
-        *evidence_sentences(result),
+        verdict_sentences(diagnosis),
+        fit_sentence(diagnosis),
+        *detectable_sentences(diagnosis),
+        *evidence_sentences(evidence),
         *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
     )

@@ -12,7 +12,7 @@ from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_notes
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.comparator_choice import ComparatorChoice
+from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs import TrialLog

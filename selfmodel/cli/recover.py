@@ -180,7 +180,7 @@ def recover(
         if as_json:
             print_json(values_of(result))
         else:
-            print_report(values_of(result), experiment.folder)
+            print_report(values_of(result), outcome.recovery.diagnosis, experiment.folder)
     if report:
         subject = subject_of_run(experiment.folder, experiment.threads, comparator, considered)
         replace_file(experiment.folder / REPORT, html_of(report_of(subject)))

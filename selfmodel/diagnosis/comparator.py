@@ -1,6 +1,7 @@
-"""Comparator interface: distances between simulated behaviour and a logged trial."""
+"""Comparator interface: losses of simulated behaviour against a logged trial."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from selfmodel.arrays import FloatArray, IndexArray
@@ -10,117 +11,12 @@ from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial
 
 
-class TrialRefusedError(InputError):
-    """A comparator cannot judge a trial, which lacks signals or steps.
-
-    Attributes:
-        reason: The trial, the requirement of the comparator and the content of the trial.
-
-    Args:
-        reason: As the attribute.
-        remedy: Advice, after a colon in the message.
-    """
-
-    def __init__(self, reason: str, remedy: str = "") -> None:
-        super().__init__(f"{reason}: {remedy}" if remedy else reason)
-        self.reason = reason
-
-
-@runtime_checkable
-class PreparedTrial(Protocol):
-    """A logged trial prepared for comparison, made by ``Comparator.prepare``.
-
-    It contains everything that depends on the trial and not on a hypothesis, and is never changed
-    after ``prepare``.
-    """
-
-    @property
-    def request(self) -> Request:
-        """The simulation that a comparison with the trial requires."""
-        ...
-
-    def distances(self, simulated: Behaviour) -> FloatArray:
-        """Returns the distance of each simulation from the trial.
-
-        The result depends on the prepared trial and the argument alone; neither is changed.
-
-        Args:
-            simulated: The requested signals, with a leading axis of ``n`` hypotheses.
-
-        Returns:
-            ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
-            that reproduces the trial, as ``selfmodel.testing.shown`` returns.
-        """
-        ...
-
-
-@runtime_checkable
-class PiecewiseTrial(PreparedTrial, Protocol):
-    """A prepared trial whose distance is a mean of losses: of segments, windows or steps.
-
-    The losses make a paired test possible: whether one hypothesis is *significantly* closer to
-    the trial than another. With a single distance per trial there is no such test.
-    """
-
-    def losses(self, simulated: Behaviour) -> FloatArray:
-        """Returns the loss of each segment, window or step of the trial.
-
-        Args:
-            simulated: As for ``distances``.
-
-        Returns:
-            ``(n, pieces)`` finite numbers of at least 0; ``distances`` is their mean over the
-            pieces. The pieces and their order are the same for every hypothesis.
-        """
-        ...
-
-
-@runtime_checkable
-class TimedTrial(PiecewiseTrial, Protocol):
-    """A prepared trial whose pieces have times, so that a change in time can be found."""
-
-    @property
-    def piece_steps(self) -> IndexArray:
-        """First and last control step of each piece, ``(pieces, 2)``, in increasing order."""
-        ...
-
-
-@runtime_checkable
-class LocatedTrial(PiecewiseTrial, Protocol):
-    """A prepared trial whose losses are sums over signals."""
-
-    def losses_by_signal(self, simulated: Behaviour) -> Mapping[str, FloatArray]:
-        """Returns the part of each signal in the losses, ``(n, pieces)`` each.
-
-        Args:
-            simulated: As for ``distances``.
-        """
-        ...
-
-
-@runtime_checkable
-class HingewiseTrial(PiecewiseTrial, Protocol):
-    """A prepared trial that predicts the motion of single hinges."""
-
-    def losses_by_hinge(self, simulated: Behaviour) -> FloatArray:
-        """Returns the loss of each hinge on its own, ``(n, pieces, hinges)``.
-
-        These losses are used for faults of single joints, in addition to ``losses``. The hinges are
-        in the order of the log's joint positions. A loss is NaN where the log contains no evidence
-        on the hinge; all others are at least 0, and finite.
-
-        Args:
-            simulated: As for ``distances``.
-        """
-        ...
-
-
 @runtime_checkable
 class Comparator(Protocol):
     """A distance between simulated behaviour and a logged trial.
 
     A plug-in is an object with these members; no base class is required.
-    ``selfmodel.testing.check_comparator`` tests conformance.
+    ``selfmodel.check_comparator`` tests conformance.
     """
 
     @property
@@ -128,8 +24,8 @@ class Comparator(Protocol):
         """The name on the command line and in results."""
         ...
 
-    def prepare(self, trial: Trial) -> PreparedTrial:
-        """Returns the trial prepared for comparison: a ``PreparedTrial`` or ``PiecewiseTrial``.
+    def prepare(self, trial: Trial) -> "PreparedTrial | PiecewiseTrial":
+        """Returns the trial prepared for comparison.
 
         The result depends on the trial alone.
 
@@ -150,6 +46,105 @@ class ComparatorWithSurrogate(Comparator, Protocol):
         ...
 
 
+@runtime_checkable
+class PreparedTrial(Protocol):
+    """A logged trial prepared for comparison, with one distance per hypothesis.
+
+    It contains everything that depends on the trial and not on a hypothesis, and is never changed
+    after ``Comparator.prepare``.
+    """
+
+    @property
+    def request(self) -> Request:
+        """The simulation that a comparison with the trial requires."""
+        ...
+
+    def distances(self, simulated: Behaviour) -> FloatArray:
+        """Returns the distance of each simulation from the trial.
+
+        The result depends on the prepared trial and the argument alone; neither is changed.
+
+        Args:
+            simulated: The requested signals, with a leading axis of ``n`` hypotheses, and the
+                hinges that each hypothesis fixes; see ``Behaviour``.
+
+        Returns:
+            ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
+            that reproduces the trial, as ``selfmodel.diagnosis.shown`` returns.
+        """
+        ...
+
+
+@runtime_checkable
+class PiecewiseTrial(Protocol):
+    """A prepared trial with losses of segments, windows or steps, whose mean is the distance.
+
+    The losses make a paired test possible: whether one hypothesis is *significantly* closer to
+    the trial than another. With a single distance per trial there is no such test.
+    """
+
+    @property
+    def request(self) -> Request:
+        """The simulation that a comparison with the trial requires."""
+        ...
+
+    def losses(self, simulated: Behaviour) -> "FloatArray | Losses":
+        """Returns the loss of each segment, window or step of the trial.
+
+        Args:
+            simulated: As for ``PreparedTrial.distances``.
+
+        Returns:
+            ``(n, pieces)`` finite numbers of at least 0, and 0 for a simulation that reproduces the
+            trial. The pieces and their order are the same for every hypothesis.
+        """
+        ...
+
+
+@runtime_checkable
+class TimedTrial(PiecewiseTrial, Protocol):
+    """A prepared trial whose pieces have times, so that a change in time can be found."""
+
+    @property
+    def piece_steps(self) -> IndexArray:
+        """First and last control step of each piece, ``(pieces, 2)``, in increasing order."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Losses:
+    """Losses of simulations of a trial, with their parts.
+
+    Attributes:
+        total: Loss of each segment, window or step, ``(n, pieces)``.
+        by_signal: Part of each signal in the total, ``(n, pieces)`` each; empty if the losses are
+            no sums over signals.
+        by_hinge: Loss of each hinge on its own, ``(n, pieces, hinges)``, in the order of the log's
+            joint positions; no part of the total. It decides on faults of single joints. NaN
+            without evidence on the hinge. None if no single hinges are predicted.
+    """
+
+    total: FloatArray
+    by_signal: Mapping[str, FloatArray] = field(default_factory=dict)
+    by_hinge: FloatArray | None = None
+
+
+class TrialRefusedError(InputError):
+    """A comparator cannot judge a trial, which lacks signals or steps.
+
+    Attributes:
+        reason: The trial, the requirement of the comparator and the content of the trial.
+
+    Args:
+        reason: As the attribute.
+        remedy: Advice, after a colon in the message.
+    """
+
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__(f"{reason}: {remedy}" if remedy else reason)
+        self.reason = reason
+
+
 def as_comparator(found: object, name: str) -> Comparator:
     """Returns an object as a comparator.
 
@@ -158,17 +153,10 @@ def as_comparator(found: object, name: str) -> Comparator:
         name: The name that the user gave, for the error.
 
     Raises:
-        InputError: The object is no comparator, or is one of selfmodel 0.1.
+        InputError: The object is no comparator.
     """
-    if not isinstance(found, type):
-        if isinstance(found, Comparator):
-            return found
-        if hasattr(found, "request") and hasattr(found, "distances"):
-            raise InputError(
-                f"{name!r} is a comparator of selfmodel 0.1: give it a method prepare(trial) that "
-                f"returns an object with .request and .distances(simulated), both without the "
-                f"argument trial, and .losses(simulated) if it had losses"
-            )
+    if isinstance(found, Comparator) and not isinstance(found, type):
+        return found
     raise InputError(
         f"{name!r} is no comparator: expected an object, not a class, with the members of "
         f"selfmodel.diagnosis.comparator.Comparator, got {found!r}"

@@ -1,55 +1,53 @@
-"""The diagnostic search: an EA over hypotheses, local refinement, and the verdict."""
+"""The diagnosis of trials: diagnostic EA, local refinement, change in time, and verdict."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.change import best_split, change_at, is_change
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.judgement import by_distance, judged, ranked_by_distance
-from selfmodel.diagnosis.loss_functions import Losses, LossFunctions
-from selfmodel.diagnosis.question import Question, question_of
-from selfmodel.diagnosis.search.joint_faults import with_joint_faults
-from selfmodel.diagnosis.search.refine import refined
-from selfmodel.diagnosis.search.search_cost import SearchSize
-from selfmodel.diagnosis.search.surrogate import Surrogate, own_surrogates, surrogate_of
-from selfmodel.diagnosis.verdicts.change_point import Change, best_split, change_at, is_change
-from selfmodel.diagnosis.verdicts.significance import MIN_Z, excess_over_healthy
-from selfmodel.diagnosis.verdicts.unsearched import unsearched_space
-from selfmodel.evolution import Evolution, GenerationCallback, evolve
+from selfmodel.diagnosis.diagnosis import Change, Diagnosis
+from selfmodel.diagnosis.joints import with_joint_faults
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.problem import Parts, Problem
+from selfmodel.diagnosis.search import LocalSearch, evolved
+from selfmodel.diagnosis.significance import MIN_Z, excess_over_healthy
+from selfmodel.diagnosis.verdict import judged, ranked_by_distance
+from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPart, trial_names
+from selfmodel.trials.trial import Trial, trial_names
 
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
-
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator after a change that a search needs."""
 
 
 class DiagnosticSearch:
-    """Evolves hypotheses against logged trials; every distance is cached.
+    """Diagnoses logged trials; every loss is kept for the next diagnosis.
 
-    Fitness is minus the sum of the distances over all trials. Source: the paper, section III. For
-    a comparator with losses per segment or window, the best hypotheses are refined; see ``refine``.
+    For a comparator with losses per segment or window, the best hypotheses of the EA are refined;
+    see ``search``. For another, the ranking is that of the EA.
 
     Args:
         simulator: The self-model.
         comparator: Distance between simulations and a trial.
         settings: Parameters of the EA.
         kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
-        intact: Trials of the healthy robot, which measure the loss of a correct model; without
-            any, no verdict is ``unexplained``.
+        healthy_trials: Trials of the healthy robot, which measure the loss of a correct model;
+            without any, no verdict is ``unexplained``.
+
+    Attributes:
+        losses: Losses of hypotheses on the trials.
+        evaluations: Evaluations by the EA, over all diagnoses so far.
 
     Raises:
         InputError: No kind applies to the robot, or a kind is not searchable.
@@ -62,14 +60,13 @@ class DiagnosticSearch:
         settings: Settings,
         kinds: Sequence[FaultKind] = PAPER_KINDS,
         *,
-        intact: Sequence[Trial] = (),
+        healthy_trials: Sequence[Trial] = (),
     ) -> None:
         self._settings = settings
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
-        self._intact = tuple(intact)
-        self.evidence = Evidence(simulator, comparator)
-        self._own_surrogates = own_surrogates(comparator, simulator)
+        self._healthy_trials = tuple(healthy_trials)
         self._proposed: set[Hypothesis] = set()
+        self.losses = LossTable(simulator, comparator)
         self.evaluations = 0
 
     def __call__(
@@ -87,28 +84,25 @@ class DiagnosticSearch:
             rng: Source of all random numbers.
             on_generation: Callback, called after each generation.
         """
-        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
-        found = self._evolved(surrogate, seeds, rng, on_generation)
-        names = trial_names(trials)
-        question = self._question(trials, names, surrogate.losses)
-        if not self.evidence.is_piecewise(trials):
-            return ranked_by_distance(found, question)
-        best, compared = self._refined(found[:REFINEMENT_STARTS], question)
-        change = self._change(best, found, trials, question)
-        if change is None:
-            return judged(best, compared, question)
-        rest = partial(surrogate.evidence.losses, trials=change.since(surrogate.trials))
-        if rest([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
-            return judged(best, compared, question)
-        change = self._with_refined_before(change, found, trials, surrogate)
-        healthy = change.until(trials) if change.before == INTACT else []
-        later = self._question(change.since(trials), names, rest, healthy)
-        after, compared_later = self._refined([change.after, *found[:REFINEMENT_STARTS]], later)
-        if after == change.before:
-            return judged(best, compared, question)
-        diagnosis = judged(after, compared_later, later)
-        dated = self._dated(change, diagnosis.best, trials)
-        return dataclasses.replace(diagnosis, change=dated, trials=len(trials))
+        surrogate = self.losses.surrogate(trials)
+        found, evaluations = evolved(
+            partial(surrogate[0].distances, trials=surrogate[1]),
+            self._space,
+            self._settings,
+            seeds,
+            rng,
+            on_generation=on_generation,
+        )
+        self.evaluations += evaluations
+        self._proposed.update(found)
+        problem = self._problem(trials, trials, surrogate)
+        if not self.losses.is_piecewise(trials):
+            return ranked_by_distance(found, problem)
+        starts = found[:REFINEMENT_STARTS]
+        best, compared = self._refined(starts, problem)
+        return self._after_change(best, starts, trials, problem, surrogate) or judged(
+            best, compared, problem
+        )
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Checks that the comparator accepts all trials, before any search.
@@ -117,171 +111,138 @@ class DiagnosticSearch:
             InputError: The comparator rejects a trial; the message contains every such trial and
                 the reason.
         """
-        self.evidence.check([*self._intact, *trials])
-        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
-        surrogate.evidence.check(surrogate.trials)
-
-    def simulated_steps(self, trials: Sequence[Trial]) -> int:
-        """Returns the estimated number of control steps that a diagnosis of some trials simulates.
-
-        Args:
-            trials: Trials that the comparator accepts; see ``check``.
-        """
-        surrogate = surrogate_of(self.evidence, self._own_surrogates, trials)
-        return SearchSize(
-            settings=self._settings,
-            candidates=len(self._space.coarse_candidates),
-            unsearched=len(unsearched_space(self._space).coarse_candidates),
-            surrogate_steps=surrogate.evidence.steps_per_hypothesis(surrogate.trials),
-            is_refined=self.evidence.is_piecewise(trials),
-            uses_segments=self.evidence.uses_segments(trials),
-            has_healthy=bool(self._intact),
-        ).simulated_steps
+        self.losses.check([*self._healthy_trials, *trials])
+        cheaper, its_trials = self.losses.surrogate(trials)
+        cheaper.check(its_trials)
 
     @property
     def distinct_hypotheses(self) -> int:
         """Number of distinct hypotheses that were proposed, by all searches so far."""
         return len(self._proposed)
 
-    def _evolved(
+    def _problem(
         self,
-        surrogate: Surrogate,
-        seeds: Sequence[Hypothesis],
-        rng: np.random.Generator,
-        on_generation: GenerationCallback,
-    ) -> list[Hypothesis]:
-        """The hypotheses that the EA evaluated, smallest distance first."""
-        genes = self._settings.genes
-        totals: dict[Hypothesis, float] = {}
-
-        def fitness(genomes: FloatArray) -> FloatArray:
-            hypotheses = [self._space.decode(genome) for genome in genomes]
-            distances = surrogate.distances(hypotheses)
-            totals.update(zip(hypotheses, map(float, distances), strict=True))
-            return 0.0 - distances  # not -distances: a perfect fitness is 0, not -0
-
-        search = Evolution(
-            genes * GENE_VALUES,
-            np.random.Generator.random,
-            self._settings,
-            rng,
-            [self._space.encode(hypothesis, genes) for hypothesis in seeds],
-        )
-        evolve(search, fitness, on_generation)
-        self.evaluations += search.evaluations
-        self._proposed |= totals.keys()
-        return by_distance(totals)
-
-    def _question(
-        self,
-        trials: Sequence[Trial | TrialPart],
-        names: Mapping[str, str],
-        surrogate: Losses,
-        earlier: Sequence[Trial | TrialPart] = (),
-    ) -> Question:
-        """Returns the question of the hypothesis that explains some trials, or parts of them.
+        trials: Sequence[Trial],
+        parts: Parts,
+        surrogate: tuple[LossTable, Parts],
+        earlier: Parts = (),
+    ) -> Problem:
+        """Returns the problem of some trials, or parts of them.
 
         Args:
-            trials: Trials to explain, or parts of them.
-            names: Names of the trials of the whole diagnosis, by path.
-            surrogate: Losses of the surrogate comparator on these.
-            earlier: Trials, or parts of them, of the robot before it changed: the healthy reference
-                if there are no trials of the healthy robot.
+            trials: All trials of the diagnosis.
+            parts: Trials to explain, or parts of them.
+            surrogate: Losses of the surrogate comparator, and its trials.
+            earlier: Parts of the trials before the robot changed: the healthy reference if there
+                are no trials of the healthy robot.
         """
-        return question_of(
-            self.evidence,
+        return Problem(
+            self.losses,
             self._space,
-            trials,
-            names=names,
-            intact=self._intact or earlier,
+            parts,
             surrogate=surrogate,
-            kept=self._settings.kept,
+            healthy_trials=self._healthy_trials or earlier,
+            names=trial_names(trials),
+            settings=self._settings,
         )
 
     def _refined(
-        self, known: Sequence[Hypothesis], question: Question
+        self, known: Iterable[Hypothesis], problem: Problem
     ) -> tuple[Hypothesis, set[Hypothesis]]:
         """Returns the best hypothesis around known ones, and all that were compared.
 
         Hypotheses that only the tests of a verdict compare with the trials are never ranked.
         """
-        compared: set[Hypothesis] = set()
-        best = refined(
-            known,
-            question.space,
-            self._settings.genes,
-            LossFunctions(
-                damaged=_recorded(question.losses.damaged, compared),
-                surrogate=_recorded(question.losses.surrogate, self._proposed),
-                healthy=question.losses.healthy,
-            ),
-        )
-        if question.joints is not None:
-            best = with_joint_faults(
-                best,
-                question.space,
-                self._settings.genes,
-                _recorded(question.losses.damaged, compared),
-                question.joints,
-            )
-        compared |= {best, INTACT}
-        self._proposed |= compared
+        search = LocalSearch(problem)
+        best = search.refined(known)
+        if problem.has_joints:
+            best = with_joint_faults(best, search)
+        compared = search.compared | {best, INTACT}
+        self._proposed |= compared | search.proposed
         return best, compared
+
+    def _after_change(
+        self,
+        best: Hypothesis,
+        starts: Sequence[Hypothesis],
+        trials: Sequence[Trial],
+        problem: Problem,
+        surrogate: tuple[LossTable, Sequence[Trial]],
+    ) -> Diagnosis | None:
+        """Returns the diagnosis of the time after a change of the robot.
+
+        None if no change predicts the trials significantly better than the best hypothesis, if too
+        little time follows it, or if the losses of the comparator have no times.
+
+        Args:
+            best: The best hypothesis about all trials.
+            starts: Hypotheses from the EA that refinements start from.
+            trials: All trials.
+            problem: The problem of all trials.
+            surrogate: Losses of the surrogate comparator, and its trials.
+        """
+        table, its_trials = surrogate
+        change = self._change(best, starts, trials, problem)
+        if change is None:
+            return None
+        coarse_parts = change.since(its_trials)
+        if table.losses([INTACT], coarse_parts).shape[1] < MIN_SURROGATE_PIECES:
+            return None
+        change = self._with_refined_before(change, starts, trials, surrogate)
+        earlier = change.until(trials) if change.before == INTACT else []
+        later = self._problem(trials, change.since(trials), (table, coarse_parts), earlier)
+        after, compared = self._refined([change.after, *starts], later)
+        if after == change.before:
+            return None
+        diagnosis = judged(after, compared, later)
+        dated = self._dated(change, diagnosis.best, trials)
+        return dataclasses.replace(diagnosis, change=dated, trials=len(trials))
 
     def _change(
         self,
         best: Hypothesis,
-        found: Sequence[Hypothesis],
+        starts: Sequence[Hypothesis],
         trials: Sequence[Trial],
-        question: Question,
+        problem: Problem,
     ) -> Change | None:
-        """Returns the change in time that predicts the trials significantly better than ``best``.
-
-        None if there is no such change, or if the losses of the comparator have no times.
-        """
-        timeline = self.evidence.timeline(trials)
+        timeline = self.losses.timeline(trials)
         if timeline is None:
             return None
-        losses = question.losses
-        singles = question.space.with_one_more(INTACT)
-        before = dict.fromkeys([INTACT, best, *question.space.with_one_less(best)])
-        after = dict.fromkeys([best, *found[:REFINEMENT_STARTS], *singles])
-        split = best_split(list(before), list(after), losses.surrogate, losses.damaged)
-        if split is None or not is_change(split, best, losses.damaged):
+        space = problem.space
+        before = dict.fromkeys([INTACT, best, *space.with_one_less(best)])
+        after = dict.fromkeys([best, *starts, *space.with_one_more(INTACT)])
+        split = best_split(list(before), list(after), problem.coarse, problem.losses)
+        if split is None or not is_change(split, best, problem.losses):
             return None
-        return change_at(split, losses.damaged, timeline, _names_of(trials))
+        return change_at(split, problem.losses, timeline, _names_of(trials))
 
     def _with_refined_before(
         self,
         change: Change,
-        found: Sequence[Hypothesis],
+        starts: Sequence[Hypothesis],
         trials: Sequence[Trial],
-        surrogate: Surrogate,
+        surrogate: tuple[LossTable, Sequence[Trial]],
     ) -> Change:
         """Returns a change with the refined hypothesis about the time before it.
 
         If the empty hypothesis predicts this time as well as the healthy trials, or if there are
         none, it stays: the search would only find model error.
         """
-        earlier = change.until(trials)
-        coarse = partial(surrogate.evidence.losses, trials=change.until(surrogate.trials))
-        if coarse([INTACT]).shape[1] < MIN_SURROGATE_PIECES:
+        table, its_trials = surrogate
+        earlier, coarse_parts = change.until(trials), change.until(its_trials)
+        if table.losses([INTACT], coarse_parts).shape[1] < MIN_SURROGATE_PIECES:
             return change
-        question = self._question(earlier, trial_names(trials), coarse)
+        problem = self._problem(trials, earlier, (table, coarse_parts))
         if change.before == INTACT:
-            healthy = question.healthy_losses
-            losses = question.losses.damaged([INTACT])[0]
+            healthy, (losses,) = problem.reference, problem.losses([INTACT])
             if healthy is None or excess_over_healthy(losses, healthy) < MIN_Z:
                 return change
-        before, _ = self._refined([change.before, *found[:REFINEMENT_STARTS]], question)
+        before, _ = self._refined([change.before, *starts], problem)
         return dataclasses.replace(change, before=before)
 
     def _dated(self, change: Change, after: Hypothesis, trials: Sequence[Trial]) -> Change:
         """Returns a change with the time that the final hypothesis gives it."""
-        losses, timeline = (
-            partial(self.evidence.losses, trials=trials),
-            self.evidence.timeline(trials),
-        )
+        losses, timeline = partial(self.losses.losses, trials=trials), self.losses.timeline(trials)
         split = best_split([change.before], [after], losses, losses)
         if split is None or timeline is None:
             return change
@@ -293,13 +254,3 @@ def _names_of(trials: Sequence[Trial]) -> list[str]:
     """Returns the name of each of all trials."""
     names = trial_names(trials)
     return [names[trial.path] for trial in trials]
-
-
-def _recorded(losses: Losses, into: set[Hypothesis]) -> Losses:
-    """Returns a loss function that adds every hypothesis to a set."""
-
-    def recorded(hypotheses: Sequence[Hypothesis]) -> FloatArray:
-        into.update(hypotheses)
-        return losses(hypotheses)
-
-    return recorded

@@ -1,17 +1,16 @@
-"""A diagnosis: hypotheses ranked by distance to all trials, and a verdict on the best."""
+"""A diagnosis: hypotheses ranked by distance to all trials, a verdict and its numbers."""
 
+import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from selfmodel.arrays import data_frame
-from selfmodel.diagnosis.verdicts.change_point import Change
-from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
-from selfmodel.diagnosis.verdicts.fit import Fit
-from selfmodel.diagnosis.verdicts.residual import Residual
+from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_FLOOR, LOSS_RATIO
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.trials.trial import Trial, whole
+from selfmodel.trials.trial import Trial, TrialPart, whole
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
 """Verdicts on the best hypothesis.
@@ -37,10 +36,6 @@ class Candidate:
     hypothesis: Hypothesis
     distance: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON values; the distance is None where a simulation diverged."""
-        return {"hypothesis": str(self.hypothesis), "distance": _finite(self.distance)}
-
 
 @dataclass(frozen=True)
 class UnsearchedFault:
@@ -57,14 +52,139 @@ class UnsearchedFault:
     kind: str
     others: Mapping[str, Hypothesis] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON values."""
-        others = {kind: str(hypothesis) for kind, hypothesis in self.others.items()}
-        return {
-            "hypothesis": str(self.hypothesis),
-            "kind": self.kind,
-            **({"others": others} if others else {}),
-        }
+
+@dataclass(frozen=True)
+class Fit:
+    """How well the best hypothesis predicts the trials, in the loss of the comparator.
+
+    Attributes:
+        loss: Mean loss of the best hypothesis on a piece of the trials.
+        intact_loss: Mean loss of the empty hypothesis on the same pieces.
+        healthy_loss: Mean loss of the empty hypothesis on healthy trials, the reference; None
+            without healthy trials.
+        excess: Excess of ``loss`` over ``healthy_loss``, standard errors; None without healthy
+            trials.
+        threshold: Excess above which the verdict is ``unexplained``, standard errors.
+        has_faults: Whether the best hypothesis has faults.
+        left: Share of the loss of the empty hypothesis beyond the reference that is left, 0 to 1;
+            None without such a loss.
+        joints: Excess of the loss of single joints over that on healthy trials with the same gait,
+            standard errors, by the joint's name, largest first: those of at least
+            ``MIN_Z_OF_JOINT``, and none if the best hypothesis has faults.
+    """
+
+    loss: float
+    intact_loss: float
+    healthy_loss: float | None
+    excess: float | None
+    threshold: float
+    has_faults: bool
+    left: float | None = None
+    joints: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_too_high(self) -> bool:
+        """Whether the loss is higher than that of healthy trials, significantly and by much.
+
+        Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss
+        of a hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
+        """
+        if self.healthy_loss is None or self.excess is None:
+            return False
+        if self.loss > LOSS_RATIO * self.healthy_loss + LOSS_FLOOR:
+            return True
+        is_much = self.loss > FAULTY_RATIO * self.healthy_loss + LOSS_FLOOR
+        return self.excess > self.threshold and (is_much or not self.has_faults)
+
+    @property
+    def is_unexplained(self) -> bool:
+        """Whether the loss is too high, or a joint does not move as in healthy trials."""
+        return self.is_too_high or bool(self.joints)
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The loss of the best hypothesis beyond that of healthy trials.
+
+    Attributes:
+        signals: Excess of the mean loss of each signal, largest first, at most three.
+        trial: Name of the trial with the worst time.
+        begin: Beginning of the worst time, s since the start of that trial.
+        end: End of the worst time, s.
+    """
+
+    signals: Mapping[str, float]
+    trial: str
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the robot, or of its environment, at a time.
+
+    Attributes:
+        trial: Name of the trial in which the change occurred.
+        index: Index of that trial among the trials of the diagnosis.
+        time: Time of the change, s since the start of that trial.
+        earliest: Lower bound of the time, s.
+        latest: Upper bound of the time, s.
+        before: Best hypothesis about the time before the change.
+        after: Hypothesis about the time after the change, with which the time was found.
+    """
+
+    trial: str
+    index: int
+    time: float
+    earliest: float
+    latest: float
+    before: Hypothesis
+    after: Hypothesis
+
+    def __str__(self) -> str:
+        return (
+            f"changed at about t = {self.time:.1f} s ({self.earliest:.1f} to {self.latest:.1f}) "
+            f"of {self.trial}; before: {self.before}"
+        )
+
+    def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+        """Returns the trials from the change on.
+
+        The first piece after the change is left out: the change may lie in it, and then neither
+        hypothesis predicts it.
+
+        Args:
+            trials: All trials of the diagnosis.
+        """
+        first, *rest = trials[self.index :]
+        return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
+
+    def until(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+        """Returns the trials up to the change.
+
+        Args:
+            trials: All trials of the diagnosis.
+        """
+        *earlier, last = trials[: self.index + 1]
+        return [*earlier, TrialPart(last, end=self.time)]
+
+
+@dataclass(frozen=True)
+class DetectableSeverity:
+    """The smallest severities of a fault that the trials would have shown, on either side.
+
+    Attributes:
+        kind: Name of the fault kind.
+        part: Name of the part; empty for an environment.
+        below: The largest severity below the nominal one that predicts the trials clearly worse
+            than the best hypothesis; None if no such severity would have shown.
+        above: The smallest severity above the nominal one, likewise.
+    """
+
+    kind: str
+    part: str
+    below: float | None
+    above: float | None
 
 
 @dataclass(frozen=True)
@@ -80,21 +200,20 @@ class Diagnosis:
         trials: Number of trials.
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
-            first; of those that differ in severities alone, only the first.
+            first; see ``alternatives.indistinguishable``.
         verdict: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
-            trials significantly better; see ``unsearched.best_unsearched_fault``.
+            trials significantly better; see ``alternatives.unsearched_fault``.
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
-            smallest distance first, at most as many as are ranked; see
-            ``undetectable.undetectable_faults``.
+            smallest distance first, at most as many as are ranked.
+        reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
         detectable: Smallest detectable severities of each kind and part, if the best hypothesis
-            is the empty one; see ``detectable.detectable_severities``.
+            is the empty one; see ``alternatives.detectable_severities``.
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
         residual: Signals and time of the loss that is left, if it is unexplained.
-        reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
     """
 
     ranked: tuple[Candidate, ...]
@@ -115,6 +234,15 @@ class Diagnosis:
     def best(self) -> Hypothesis:
         """The best hypothesis."""
         return self.ranked[0].hypothesis
+
+    @property
+    def undetectable_faults(self) -> tuple[Hypothesis, ...]:
+        """The undetectable faults without those of the best hypothesis."""
+        best = self.best.faults
+        return tuple(
+            Hypothesis(tuple(fault for fault in one.faults if fault not in best))
+            for one in self.undetectable
+        )
 
     def explained(self, trials: Sequence[Trial]) -> list[Trial]:
         """Returns the rows of the trials that the diagnosis is about: those after a change.
@@ -140,30 +268,11 @@ class Diagnosis:
         return "\n".join(lines) + ">"
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON values of a run's ``diagnoses.json``.
+        """Returns the JSON values: every attribute by its name, as in a run's ``diagnoses.json``.
 
-        The keys ``rivals``, ``unseen`` and ``outside`` are those of a published format; they hold
-        the attributes ``indistinguishable``, ``undetectable`` and ``unsearched``.
+        A hypothesis is its notation. An infinite number, as of a diverged simulation, is null.
         """
-        return {
-            "trials": self.trials,
-            "intact_distance": _finite(self.intact_distance),
-            "rivals": [str(hypothesis) for hypothesis in self.indistinguishable],
-            "unseen": [str(hypothesis) for hypothesis in self.undetectable],
-            "verdict": self.verdict,
-            "test": self.test,
-            "outside": self.unsearched.to_dict() if self.unsearched else None,
-            "ranked": [candidate.to_dict() for candidate in self.ranked],
-            **({"reason": self.reason} if self.reason else {}),
-            **({"fit": self.fit.to_dict()} if self.fit else {}),
-            **({"residual": self.residual.to_dict()} if self.residual else {}),
-            **({"change": self.change.to_dict()} if self.change else {}),
-            **(
-                {"detectable": [one.to_dict() for one in self.detectable]}
-                if self.detectable
-                else {}
-            ),
-        }
+        return {**to_json(self), "reason": self.reason or None}
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
         """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first.
@@ -171,9 +280,114 @@ class Diagnosis:
         Raises:
             InputError: pandas is not installed.
         """
-        return data_frame([candidate.to_dict() for candidate in self.ranked])
+        return data_frame([to_json(candidate) for candidate in self.ranked])
 
 
-def _finite(distance: float) -> float | None:
-    """JSON has no infinity, which is the distance of a simulation that diverged."""
-    return distance if math.isfinite(distance) else None
+def output_of(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Returns the values of a diagnosis in ``--json`` output.
+
+    The ranking is ``diagnosis`` there, and ``unseen`` has the undetectable faults alone.
+    """
+    values = diagnosis.to_dict()
+    del values["trials"]
+    unseen = [str(faults) for faults in diagnosis.undetectable_faults]
+    return {"diagnosis": values.pop("ranked"), **values, "unseen": unseen}
+
+
+def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Diagnosis:
+    """Returns a diagnosis from its JSON values.
+
+    Args:
+        values: Result of ``Diagnosis.to_dict``, or of ``output_of`` with a number of ``trials``.
+            Those of selfmodel 0.1 lack some keys.
+        parse: Reads the notation of a hypothesis.
+
+    Raises:
+        ValueError: A hypothesis, a number or the verdict is invalid.
+        KeyError: A key is missing.
+        TypeError: A value has another type.
+        AttributeError: The values are no object.
+    """
+    named = {_ATTRIBUTES.get(key, key): value for key, value in values.items()}
+    if "diagnosis" in named:
+        named["ranked"] = named["diagnosis"]
+    named["reason"] = named.get("reason") or ""
+    found: Diagnosis = _from_json(Diagnosis, named, parse)
+    if not found.ranked:
+        raise ValueError("expected at least one ranked hypothesis, got none")
+    if "diagnosis" in named:
+        full = (dict.fromkeys((*found.best.faults, *one.faults)) for one in found.undetectable)
+        undetectable = tuple(Hypothesis(tuple(sorted(faults))) for faults in full)
+        found = dataclasses.replace(found, undetectable=undetectable)
+    fit = found.fit
+    # Both are null without healthy trials; null beside a number is infinite.
+    if fit is not None and (fit.healthy_loss is None) != (fit.excess is None):
+        healthy = math.inf if fit.healthy_loss is None else fit.healthy_loss
+        excess = math.inf if fit.excess is None else fit.excess
+        fit = dataclasses.replace(fit, healthy_loss=healthy, excess=excess)
+    return dataclasses.replace(found, fit=fit)
+
+
+_KEYS: Mapping[str, str] = {
+    "indistinguishable": "rivals",
+    "undetectable": "unseen",
+    "unsearched": "outside",
+}
+"""Published keys of JSON that are not the names of the attributes."""
+
+_ATTRIBUTES: Mapping[str, str] = {key: name for name, key in _KEYS.items()}
+
+
+def to_json(value: object) -> Any:  # noqa: ANN401  # JSON values
+    """Returns the JSON values of a record of a diagnosis, by the names of its attributes."""
+    if isinstance(value, Hypothesis):
+        return str(value)
+    if dataclasses.is_dataclass(value):
+        names = (one.name for one in dataclasses.fields(value))
+        return {_KEYS.get(name, name): to_json(getattr(value, name)) for name in names}
+    if isinstance(value, Mapping):
+        return {key: to_json(one) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return [to_json(one) for one in value]
+    # JSON has no infinity, which is the distance of a simulation that diverged.
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _from_json(kind: Any, value: Any, parse: Callable[[str], Hypothesis]) -> Any:  # noqa: ANN401
+    """Returns the value of a field of a type, from its JSON value."""
+    parts, origin = get_args(kind), get_origin(kind)
+    if type(None) in parts:
+        return None if value is None else _from_json(parts[0], value, parse)
+    if dataclasses.is_dataclass(kind) and kind is not Hypothesis:
+        types = get_type_hints(kind)
+        names = [
+            one.name
+            for one in dataclasses.fields(kind)
+            # A key with a default may be missing; without one, the look-up names it.
+            if one.name in value or one.default is one.default_factory  # both missing
+        ]
+        record: Any = kind
+        return record(**{name: _from_json(types[name], value[name], parse) for name in names})
+    if origin is tuple and isinstance(value, list):
+        return tuple(_from_json(parts[0], one, parse) for one in value)
+    if origin is Mapping and isinstance(value, dict):
+        return {key: _from_json(parts[1], one, parse) for key, one in value.items()}
+    return _leaf_from_json(kind, value, parse)
+
+
+def _leaf_from_json(kind: Any, value: Any, parse: Callable[[str], Hypothesis]) -> Any:  # noqa: ANN401
+    if kind is float:
+        if value is None:
+            return math.inf
+        if not isinstance(value, (int, float)) or not abs(value) <= sys.float_info.max:
+            raise ValueError(f"expected a finite number or null, got {value!r:.60}")
+        return float(value)
+    if get_origin(kind) is Literal:
+        if value not in get_args(kind):
+            raise ValueError(f"expected one of {', '.join(get_args(kind))}, got {value!r:.60}")
+        return value
+    if kind is Hypothesis and isinstance(value, str):
+        return parse(value)
+    if not isinstance(kind, type) or not isinstance(value, kind):
+        raise TypeError(f"expected {kind}, got {value!r:.60}")
+    return value

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis

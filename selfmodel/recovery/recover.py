@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.diagnosis.comparator_choice import ChosenComparator, ComparatorChoice
+from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -209,7 +209,7 @@ class RecoveryLoop:
             self._comparator.comparator,
             self.settings,
             self.kinds,
-            intact=self.known.trials[:1],
+            healthy_trials=self.known.trials[:1],
         )
 
     def _diagnose(self) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from selfmodel.arrays import data_frame
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores import DISPLACEMENT, Score

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.sentences import confidence_sentence, fit_sentence, right_or_wrong
-from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search, as_json
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
@@ -106,8 +105,7 @@ def headline(subject: Subject) -> str:
 def details(subject: Subject) -> tuple[str, ...]:
     """Returns the sentences of the verdict, and the truth where it is known."""
     diagnosis = subject.diagnosis
-    found = {**confidence_to_dict(diagnosis), "diagnosis": ranking_to_list(diagnosis.ranked)}
-    sentences = [confidence_sentence(found), fit_sentence(found)]
+    sentences = [verdict_sentences(diagnosis), fit_sentence(diagnosis)]
     if subject.result is not None:
         sentences.append(_truth(subject.result))
     return tuple(sentence for sentence in sentences if sentence)
@@ -115,7 +113,8 @@ def details(subject: Subject) -> tuple[str, ...]:
 
 def _truth(result: RecoveryResult) -> str:
     gap = f", at a reality gap of {result.gap:g}" if result.gap else ""
-    judgement = right_or_wrong(as_json(result))
+    best = str(result.diagnosis[0]["hypothesis"])
+    judgement = right_or_wrong(best, result.truth, correct=result.correct)
     return f"True faults: {result.truth}{gap}; the diagnosis is {judgement}."
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.evidence import simulate
-from selfmodel.diagnosis.preparation import prepared_trial
+from selfmodel.diagnosis.choice import prepared_trial
+from selfmodel.diagnosis.losses import simulate
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.recovery.next_trial import (
@@ -116,15 +116,15 @@ def _axis(subject: Subject) -> Axis:
 
 
 def _loss_charts(subject: Subject, axis: Axis) -> list[Item]:
-    evidence, trials = subject.evidence, subject.damaged
-    timeline = evidence.timeline(trials)
+    table, trials = subject.losses, subject.damaged
+    timeline = table.timeline(trials)
     if timeline is None:
         return []
     begin = np.array([axis.offset[trials[int(i)].path] for i in timeline.trial])
     middle = begin + (timeline.begin + timeline.end) / 2
     shown = subject.shown_hypotheses
-    losses = evidence.losses([one for _, one in shown], trials)
-    by_signal = evidence.pieces_by_signal(subject.diagnosis.best, trials)
+    losses = table.losses([one for _, one in shown], trials)
+    by_signal = table.by_signal(subject.diagnosis.best, trials)
     found: list[Item] = [
         LineChart(
             "Loss over time of each hypothesis",

@@ -11,8 +11,7 @@ import numpy as np
 
 from selfmodel import plugins
 from selfmodel.arguments import AUTO, fitted
-from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.serialization import diagnosis_from_output
+from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
@@ -72,7 +71,8 @@ class DiagnosisFile:
         """
         count = len(self.result.explained)
         try:
-            found = diagnosis_from_output(as_json(self.result), count, space.parse)
+            values = {**as_json(self.result), "trials": count}
+            found = diagnosis_from_dict(values, space.parse)
         except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
             cause = f"{type(error).__name__}: {error}"
             raise InputError(

@@ -14,7 +14,7 @@ from selfmodel.api import by_stage
 from selfmodel.arguments import AUTO, comparator_choice, fitted
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
@@ -111,9 +111,9 @@ class Subject:
         return Simulator(model, self.threads)
 
     @cached_property
-    def evidence(self) -> Evidence:
+    def losses(self) -> LossTable:
         """Losses of hypotheses on the trials."""
-        return Evidence(self.simulator, self.comparator)
+        return LossTable(self.simulator, self.comparator)
 
     @property
     def runner_up(self) -> Hypothesis | None:

@@ -120,7 +120,13 @@ def predict(
     stats.steps += len(moving) * count * horizon
     stats.diverged += int(diverged.sum())
     time = np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep
-    return SimulationResult(Behaviour(robot.anatomy.names, time, kept), diverged)
+    addresses = [int(robot.model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]
+    welded = [np.isin(addresses, [address for address, _, _ in own.welded]) for own in embodiments]
+    detached = [[name in own.detached for name in robot.anatomy.hinges] for own in embodiments]
+    predicted = Behaviour(
+        robot.anatomy.names, time, kept, welded=np.array(welded), detached=np.array(detached)
+    )
+    return SimulationResult(predicted, diverged)
 
 
 def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]:

@@ -130,10 +130,6 @@ class Simulator:
             stats=self.stats,
         )
 
-    def detached_hinges(self, hypothesis: Hypothesis) -> frozenset[str]:
-        """Returns the names of the hinges that a hypothesis detaches."""
-        return frozenset(self._embodiment(hypothesis).detached)
-
     def _adapted_to_contacts(
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:

@@ -11,7 +11,7 @@ import numpy as np
 
 from selfmodel.arguments import fitted
 from selfmodel.controllers.controller import Controller, Design
-from selfmodel.diagnosis.comparator_choice import ComparatorChoice
+from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,6 +74,9 @@ class Behaviour:
             control time step; None for a robot without its own clock.
         substeps: Physics steps of the robot's model per control step, by which positions are
             integrated; the default is that of the paper's robots.
+        welded: Mask of the hinges that the hypothesis of each run welds, ``(runs, hinges)``; None
+            for none, and for behaviour that is no prediction of segments.
+        detached: Mask of the hinges of detached limbs, likewise.
 
     Raises:
         ValueError: A shape is inconsistent with the names, or time does not increase.
@@ -84,6 +87,8 @@ class Behaviour:
     signals: Mapping[Signal, FloatArray]
     late: BoolArray | None = None
     substeps: int = 2
+    welded: BoolArray | None = None
+    detached: BoolArray | None = None
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or not np.all(np.diff(self.time) > 0):
@@ -112,6 +117,14 @@ class Behaviour:
         except KeyError:
             recorded = ", ".join(self.signals) or "nothing"
             raise KeyError(f"{signal} was not recorded; recorded: {recorded}") from None
+
+    def hinge_mask(self, effect: Literal["welded", "detached"]) -> BoolArray:
+        """Returns ``welded`` or ``detached`` of a batch of runs, ``(runs, hinges)``."""
+        found = self.welded if effect == "welded" else self.detached
+        if found is not None:
+            return found
+        runs = len(next(iter(self.signals.values())))
+        return np.zeros((runs, len(self.names.hinges)), dtype=np.bool_)
 
     @property
     def steady_commands(self) -> FloatArray:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from selfmodel.comparators.command_errors import command_errors, command_spans
+from selfmodel.comparators.readings import command_errors, command_spans
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.notation import parse

@@ -8,8 +8,8 @@ import pytest
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.evidence import Evidence, simulate
-from selfmodel.diagnosis.verdicts.significance import NEGLIGIBLE_LOSS
+from selfmodel.diagnosis.losses import LossTable, simulate
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -20,7 +20,7 @@ from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.comparators import Prepared, PreparedPieces
+from tests.helpers.comparators import Prepared, PreparedPieces, distances_of
 from tests.helpers.drivers import random_controllers
 
 Both = tuple[Trial, Behaviour]
@@ -52,7 +52,15 @@ def with_the_perfect_one(outcome: Behaviour, perfect: Behaviour) -> Behaviour:
         signal: np.concatenate([perfect[signal], values])
         for signal, values in outcome.signals.items()
     }
-    return Behaviour(outcome.names, outcome.time, signals)
+    return Behaviour(outcome.names, outcome.time, signals, **with_none_fixed(outcome))
+
+
+def with_none_fixed(outcome: Behaviour) -> dict[str, np.ndarray | None]:
+    """The hinges that the hypotheses fix, with those of the healthy robot before them."""
+    return {
+        name: None if mask is None else np.concatenate([np.zeros_like(mask[:1]), mask])
+        for name, mask in (("welded", outcome.welded), ("detached", outcome.detached))
+    }
 
 
 @pytest.mark.parametrize("name", COMPARATORS)
@@ -65,7 +73,7 @@ def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_sim
     outcome = simulate(Simulator(robot, 2), request, trial, hypotheses).behaviour
 
     check_comparator(comparator, trial, with_the_perfect_one(outcome, shown(request, trial)))
-    distances = prepared.distances(outcome)
+    distances = distances_of(prepared, outcome)
     assert np.all(distances[1:] > distances[0]), "other damage is as close as the truth"
     if isinstance(request, ClosedLoop):
         assert distances[0] == 0
@@ -82,7 +90,7 @@ def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated
     ways = x[:, -1] - x[:, 0]
 
     np.testing.assert_array_equal(
-        FORWARD_DISPLACEMENT.prepare(trial).distances(simulated), np.abs(ways - ways[0])
+        distances_of(FORWARD_DISPLACEMENT.prepare(trial), simulated), np.abs(ways - ways[0])
     )
 
 
@@ -130,16 +138,16 @@ class Broken:
 @pytest.mark.parametrize(
     ("way", "message"),
     [
-        ("nothing", "prepare must return an object with request and distances, got None"),
+        ("nothing", "prepare must return an object with request and losses or distances, got None"),
         ("request", "a request of ClosedLoop must record some of"),
         ("unsteady", "the same trial must be prepared with the same request"),
-        ("shape", "expected a distance for each of 4 runs"),
+        ("shape", "distances must have shape .* with n = 4"),
         ("sign", "must be finite and at least 0"),
         ("nan", "must be finite and at least 0"),
         ("offset", "must be 0, got 1"),
-        ("impure", "the same arguments must give the same distances"),
+        ("impure", "must give the same distances"),
         ("crowd", "must not depend on the other runs"),
-        ("again", "a trial that is prepared again must give the same distances"),
+        ("again", "the same trial and arguments must give the same distances"),
         ("simulated", "a comparator must not change its arguments"),
         ("trial", "a comparator must not change the trial"),
     ],
@@ -170,8 +178,7 @@ class Pieces:
 
     def prepare(self, _trial: Trial) -> PreparedPieces:
         """Requests what it was made with."""
-        distances = lambda simulated: self._sound(simulated).mean(axis=1)  # noqa: E731  # short
-        return PreparedPieces(self.asks, distances, self._losses)
+        return PreparedPieces(self.asks, self._losses)
 
     def _losses(self, simulated: Behaviour) -> FloatArray:
         """Returns how far each joint is from the first run's, spoilt."""
@@ -182,7 +189,6 @@ class Pieces:
             "shape": right[:, 0],
             "none": right[:, :0],
             "sign": right - right.max(),
-            "mean": right * 2,
             "impure": right * (1 + 1e-15 * self.calls),
             "crowd": right * (1 + 1e-15 * len(right)),
         }[self.way]
@@ -259,11 +265,10 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
 @pytest.mark.parametrize(
     ("way", "message"),
     [
-        ("shape", "expected losses of shape"),
-        ("none", "expected losses of shape"),
+        ("shape", "losses must have shape"),
+        ("none", "losses must have shape"),
         ("sign", "losses must be finite and at least 0"),
-        ("mean", "the mean of the losses must be the distance"),
-        ("impure", "the same arguments must give the same losses"),
+        ("impure", "must give the same losses"),
         ("crowd", "the losses of run 1 must not depend on the other runs"),
     ],
 )
@@ -284,7 +289,7 @@ def test_segments_are_given_their_commands_and_cannot_record_them(
     asks = replace(segments(trial), record=("joint_positions", "commands"))
 
     with pytest.raises(InputError, match=r"'pieces' requested the signals .*'commands'.*, of "):
-        Evidence(Simulator(quadruped, 1), Pieces(asks)).losses([INTACT], [trial])
+        LossTable(Simulator(quadruped, 1), Pieces(asks)).losses([INTACT], [trial])
 
 
 def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated: Both):

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import GAIT_PATTERN
-from selfmodel.comparators.gait_features import LARGE_DIFFERENCES
+from selfmodel.comparators.gait_pattern import LARGE_DIFFERENCES
 from selfmodel.errors import InputError
 from selfmodel.testing import check_comparator
 from selfmodel.trials.behaviour import Behaviour
+from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
 
 GROUP = list(LARGE_DIFFERENCES)
@@ -29,7 +30,7 @@ def test_when_the_strides_begin_does_not_matter(
         gait(phases, frequency=frequency - 0.3, late=late),
     )
 
-    shifted, other = GAIT_PATTERN.prepare(trial).distances(batch(same, slower))
+    shifted, other = distances_of(GAIT_PATTERN.prepare(trial), batch(same, slower))
 
     # A reading comes on at a step, so a duty is known to a step in a stride.
     assert shifted < 0.035
@@ -87,8 +88,8 @@ def test_degenerate_trials_keep_the_contract(shown: Behaviour):
 
 
 def test_a_robot_that_lies_still_is_far_from_one_that_walks():
-    to_walk = GAIT_PATTERN.prepare(logged(still())).distances(batch(gait(), still()))
-    to_lie = GAIT_PATTERN.prepare(logged(gait())).distances(batch(gait(), still()))
+    to_walk = distances_of(GAIT_PATTERN.prepare(logged(still())), batch(gait(), still()))
+    to_lie = distances_of(GAIT_PATTERN.prepare(logged(gait())), batch(gait(), still()))
 
     assert to_walk[0] > 0.3
     assert to_lie[1] > 0.3
@@ -100,7 +101,7 @@ def test_a_robot_without_touch_is_compared_by_its_joints():
     trial = logged(unknown)
 
     assert GAIT_PATTERN.prepare(trial).request.record == ("joint_positions",)
-    same, trot = GAIT_PATTERN.prepare(trial).distances(batch(gait(late=0.2), gait(TROT)))
+    same, trot = distances_of(GAIT_PATTERN.prepare(trial), batch(gait(late=0.2), gait(TROT)))
     assert same < trot / 10
 
 
@@ -120,7 +121,7 @@ def test_what_was_not_observed_is_not_compared():
     )
 
     check_comparator(GAIT_PATTERN, trial, runs)
-    distances = GAIT_PATTERN.prepare(trial).distances(runs)
+    distances = distances_of(GAIT_PATTERN.prepare(trial), runs)
     assert distances[1] == 0
     assert distances[2] > 0
 
@@ -132,8 +133,8 @@ def test_a_window_that_was_not_observed_does_not_dilute_the_others():
         for signal in ("sensors", "joint_positions")
     }
 
-    whole = GAIT_PATTERN.prepare(logged(walking)).distances(batch(trot))
-    part = GAIT_PATTERN.prepare(logged(changed(walking, **half))).distances(batch(trot))
+    whole = distances_of(GAIT_PATTERN.prepare(logged(walking)), batch(trot))
+    part = distances_of(GAIT_PATTERN.prepare(logged(changed(walking, **half))), batch(trot))
 
     np.testing.assert_allclose(part, whole, rtol=0.1)
 

@@ -7,14 +7,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.comparators.loose_encoders import (
-    LooseEncoders,
-    detached_hinges,
-    loose_encoders,
-    with_loose_encoders,
-)
+from selfmodel.comparators.encoders import LooseEncoders, loose_encoders, with_loose_encoders
 from selfmodel.trials.behaviour import Behaviour
-from tests.helpers.gaits import LEGS, batch, changed, gait, logged
+from tests.helpers.gaits import LEGS, changed, gait, logged
 
 HORIZON = 12
 STARTS = np.arange(0, 450, 50)
@@ -141,7 +136,8 @@ def simulated(detached: bool) -> Behaviour:  # noqa: FBT001  # of a table
     run = behaviour_of(np.zeros(STEPS) if detached else LOADED[0], *LOADED[1:])
     rows = STARTS[:, np.newaxis] + np.arange(HORIZON + 1)
     signals = {name: values[rows][np.newaxis] for name, values in run.signals.items()}
-    return Behaviour(run.names, run.time[: HORIZON + 1], signals)
+    mask = np.array([[detached, *[False] * (LEGS - 1)]])
+    return Behaviour(run.names, run.time[: HORIZON + 1], signals, detached=mask)
 
 
 @pytest.mark.parametrize("detached", [True, False])
@@ -152,10 +148,8 @@ def test_predictions_change_only_for_hypotheses_that_detach_the_hinge(detached: 
     loose = one_loose(angles, sensors)
     assert loose is not None
     before = simulated(detached)
-    mask = detached_hinges(before["joint_positions"], np.zeros(LEGS))
-    after = with_loose_encoders(before, loose, mask)
+    after = with_loose_encoders(before, loose)
 
-    assert mask.tolist() == [[detached, False, False, False]]
     for signal, column in (("joint_positions", 0), ("joint_velocities", 0), ("sensors", 1)):
         others = np.arange(LEGS) != column
         np.testing.assert_array_equal(
@@ -172,39 +166,14 @@ def test_predictions_change_only_for_hypotheses_that_detach_the_hinge(detached: 
     np.testing.assert_array_equal(after["base_position"], before["base_position"])
 
 
-def test_a_hinge_that_stands_at_another_angle_is_not_detached():
-    jammed = simulated(detached=True)
-    jammed.signals["joint_positions"][..., 0] = 0.2
-
-    assert not detached_hinges(jammed["joint_positions"], np.zeros(LEGS)).any()
-
-
 def test_the_predictions_of_the_simulator_are_not_changed_in_place():
     loose = one_loose(lagging(COMMANDS[:, 0], 3.0))
     assert loose is not None
     before = simulated(detached=True)
     kept = before["joint_positions"].copy()
-    with_loose_encoders(before, loose, np.array([[True, False, False, False]]))
+    with_loose_encoders(before, loose)
 
     np.testing.assert_array_equal(before["joint_positions"], kept)
-
-
-def test_the_rows_of_other_hypotheses_stay():
-    loose = one_loose(lagging(COMMANDS[:, 0], 3.0))
-    assert loose is not None
-    both = batch(
-        *(
-            Behaviour(
-                one.names, one.time, {name: values[0] for name, values in one.signals.items()}
-            )
-            for one in (simulated(detached=True), simulated(detached=False))
-        )
-    )
-    mask = detached_hinges(both["joint_positions"], np.zeros(LEGS))
-    after = with_loose_encoders(both, loose, mask)
-
-    assert mask[:, 0].tolist() == [True, False]
-    np.testing.assert_array_equal(after["joint_positions"][1], both["joint_positions"][1])
 
 
 def test_a_trial_without_loose_encoders_is_compared_as_it_is():

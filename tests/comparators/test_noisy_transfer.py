@@ -10,6 +10,7 @@ from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.behaviour import Behaviour
+from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, batch, changed, gait, logged
 
 MEMBERS = 6
@@ -35,7 +36,7 @@ def around(middle: float, spread: float) -> list[Behaviour]:
 
 
 def distances(*groups: list[Behaviour]) -> np.ndarray:
-    return NOISY_TRANSFER.prepare(logged(gait())).distances(ensembles(*groups))
+    return distances_of(NOISY_TRANSFER.prepare(logged(gait())), ensembles(*groups))
 
 
 def test_it_asks_for_a_small_ensemble_of_what_the_trial_has():
@@ -115,7 +116,9 @@ def test_motion_about_the_same_mean_is_told_from_stillness():
     walking = gait(frequency=100 / WINDOW)
     still = changed(walking, joint_positions=np.zeros_like(walking["joint_positions"]))
 
-    assert NOISY_TRANSFER.prepare(logged(walking)).distances(ensembles([still] * MEMBERS))[0] > 0.1
+    assert (
+        distances_of(NOISY_TRANSFER.prepare(logged(walking)), ensembles([still] * MEMBERS))[0] > 0.1
+    )
 
 
 def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout():
@@ -124,7 +127,7 @@ def test_what_was_observed_now_and_then_counts_as_what_was_observed_throughout()
     glimpsed[::3] = np.nan
     runs = ensembles(turned(still, *np.linspace(0.2, 0.4, MEMBERS)))
     throughout, now_and_then = (
-        NOISY_TRANSFER.prepare(logged(changed(still, joint_positions=joints))).distances(runs)
+        distances_of(NOISY_TRANSFER.prepare(logged(changed(still, joint_positions=joints))), runs)
         for joints in (still["joint_positions"], glimpsed)
     )
 
@@ -149,7 +152,7 @@ def test_what_was_not_observed_is_not_compared():
     elsewhere = changed(walking, sensors=1 - walking["sensors"])
 
     runs = ensembles(*([run] * MEMBERS for run in (walking, strange, lost, elsewhere)))
-    found = NOISY_TRANSFER.prepare(trial).distances(runs)
+    found = distances_of(NOISY_TRANSFER.prepare(trial), runs)
     assert np.array_equal(found[:3], [0, 0, 0])
     assert found[3] > 0
 

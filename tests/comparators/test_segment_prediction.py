@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.comparators.encoder_motion import encoder_motion_loss, logged_motion
-from selfmodel.comparators.segment_prediction import CONTRADICTION
+from selfmodel.comparators.encoders import encoder_motion_loss, logged_motion
+from selfmodel.comparators.readings import CONTRADICTION
 from selfmodel.testing import shown
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import JOINTS
@@ -22,7 +22,7 @@ def losses(trial: Behaviour, readings: np.ndarray) -> np.ndarray:
     perfect = shown(SEGMENT_PREDICTION.prepare(one).request, one)
     signals = {**perfect.signals, "sensors": readings[np.newaxis]}
     found = Behaviour(perfect.names, perfect.time, signals)
-    return SEGMENT_PREDICTION.prepare(one).losses(found)[0]
+    return SEGMENT_PREDICTION.prepare(one).losses(found).total[0]
 
 
 def predicted(trial: Behaviour) -> np.ndarray:
@@ -68,13 +68,17 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
     assert CONTRADICTION == 3
 
 
-def motion_loss(run: Behaviour, predicted: np.ndarray, hinges: list[int]) -> np.ndarray:
-    """The loss of the motion of some encoders alone."""
+def motion_loss(run: Behaviour, predicted: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+    """The loss of the motion of some encoders, ``(1, segments)``."""
     request = SEGMENT_PREDICTION.prepare(logged(run)).request
-    starts = np.linspace(0, run.steps - 1 - request.horizon, predicted.shape[1]).round().astype(int)
-    angles, resting = run["joint_positions"][:, hinges], request.resting_angles[hinges]
-    own = logged_motion(angles, starts, request.horizon, resting)
-    return encoder_motion_loss(predicted[..., hinges], own)
+    assert request.past is not None
+    angles = np.full_like(run["joint_positions"], np.nan)
+    angles[:, hinges] = run["joint_positions"][:, hinges]
+    time = run.time[: request.horizon + 1]
+    simulated = Behaviour(run.names, time, {"joint_positions": predicted})
+    return encoder_motion_loss(
+        simulated, logged_motion(angles, request.past.starts, request.horizon)
+    )
 
 
 @settings(max_examples=10, deadline=None)
@@ -89,7 +93,8 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, see
     exact = shown(SEGMENT_PREDICTION.prepare(logged(walking)).request, logged(walking))
     rng = np.random.default_rng(seed)
     wrong = {signal: exact[signal] + rng.normal(0, 0.1, exact[signal].shape) for signal in JOINTS}
-    found = prepared.losses(Behaviour(exact.names, exact.time, {**exact.signals, **wrong}))
+    simulated = Behaviour(exact.names, exact.time, {**exact.signals, **wrong})
+    found = prepared.losses(simulated).total
 
     expected = np.zeros_like(found)
     for signal in JOINTS:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.comparators.sensor_noise_level import MARGIN, ORDER, noise_level_loss
+from selfmodel.comparators.readings import MARGIN, ORDER, noise_level_loss
 
 SEGMENTS, ROWS, SENSORS = 80, 13, 4
 ALL = np.ones((1, SENSORS), dtype=bool)

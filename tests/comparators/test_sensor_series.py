@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import PAPER_SENSORS, SENSOR_SERIES
+from selfmodel.comparators.sensor_series import padded_windows
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError
 from selfmodel.testing import check_comparator
 from selfmodel.trials.behaviour import Behaviour
+from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, batch, changed, gait, logged
 
 BOTH = [SENSOR_SERIES, PAPER_SENSORS]
@@ -29,8 +31,10 @@ def test_the_unit_of_a_column_does_not_matter(factor: float):
     def scaled(run: Behaviour) -> Behaviour:
         return changed(run, joint_positions=run["joint_positions"] * factor)
 
-    plain = SENSOR_SERIES.prepare(logged(walking)).distances(batch(trot))
-    in_other_units = SENSOR_SERIES.prepare(logged(scaled(walking))).distances(batch(scaled(trot)))
+    plain = distances_of(SENSOR_SERIES.prepare(logged(walking)), batch(trot))
+    in_other_units = distances_of(
+        SENSOR_SERIES.prepare(logged(scaled(walking))), batch(scaled(trot))
+    )
 
     np.testing.assert_allclose(in_other_units, plain, rtol=1e-9)
 
@@ -46,21 +50,22 @@ def test_no_difference_is_too_large_to_be_bounded(comparator: Comparator):
         },
     )
     # A still column has no spread to be scaled by, and all of the motion is far away.
-    assert 0 < comparator.prepare(logged(walking)).distances(batch(away))[0] <= 1
+    assert 0 < distances_of(comparator.prepare(logged(walking)), batch(away))[0] <= 1
 
 
 def test_early_steps_count_more_than_late_ones():
     trial = logged(gait())
-    early, middle, late = SENSOR_SERIES.prepare(trial).distances(
-        batch(disturbed(100, 150), disturbed(500, 550), disturbed(900, 950))
+    early, middle, late = distances_of(
+        SENSOR_SERIES.prepare(trial),
+        batch(disturbed(100, 150), disturbed(500, 550), disturbed(900, 950)),
     )
 
     assert early > 2 * middle > 4 * late > 0
 
 
 def test_a_stride_that_begins_a_little_late_is_nearly_the_same():
-    little, much, trot = SENSOR_SERIES.prepare(logged(gait())).distances(
-        batch(gait(late=0.1), gait(late=0.3), gait(TROT))
+    little, much, trot = distances_of(
+        SENSOR_SERIES.prepare(logged(gait())), batch(gait(late=0.1), gait(late=0.3), gait(TROT))
     )
 
     assert little < 0.1 * trot
@@ -71,7 +76,7 @@ def test_a_base_that_was_logged_with_the_other_sign_is_the_same():
     walking = gait()
     turned = changed(walking, base_orientation=-walking["base_orientation"])
 
-    assert SENSOR_SERIES.prepare(logged(walking)).distances(batch(turned))[0] == 0
+    assert distances_of(SENSOR_SERIES.prepare(logged(walking)), batch(turned))[0] == 0
 
 
 @pytest.mark.parametrize("axis", [1, 2, 3])
@@ -83,7 +88,7 @@ def test_turns_to_either_side_of_each_axis_are_told_apart(axis: int):
     trial = logged(changed(gait(), base_orientation=one))
 
     runs = batch(changed(gait(), base_orientation=other), gait())
-    assert np.all(SENSOR_SERIES.prepare(trial).distances(runs) > 0.02)
+    assert np.all(distances_of(SENSOR_SERIES.prepare(trial), runs) > 0.02)
 
 
 @pytest.mark.parametrize("comparator", BOTH)
@@ -107,7 +112,7 @@ def test_what_was_not_observed_is_not_compared(comparator: Comparator):
     runs = batch(walking, changed(walking, sensors=strange), changed(walking, sensors=elsewhere))
 
     check_comparator(comparator, trial, runs)
-    distances = comparator.prepare(trial).distances(runs)
+    distances = distances_of(comparator.prepare(trial), runs)
     assert distances[1] < 0.01 * distances[2] or distances[1] == 0
     assert distances[2] > 0
 
@@ -118,7 +123,7 @@ def test_a_signal_that_the_log_lacks_is_neither_asked_for_nor_compared():
 
     assert "base_position" not in SENSOR_SERIES.prepare(trial).request.record
     away = changed(walking, base_position=walking["base_position"] + 1)
-    assert SENSOR_SERIES.prepare(trial).distances(batch(away))[0] == 0
+    assert distances_of(SENSOR_SERIES.prepare(trial), batch(away))[0] == 0
 
 
 @pytest.mark.parametrize("comparator", BOTH)
@@ -150,4 +155,19 @@ def test_without_a_displacement_the_papers_sensors_are_the_readings():
     trial = logged(changed(gait(), base_position=np.full((1000, 3), np.nan)))
 
     assert PAPER_SENSORS.prepare(trial).losses(batch(gait(), gait(TROT))).shape[1] == 40
-    assert PAPER_SENSORS.prepare(trial).distances(batch(gait(), gait(TROT)))[1] > 0
+    assert distances_of(PAPER_SENSORS.prepare(trial), batch(gait(), gait(TROT)))[1] > 0
+
+
+def test_the_last_window_is_filled_up_with_zeros():
+    values = np.arange(1.0, 11.0).reshape(1, 5, 2)
+    windows = padded_windows(values, 3)
+
+    assert windows.shape == (1, 2, 3, 2)
+    assert windows[0, 0].tolist() == [[1, 2], [3, 4], [5, 6]]
+    assert windows[0, 1].tolist() == [[7, 8], [9, 10], [0, 0]]
+
+
+def test_unobserved_values_become_zeros():
+    values = np.array([[1.0, np.nan], [2.0, 3.0]])
+
+    assert padded_windows(values, 2, np.isfinite(values)).tolist() == [[[1, 0], [2, 3]]]

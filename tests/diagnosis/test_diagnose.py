@@ -15,13 +15,9 @@ from selfmodel.comparators import (
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.sentences import confidence_sentence
-from selfmodel.diagnosis.serialization import (
-    confidence_to_dict,
-    diagnosis_from_dict,
-    ranking_to_list,
-)
+from selfmodel.diagnosis.diagnosis import diagnosis_from_dict
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.text import verdict_sentences
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.joints import BROKEN, JAMMED
@@ -75,7 +71,7 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
     trial = logged(quadruped, "break:front_left_knee", controller)
     diagnose = DiagnosticSearch(simulator, FORWARD_DISPLACEMENT, SMALL)
 
-    distances = diagnose.evidence.distances([bad, INTACT], [trial])
+    distances = diagnose.losses.distances([bad, INTACT], [trial])
     assert distances[0] == np.inf
     assert np.isfinite(distances[1])
     ways = RepairSearch(simulator, SMALL)._simulate([(bad, controller), (INTACT, controller)])
@@ -92,11 +88,11 @@ def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: R
     trials = [dataclasses.replace(t, path=str(i)) for i, t in enumerate(trials)]
     hypotheses = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
     diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
-    alone = [diagnose.evidence.distances(hypotheses, [trial]) for trial in trials]
+    alone = [diagnose.losses.distances(hypotheses, [trial]) for trial in trials]
 
     assert np.all(np.array(alone) > 0)
     np.testing.assert_allclose(
-        diagnose.evidence.distances(hypotheses, trials), sum(alone), rtol=1e-12
+        diagnose.losses.distances(hypotheses, trials), sum(alone), rtol=1e-12
     )
 
 
@@ -132,8 +128,8 @@ def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_firs
 @pytest.mark.parametrize(
     ("distances", "said"),
     [
-        (lambda _: 0.0, r"returned \(\) distances for 2 simulations"),
-        (lambda n: np.zeros((n, 1)), r"returned \(2, 1\) distances for 2"),
+        (lambda _: 0.0, r"returned losses \(1,\) for 2 simulations"),
+        (lambda n: np.zeros((n, 1)), r"returned losses \(2, 1, 1\) for 2"),
         (lambda n: np.full(n, -1.0), "returned a distance that is not a number of at least 0"),
         (lambda n: np.full(n, np.nan), "returned a distance that is not a number of at least 0"),
     ],
@@ -147,7 +143,7 @@ def test_a_comparator_that_breaks_its_contract_is_named(
     both = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
 
     with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):
-        diagnose.evidence.distances(both, [trial])
+        diagnose.losses.distances(both, [trial])
 
 
 @pytest.mark.parametrize(
@@ -161,7 +157,7 @@ def test_what_no_simulation_survives_is_unexplained_and_says_why(
     simulator = Simulator(unstable(quadruped), 2)
     few = dataclasses.replace(Settings().scaled(4), generations=1)
     diagnose = DiagnosticSearch(
-        simulator, comparator, few, (BROKEN,), intact=[trial] if healthy else []
+        simulator, comparator, few, (BROKEN,), healthy_trials=[trial] if healthy else []
     )
     found = diagnose([trial], [], np.random.default_rng(0), lambda _: None)
 
@@ -171,11 +167,10 @@ def test_what_no_simulation_survives_is_unexplained_and_says_why(
     assert trial.path in found.reason
     assert not found.indistinguishable
     assert found.unsearched is None
-    assert found.to_dict()["reason"] == confidence_to_dict(found)["reason"] == found.reason
+    assert found.to_dict()["reason"] == found.reason
     again = diagnosis_from_dict(found.to_dict(), lambda text: parse(text, quadruped.anatomy))
     assert again == found
-    said = {"diagnosis": ranking_to_list(found.ranked), **confidence_to_dict(found)}
-    assert confidence_sentence(said) == f"Unexplained: {found.reason}."
+    assert verdict_sentences(found) == f"Unexplained: {found.reason}."
 
 
 def test_a_hypothesis_that_survives_is_better_than_one_that_diverges(quadruped: Robot):
@@ -212,7 +207,7 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
     trial = logged(quadruped, "intact", controller, steps=100)
     for signal in ("base_position", "joint_positions", "sensors"):
         trial = with_value(trial, signal, 7, 1, 1e300)
-    evidence = Evidence(Simulator(quadruped, 1), COMPARATORS[name])
+    evidence = LossTable(Simulator(quadruped, 1), COMPARATORS[name])
 
     with pytest.raises(InputError, match=r"is 1e\+300 at step 7, expected at"):
         evidence.check([trial])

@@ -9,17 +9,18 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
-from selfmodel.diagnosis.serialization import (
-    confidence_to_dict,
+from selfmodel.diagnosis.diagnosis import (
+    Candidate,
+    Change,
+    DetectableSeverity,
+    Diagnosis,
+    Fit,
+    Residual,
+    UnsearchedFault,
     diagnosis_from_dict,
-    diagnosis_from_output,
-    ranking_to_list,
+    output_of,
+    to_json,
 )
-from selfmodel.diagnosis.verdicts.change_point import Change
-from selfmodel.diagnosis.verdicts.detectable import DetectableSeverity
-from selfmodel.diagnosis.verdicts.fit import Fit
-from selfmodel.diagnosis.verdicts.residual import Residual
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -105,23 +106,11 @@ def test_the_fit_the_change_and_the_limits_survive_json(
     assert diagnosis_from_dict(json.loads(text), SPACE.parse) == whole
 
 
-def test_the_command_line_has_the_fit_the_change_and_the_limits(found: Diagnosis):
-    fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0, has_faults=True)
-    whole = dataclasses.replace(found, fit=fit, change=CHANGE, detectable=DETECTABLE)
-    values = json.loads(json.dumps(confidence_to_dict(whole), allow_nan=False))
-
-    assert values["fit"] == fit.to_dict()
-    assert values["change"] == CHANGE.to_dict()
-    assert values["detectable"] == [one.to_dict() for one in DETECTABLE]
-    plain = confidence_to_dict(found)
-    assert (plain["fit"], plain["change"], "detectable" in plain) == (None, None, False)
-
-
 def test_a_change_is_a_line_of_the_repr(found: Diagnosis):
     lines = repr(dataclasses.replace(found, change=CHANGE)).splitlines()
 
     assert lines[-1] == (
-        "  changed at about t = 4.9 s (4.8 to 5.0) of 02-recovery, before: intact>"
+        "  changed at about t = 4.9 s (4.8 to 5.0) of 02-recovery; before: intact>"
     )
 
 
@@ -130,28 +119,51 @@ def test_a_change_is_a_line_of_the_repr(found: Diagnosis):
     [
         ("fit", {"loss": "much"}),
         ("fit", {"loss": 0.1}),
-        ("change", {**CHANGE.to_dict(), "before": "break:nose"}),
-        ("change", {**CHANGE.to_dict(), "time": "late"}),
+        ("change", {**to_json(CHANGE), "before": "break:nose"}),
+        ("change", {**to_json(CHANGE), "time": "late"}),
         ("detectable", [{"kind": "motor", "part": "", "below": "none", "above": None}]),
     ],
 )
 def test_wrong_values_of_a_file_are_refused(found: Diagnosis, key: str, values: object):
-    with pytest.raises((ValueError, KeyError)):
+    with pytest.raises((ValueError, KeyError, TypeError)):
         diagnosis_from_dict({**found.to_dict(), key: values}, SPACE.parse)
 
 
 def test_the_command_line_lists_only_the_extra_fault(found: Diagnosis):
-    assert confidence_to_dict(found)["unseen"] == ["sensor:back_left_touch"]
+    assert output_of(found)["unseen"] == ["sensor:back_left_touch"]
     assert found.to_dict()["unseen"] == [f"{BEST}+sensor:back_left_touch"]
 
 
 def test_a_diagnosis_survives_the_output_of_the_command_line(found: Diagnosis):
-    whole = dataclasses.replace(found, change=CHANGE, residual=RESIDUAL, detectable=DETECTABLE)
-    output = {"diagnosis": ranking_to_list(whole.ranked), **confidence_to_dict(whole)}
+    fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0, has_faults=True)
+    whole = dataclasses.replace(
+        found, change=CHANGE, residual=RESIDUAL, detectable=DETECTABLE, fit=fit
+    )
+    output = json.loads(json.dumps(output_of(whole), allow_nan=False))
 
-    again = diagnosis_from_output(json.loads(json.dumps(output)), whole.trials, SPACE.parse)
+    assert diagnosis_from_dict({**output, "trials": whole.trials}, SPACE.parse) == whole
 
-    assert again == whole
+
+def test_the_published_keys_are_those_of_0_1_with_null_for_what_is_missing(found: Diagnosis):
+    values = output_of(found)
+
+    assert set(values) == {
+        *("diagnosis", "verdict", "rivals", "unseen", "test", "outside", "intact_distance"),
+        *("reason", "fit", "change", "residual", "detectable"),
+    }
+    assert values["rivals"] == [OTHER]
+    assert values["outside"]["kind"] == "friction"
+    assert values["reason"] is values["fit"] is values["change"] is values["residual"] is None
+    assert values["diagnosis"][1] == {"hypothesis": OTHER, "distance": None}
+
+
+def test_a_diagnosis_of_0_1_lacks_some_keys(found: Diagnosis):
+    early = {key: found.to_dict()[key] for key in ("ranked", "trials", "intact_distance")}
+    early |= {"rivals": [], "verdict": "explained", "test": ""}
+
+    read = diagnosis_from_dict(early, SPACE.parse)
+
+    assert (read.best, read.unsearched, read.undetectable, read.fit) == (found.best, None, (), None)
 
 
 def test_a_table_without_pandas_is_refused_with_the_remedy(

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.judgement import judged, ranked_by_distance
-from selfmodel.diagnosis.loss_functions import LossFunctions
-from selfmodel.diagnosis.question import Question
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.problem import Problem
+from selfmodel.diagnosis.verdict import WINDOW, judged, ranked_by_distance
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -43,13 +44,18 @@ def trial(robot: Robot, truth: str, path: str) -> Trial:
     return dataclasses.replace(run, path=path)
 
 
-def question_of(robot: Robot, *trials: Trial) -> Question:
-    """The question of some trials, with a trial of the healthy robot."""
+def problem_of(robot: Robot, *trials: Trial) -> Problem:
+    """The problem of some trials, with a trial of the healthy robot."""
     healthy = trial(robot, "intact", "healthy.mcap")
-    simulator = Simulator(robot, 1)
-    search = DiagnosticSearch(simulator, SEGMENT_PREDICTION, Settings(), intact=[healthy])
-    return search._question(
-        trials, trial_names(trials), partial(search.evidence.losses, trials=trials)
+    table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
+    return Problem(
+        table,
+        HypothesisSpace.of(PAPER_KINDS, robot.anatomy),
+        trials,
+        surrogate=table.surrogate(trials),
+        healthy_trials=[healthy],
+        names=trial_names(trials),
+        settings=Settings(),
     )
 
 
@@ -57,47 +63,31 @@ def parsed(robot: Robot) -> list[list[Hypothesis]]:
     return [[parse(one, robot.anatomy) for one in some] for some in OF_ONE_SET]
 
 
-def nearest(sets: Iterable[list[Hypothesis]], question: Question) -> set[Hypothesis]:
+def nearest(sets: Iterable[list[Hypothesis]], problem: Problem) -> set[Hypothesis]:
     """The hypothesis of each set with the smallest distance."""
-    distances = partial(question.evidence.distances, trials=question.trials)
+    distances = partial(problem.table.distances, trials=problem.trials)
     return {some[int(np.argmin(distances(some)))] for some in sets}
 
 
-def judged_truth(found: Iterable[Hypothesis], question: Question) -> Diagnosis:
+def judged_truth(found: Iterable[Hypothesis], problem: Problem) -> Diagnosis:
     """The judgement of a search that ended at the truth."""
-    return judged(parse(LAME, question.space.anatomy), found, question)
+    return judged(parse(LAME, problem.space.anatomy), found, problem)
 
 
 @pytest.mark.parametrize("judge", [judged_truth, ranked_by_distance])
 def test_the_ranking_has_each_set_of_faults_once_with_its_best_severities(
-    quadruped: Robot, judge: Callable[[Iterable[Hypothesis], Question], Diagnosis]
+    quadruped: Robot, judge: Callable[[Iterable[Hypothesis], Problem], Diagnosis]
 ):
-    question = question_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
+    problem = problem_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
     sets = parsed(quadruped)
-    found = judge([one for some in sets for one in some], question)
+    found = judge([one for some in sets for one in some], problem)
     ranked = [candidate.hypothesis for candidate in found.ranked]
 
     assert str(found.best) == LAME
     assert len(ranked) == len(sets)
-    assert set(ranked) == nearest(sets, question)
+    assert set(ranked) == nearest(sets, problem)
     distances = [candidate.distance for candidate in found.ranked]
     assert distances == sorted(distances)
-
-
-def test_the_indistinguishable_hypotheses_have_each_set_of_faults_once(quadruped: Robot):
-    question = question_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
-    alike = LossFunctions(
-        damaged=lambda some: np.ones((len(some), 20)),
-        surrogate=lambda some: np.ones((len(some), 20)),
-        healthy=None,
-    )
-    sets = parsed(quadruped)
-    alike_question = dataclasses.replace(question, losses=alike, joints=None)
-    found = judged_truth([one for some in sets for one in some], alike_question)
-
-    others = [some for some in sets if "+" not in str(some[0]) and str(some[0]) != LAME]
-    assert len(found.indistinguishable) == len(others)
-    assert set(found.indistinguishable) == nearest(others, question)
 
 
 def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
@@ -105,8 +95,12 @@ def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
 ):
     names = {"monday.mcap": "intact", "tuesday.mcap": LAME}
     trials = [trial(quadruped, truth, path) for path, truth in names.items()]
-    found = judged(INTACT, [INTACT], question_of(quadruped, *trials))
+    found = judged(INTACT, [INTACT], problem_of(quadruped, *trials))
 
     assert found.verdict == "unexplained"
     assert found.residual is not None
     assert found.residual.trial == "tuesday"
+    signals = found.residual.signals
+    assert 1 <= len(signals) <= 3
+    assert list(signals.values()) == sorted(signals.values(), reverse=True)
+    assert 0 < found.residual.end - found.residual.begin <= WINDOW * 0.13

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.comparators.command_errors import command_errors
+from selfmodel.comparators.readings import command_errors
 from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import RecoveryLoop

@@ -10,8 +10,7 @@ from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PRE
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.evidence import Evidence
-from selfmodel.diagnosis.search.surrogate import own_surrogates, surrogate_of
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
@@ -94,7 +93,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(
     played = dataclasses.replace(trial, plan=plan)
     search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
     hypotheses = [parse(text, quadruped.anatomy) for text in ("break:back_left_shoulder", "intact")]
-    distances = search.evidence.distances(hypotheses, [played])
+    distances = search.losses.distances(hypotheses, [played])
 
     assert distances[0] == 0 < distances[1]
 
@@ -115,10 +114,9 @@ def test_a_surrogate_that_cannot_judge_a_trial_is_replaced_by_the_comparator(qua
     angles = np.where(seen[:, np.newaxis], run["joint_positions"], np.nan)
     trial = logged(changed(run, joint_positions=angles))
     simulator = Simulator(quadruped, 1)
-    evidence = Evidence(simulator, SEGMENT_PREDICTION)
-    own = own_surrogates(SEGMENT_PREDICTION, simulator)
+    evidence = LossTable(simulator, SEGMENT_PREDICTION)
 
     with pytest.raises(InputError, match="needs joint_positions at 4 or more of 26 moments"):
-        own[0].check([trial])
-    assert surrogate_of(evidence, own, [trial]).evidence is evidence
+        evidence.cheaper[0].check([trial])
+    assert evidence.surrogate([trial])[0] is evidence
     DiagnosticSearch(simulator, SEGMENT_PREDICTION, SMALL).check([trial])

@@ -12,7 +12,7 @@ import pytest
 
 import selfmodel
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.result import Recovery

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import COMPARATORS
-from selfmodel.diagnosis.verdicts.change_point import Change
+from selfmodel.diagnosis.diagnosis import Change
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs.controllers import parse_controller
@@ -27,7 +27,7 @@ def test_the_losses_are_those_of_the_comparator(subject: Subject):
     assert isinstance(by_hypothesis, LineChart)
     assert isinstance(by_signal, LineChart)
 
-    (losses,) = subject.evidence.losses([subject.diagnosis.best], subject.damaged)
+    (losses,) = subject.losses.losses([subject.diagnosis.best], subject.damaged)
 
     assert by_hypothesis.series[0].y == tuple(losses)
     assert np.allclose(np.sum([one.y for one in by_signal.series], axis=0), losses)

@@ -30,7 +30,7 @@ def test_a_run_has_its_trials_and_diagnoses_with_the_losses_of_the_run(run: Path
     assert [diagnosis.trials for diagnosis in subject.diagnoses] == [1, 2]
     assert distances == [one["distance"] for one in result["diagnosis"]]
     assert list(map(str, hypotheses)) == [one["hypothesis"] for one in result["diagnosis"]]
-    assert np.array_equal(subject.evidence.distances(hypotheses, subject.damaged), distances)
+    assert np.array_equal(subject.losses.distances(hypotheses, subject.damaged), distances)
 
 
 def test_the_calibration_of_the_result_is_that_of_the_trials(subject: Subject):

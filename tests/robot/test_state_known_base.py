@@ -3,7 +3,7 @@
 import numpy as np
 
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
-from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -50,6 +50,6 @@ def test_an_observed_base_and_a_floating_base_are_unchanged():
 
 def test_a_log_of_an_arm_without_its_base_is_predicted_and_calibrated_exactly():
     trial = without_base(trial_of(arm()))
-    evidence = Evidence(Simulator(arm(), 1), SEGMENT_PREDICTION)
+    evidence = LossTable(Simulator(arm(), 1), SEGMENT_PREDICTION)
     assert evidence.distances([INTACT], [trial])[0] == 0
     assert calibrate(arm(), [trial], threads=1).error_before == 0

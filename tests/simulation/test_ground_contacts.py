@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.terrain import (
@@ -89,7 +89,7 @@ def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
     trial = Trial(plan, quadruped.name, behaviour, "nowhere.mcap")
     said = ["intact", "roughness=0.01", "roughness=0.02", "roughness=0.04"]
     hypotheses = [parse(both(one), quadruped.anatomy) for one in said]
-    losses = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION).distances(hypotheses, [trial])
+    losses = LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION).distances(hypotheses, [trial])
 
     assert said[int(np.argmin(losses))] == truth
 
@@ -157,7 +157,7 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
     for number, signals in enumerate((in_the_air, on_its_back)):
         behaviour = dataclasses.replace(whole, signals=signals)
         trial = Trial(plan, quadruped.name, behaviour, f"{number}.mcap")
-        evidence = Evidence(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+        evidence = LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
         rough = parse("roughness=0.02", quadruped.anatomy)
 
         assert ground_contact_points(quadruped, behaviour).shape == (0, 3)

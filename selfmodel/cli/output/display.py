@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
-from selfmodel.diagnosis.comparator_choice import ChosenComparator
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins

@@ -10,8 +10,8 @@ from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_lines
 from selfmodel.cli.output.ranking import ranking_table
 from selfmodel.cli.output.tables import folding, print_tables
-from selfmodel.diagnosis.sentences import confidence_sentence, right_or_wrong
-from selfmodel.diagnosis.serialization import confidence_to_dict, ranking_to_list
+from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
+from selfmodel.diagnosis.text import right_or_wrong, verdict_sentences
 from selfmodel.logs.results import RecoveryResult, ScoreResult, TrialResult
 from selfmodel.recovery.repertoire.model_digest import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT
@@ -19,11 +19,12 @@ from selfmodel.robot.designs import network_for
 from selfmodel.studies.experiment import Experiment, Outcome
 
 
-def print_report(found: dict[str, Any], folder: Path) -> None:
+def print_report(found: dict[str, Any], diagnosis: Diagnosis, folder: Path) -> None:
     """Prints the trials, the diagnosis, and the true hypothesis.
 
     Args:
         found: Result of ``recovery_result`` as JSON values.
+        diagnosis: The last diagnosis.
         folder: Folder of the recovery.
     """
     score = found["score"]
@@ -37,8 +38,9 @@ def print_report(found: dict[str, Any], folder: Path) -> None:
     print_tables(trials, ranking_table(found["diagnosis"], found["truth"]))
     evaluations, trials_since = found["evaluations"], found["physical_trials"]
     print_lines(
-        f"truth: {found['truth']}{_reality(found)}; the diagnosis is {right_or_wrong(found)}.",
-        confidence_sentence(found),
+        f"truth: {found['truth']}{_reality(found)}; the diagnosis is "
+        f"{right_or_wrong(str(diagnosis.best), found['truth'], correct=found['correct'])}.",
+        verdict_sentences(diagnosis),
         f"{_sentence(found)} at best in {counted(trials_since, 'trial')} since.",
         *_no_recovery(found),
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
@@ -126,8 +128,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
                 strict=True,
             )
         ),
-        diagnosis=ranking_to_list(recovery.diagnosis.ranked),
-        **confidence_to_dict(recovery.diagnosis),
+        **output_of(recovery.diagnosis),
         calibration=recovery.calibration.to_dict() if recovery.calibration else None,
         correct=outcome.correct,
         displacement={

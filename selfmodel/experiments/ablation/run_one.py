@@ -67,7 +67,7 @@ def diagnose_run(
         plugins.comparator(comparator),
         setting.settings,
         plugins.kinds(setting.shared["kinds"]),
-        intact=healthy,
+        healthy_trials=healthy,
     )
     rows: list[AblationRow] = []
     cost = DiagnosisCost()

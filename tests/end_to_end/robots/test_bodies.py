@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
-from selfmodel.diagnosis.evidence import Evidence
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -136,7 +136,7 @@ def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
         happened(body, intact),
         "",
     )
-    evidence = Evidence(Simulator(body, 1), SEGMENT_PREDICTION)
+    evidence = LossTable(Simulator(body, 1), SEGMENT_PREDICTION)
     losses = evidence.losses([intact, *others], [trial]).mean(axis=1)
 
     assert losses[0] < (1e-4 if body.name == "dog" else 1e-8)

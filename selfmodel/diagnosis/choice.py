@@ -1,0 +1,149 @@
+"""Preparation of trials for a comparator, and the choice of one that can judge all trials."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmodel.diagnosis.comparator import (
+    Comparator,
+    PiecewiseTrial,
+    PreparedTrial,
+    TrialRefusedError,
+)
+from selfmodel.errors import InputError
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import BASE_SIGNALS, completed_trial
+from selfmodel.simulation.requests import Segments, recordable
+from selfmodel.trials.trial import Trial, check_magnitudes
+
+
+def contract_error(comparator: Comparator, problem: str) -> InputError:
+    """Returns the error for a comparator that breaks its contract."""
+    return InputError(
+        f"the comparator {comparator.name!r} {problem}: run selfmodel.check_comparator on it"
+    )
+
+
+def prepared_trial(
+    comparator: Comparator, robot: Robot, trial: Trial
+) -> PreparedTrial | PiecewiseTrial:
+    """Returns a trial prepared for comparison, checked.
+
+    Args:
+        comparator: The comparator.
+        robot: The self-model.
+        trial: A logged trial of the robot.
+
+    Raises:
+        TrialRefusedError: The comparator cannot judge the trial.
+        InputError: The comparator breaks its contract, or a compared number is absurdly large.
+    """
+    # Numbers that are too large for arithmetic are refused by name, after the preparation.
+    with np.errstate(over="ignore", invalid="ignore"):
+        known = completed_trial(robot, trial)
+        try:
+            prepared: object = comparator.prepare(known)
+        except TrialRefusedError:
+            raise
+        except InputError as error:  # of a third-party comparator
+            raise TrialRefusedError(str(error)) from error
+    if not isinstance(prepared, PreparedTrial | PiecewiseTrial):
+        raise contract_error(
+            comparator, f"prepared {prepared!r}, which has no request with losses or distances"
+        )
+    request, possible = prepared.request, recordable(prepared.request)
+    if not request.record or not set(request.record) <= set(possible):
+        raise contract_error(
+            comparator, f"requested the signals {request.record!r}, of {', '.join(possible)}"
+        )
+    if robot.has_fixed_base and set(request.record) <= set(BASE_SIGNALS):
+        raise TrialRefusedError(
+            f"{comparator.name} compares the motion of the base, and the base of {robot.name} is "
+            f"fixed",
+            "give the comparator segment-prediction",
+        )
+    states = (*request.states, "commands") if isinstance(request, Segments) else ()
+    check_magnitudes(trial, tuple(dict.fromkeys((*states, *request.record))))
+    return prepared
+
+
+@dataclass(frozen=True)
+class ChosenComparator:
+    """A comparator that can judge all trials.
+
+    Attributes:
+        comparator: The comparator.
+        reason: The reason for the choice, a clause.
+    """
+
+    comparator: Comparator
+    reason: str
+
+
+ComparatorChoice = Callable[[Robot, Sequence[Trial]], ChosenComparator]
+"""Returns a comparator that can judge all trials of a robot, or raises ``InputError``."""
+
+
+def best_comparator(
+    preference: Sequence[Comparator], robot: Robot, trials: Sequence[Trial]
+) -> ChosenComparator:
+    """Returns the first comparator that can judge all trials.
+
+    Args:
+        preference: At least one comparator, best first; the last needs the fewest signals.
+        robot: The self-model.
+        trials: Logged trials of the robot.
+
+    Raises:
+        InputError: No comparator can judge all trials; the message has the reasons of the last one
+            for each trial. Or a compared number is absurdly large.
+    """
+    reasons: list[str] = []
+    for comparator in preference:
+        refused = _refusals(comparator, robot, trials)
+        if not refused:
+            return ChosenComparator(comparator, "; ".join(reasons) or "the logs have all signals")
+        reasons += refused
+    raise InputError(
+        f"no comparator of selfmodel can judge these trials: {'; '.join(refused)}: leave these "
+        f"trials out"
+    )
+
+
+def given_comparator(
+    comparator: Comparator,
+    preference: Sequence[Comparator],
+    robot: Robot,
+    trials: Sequence[Trial],
+) -> ChosenComparator:
+    """Returns a comparator that the caller gave, if it can judge all trials.
+
+    Args:
+        comparator: The comparator.
+        preference: Comparators to name in the error, best first.
+        robot: The self-model.
+        trials: Logged trials of the robot.
+
+    Raises:
+        InputError: The comparator cannot judge all trials; the message has the reason for each
+            trial, and the first comparator of the preference that can judge all of them. Or the
+            comparator breaks its contract, or a compared number is absurdly large.
+    """
+    refused = _refusals(comparator, robot, trials)
+    if not refused:
+        return ChosenComparator(comparator, "given")
+    able = [other for other in preference if not _refusals(other, robot, trials)]
+    remedy = f"give the comparator {able[0].name}, which can judge all trials, or " if able else ""
+    raise InputError(f"{'; '.join(refused)}: {remedy}leave these trials out")
+
+
+def _refusals(comparator: Comparator, robot: Robot, trials: Sequence[Trial]) -> list[str]:
+    """Returns the reasons for which a comparator cannot judge trials; none if it can judge all."""
+    found = []
+    for trial in trials:
+        try:
+            prepared_trial(comparator, robot, trial)
+        except TrialRefusedError as error:
+            found.append(error.reason)
+    return found

@@ -1,0 +1,256 @@
+"""Faults of single joints, decided by the motion of the joint itself.
+
+The search before this one compares losses over all signals. A small fault of a joint is lost in
+them, and so is the difference between kinds with similar effects: dry friction, damping, a weak
+motor, a jam. The joint's own motion contains both. On 24 recordings of another generator with one
+such fault (seed 0), the loss of the joint was 4 to 53 standard errors above that in the healthy
+trial; in 16 recordings of healthy robots with the same gait, no joint's was above 2.1.
+
+1. **Replacement**: at each joint with a fault, the best fault of the joint takes the place of the
+   present one if the motion of the joint is predicted significantly better; in the place of
+   several, if it is not predicted significantly worse.
+2. **Addition**: of the joints with an excess over the healthy trials, largest first, the first
+   whose best fault explains it gets this fault, until none does.
+3. **Pruning**, after a replacement or addition: a fault that is no longer required is removed.
+
+No step accepts a hypothesis that predicts the trials significantly worse. The best fault of a joint
+has the smallest sum of the total loss and the joint's loss.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.diagnosis.problem import Problem
+from selfmodel.diagnosis.search import LocalSearch
+from selfmodel.diagnosis.severity import with_fitted_severity
+from selfmodel.diagnosis.significance import (
+    MAX_LEFT_OF_JOINT,
+    MIN_EXCESS_OF_JOINT,
+    MIN_PIECES,
+    MIN_Z,
+    MIN_Z_OF_JOINT,
+    excess_over_healthy,
+    gain_exceeds_healthy_gain,
+    is_better,
+    paired_z,
+)
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.kind import Fault
+
+JOINTS_TRIED, KINDS_FITTED = 3, 3
+"""Joints that are tried for an addition, and kinds whose severities are fitted, best first."""
+
+
+def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
+    """Returns a hypothesis with its faults of single joints decided by the joints' own motion.
+
+    An added fault has to gain significantly more than on healthy trials, and to explain the joint.
+
+    Args:
+        best: The best hypothesis by the total loss.
+        search: The search that found it; its problem has losses of joints.
+    """
+    joints = _JointSearch(best, search)
+    current = best
+    for joint in joints.joints_of(best):
+        current = joints.replaced(current, joint)
+    while len(current) < search.problem.max_faults:
+        added = joints.with_one_more(current)
+        if added == current:
+            break
+        current = added
+    return best if current == best else joints.pruned(current)
+
+
+def excesses(hypothesis: Hypothesis, problem: Problem) -> dict[str, float]:
+    """Returns the excess of each joint's loss over that on healthy trials, largest first.
+
+    Args:
+        hypothesis: Hypothesis about the trials to explain; on the healthy trials, the empty one is
+            compared.
+        problem: The trials and their losses.
+
+    Returns:
+        Excess by the joint's name, standard errors, of the joints with at least ``MIN_PIECES``
+        known pieces in either; see ``significance.excess_over_healthy``.
+    """
+    found = {}
+    for joint in problem.space.anatomy.joints:
+        (one,) = known(problem.of_joint(joint.name, [hypothesis]))
+        (other,) = known(problem.healthy_of_joint(joint.name, [INTACT]))
+        if min(len(one), len(other)) >= MIN_PIECES:
+            found[joint.name] = excess_over_healthy(one, other)
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def distinguished(best: Hypothesis, others: Sequence[Hypothesis], problem: Problem) -> BoolArray:
+    """Returns a mask of the hypotheses that predict some joint significantly worse, ``(n,)``.
+
+    Args:
+        best: The hypothesis that may be better.
+        others: Hypotheses; the joints at which exactly one of the two has a fault are compared.
+        problem: The trials and their losses.
+    """
+    mask = np.zeros(len(others), dtype=np.bool_)
+    for row, other in enumerate(others):
+        different = set(best.faults) ^ set(other.faults)
+        parts = {fault.part for fault in different if fault.kind.is_of_joint}
+        mask[row] = any(
+            joint_is_better(*problem.of_joint(joint.name, [best, other]))
+            for joint in problem.space.anatomy.joints
+            if joint.name in parts
+        )
+    return mask
+
+
+def known(rows: FloatArray) -> FloatArray:
+    """Returns the pieces that are known in every row, ``(n, known pieces)``."""
+    return np.asarray(rows[:, ~np.isnan(rows).any(axis=0)])
+
+
+def joint_is_better(one: FloatArray, other: FloatArray) -> bool:
+    """Returns whether the losses of a joint are significantly smaller.
+
+    Args:
+        one: Losses of a hypothesis, ``(pieces,)``; NaN if unknown.
+        other: Losses of another hypothesis on the same pieces.
+
+    Returns:
+        False with fewer than ``MIN_PIECES`` pieces that are known in both.
+    """
+    smaller, larger = known(np.stack([one, other]))
+    if len(smaller) < MIN_PIECES or not np.isfinite(smaller).all():
+        return False
+    return not np.isfinite(larger).all() or paired_z(larger, smaller) >= MIN_Z
+
+
+class _JointSearch:
+    """Choice of the faults of joints, beginning with a hypothesis."""
+
+    def __init__(self, start: Hypothesis, search: LocalSearch) -> None:
+        self._start, self._problem, self._losses = start, search.problem, search.losses
+        self._space = search.problem.space
+
+    def joints_of(self, hypothesis: Hypothesis) -> list[str]:
+        """The joints with a fault of their motion, in the order of the anatomy."""
+        parts = {fault.part for fault in hypothesis.faults if fault.kind.is_of_joint}
+        return [joint.name for joint in self._space.anatomy.joints if joint.name in parts]
+
+    def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
+        """The hypothesis with the best fault of a joint in the place of its present ones."""
+        levels = self._best_levels(current, joint)
+        if not levels:
+            return current
+        candidate = self._best_fitted(levels, joint)
+        if self._is_better_at(joint, candidate, current):
+            return candidate
+        is_simpler = len(candidate) < len(current)
+        is_worse = joint_is_better(*self._problem.of_joint(joint, [current, candidate]))
+        is_enough = is_simpler and not is_worse and not self._harms(candidate, current)
+        return candidate if is_enough else current
+
+    def with_one_more(self, current: Hypothesis) -> Hypothesis:
+        """The hypothesis with a fault of a further joint; the same if none explains its joint."""
+        taken = self.joints_of(current)
+        excess = excesses(current, self._problem)
+        suspects = [
+            name for name, z in excess.items() if z >= MIN_EXCESS_OF_JOINT and name not in taken
+        ]
+        for joint in suspects[:JOINTS_TRIED]:
+            levels = self._best_levels(current, joint)
+            # A level near the true severity is much better already: fits cost most of this search.
+            if not levels or not self._is_better_at(joint, levels[0], current):
+                continue
+            candidate = self._best_fitted(levels, joint)
+            if self._explains(joint, candidate, current, excess[joint]):
+                return candidate
+        return current
+
+    def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis without the faults that neither the trials nor their joints require."""
+        current = hypothesis
+        while True:
+            fewer = next(
+                (one for one in self._space.with_one_less(current) if self._suffices(one, current)),
+                None,
+            )
+            if fewer is None:
+                return current
+            current = fewer
+
+    def _suffices(self, fewer: Hypothesis, current: Hypothesis) -> bool:
+        if is_better(*self._losses([current, fewer])):
+            return False
+        removed = set(current.faults) - set(fewer.faults)
+        joints = [fault.part for fault in removed if fault.kind.is_of_joint]
+        return not any(
+            joint_is_better(*self._problem.of_joint(joint, [current, fewer])) for joint in joints
+        )
+
+    def _explains(
+        self, joint: str, candidate: Hypothesis, current: Hypothesis, excess: float
+    ) -> bool:
+        """Returns whether a fault of a joint is the cause of its excess, and no model error."""
+        if not self._is_better_at(joint, candidate, current):
+            return False
+        alone = self._space.canonical(_faults_of(candidate, joint))
+        damaged = known(self._problem.of_joint(joint, [candidate, current]))
+        healthy = known(self._problem.healthy_of_joint(joint, [alone, INTACT]))
+        left = excesses(candidate, self._problem).get(joint, np.inf)
+        is_cause = left < min(MIN_Z_OF_JOINT, MAX_LEFT_OF_JOINT * excess)
+        return is_cause and gain_exceeds_healthy_gain(*damaged, *healthy)
+
+    def _best_levels(self, current: Hypothesis, joint: str) -> list[Hypothesis]:
+        """The hypothesis with each kind of fault of a joint at its best level, best first.
+
+        There is none without evidence on the joint.
+        """
+        if np.isnan(self._problem.of_joint(joint, [current])).all():
+            return []
+        others = [fault for fault in current.faults if fault not in _faults_of(current, joint)]
+        by_kind: dict[str, list[Hypothesis]] = {}
+        for fault in self._space.coarse_candidates:
+            if fault.kind.is_of_joint and fault.part == joint:
+                hypothesis = self._space.canonical([*others, fault])
+                if len(hypothesis) > len(others):
+                    by_kind.setdefault(fault.kind.name, []).append(hypothesis)
+        best = [self._smallest(levels, joint) for levels in by_kind.values()]
+        return sorted(best, key=lambda one: float(self._focused([one], joint)[0].sum()))
+
+    def _best_fitted(self, levels: Sequence[Hypothesis], joint: str) -> Hypothesis:
+        """The best of the first hypotheses, with the severity of the joint's fault fitted."""
+        focused = partial(self._focused, joint=joint)
+        fitted = []
+        for hypothesis in levels[:KINDS_FITTED]:
+            (fault,) = _faults_of(hypothesis, joint)
+            index = hypothesis.faults.index(fault)
+            fitted.append(with_fitted_severity(hypothesis, index, focused, self._space))
+        return self._smallest(fitted, joint)
+
+    def _smallest(self, hypotheses: Sequence[Hypothesis], joint: str) -> Hypothesis:
+        return hypotheses[int(np.argmin(self._focused(hypotheses, joint).sum(axis=1)))]
+
+    def _focused(self, hypotheses: Sequence[Hypothesis], joint: str) -> FloatArray:
+        """Total losses plus those of the joint, ``(n, pieces)``; inf without evidence on it."""
+        own = self._problem.of_joint(joint, hypotheses)
+        unknown = np.isnan(own)
+        own = np.where(unknown.all(axis=1, keepdims=True), np.inf, np.where(unknown, 0.0, own))
+        return self._losses(hypotheses) + own
+
+    def _is_better_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
+        """Returns whether one predicts the joint better, and the trials not worse."""
+        is_better_there = joint_is_better(*self._problem.of_joint(joint, [one, other]))
+        return is_better_there and not self._harms(one, other)
+
+    def _harms(self, one: Hypothesis, other: Hypothesis) -> bool:
+        """Returns whether one predicts the trials worse than another, or than the start."""
+        after, before, start = self._losses([one, other, self._start])
+        return is_better(before, after) or is_better(start, after)
+
+
+def _faults_of(hypothesis: Hypothesis, joint: str) -> list[Fault]:
+    """Returns the faults of the motion of a joint."""
+    return [fault for fault in hypothesis.faults if fault.kind.is_of_joint and fault.part == joint]

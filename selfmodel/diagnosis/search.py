@@ -1,0 +1,297 @@
+"""The search for the best hypothesis: the diagnostic EA, and a local search from its best.
+
+The EA (the paper, section III) finds the neighbourhood. The local search tests every neighbour and
+keeps a fault only where the trials require it; with losses of many short segments it finds the same
+hypothesis from nearly every start, and with one distance per trial there is no local search and
+the EA decides alone. The local search:
+
+1. **Starts**: the best hypotheses of the EA, the empty hypothesis, and the ``STARTS`` best single
+   faults by the surrogate comparator, one per kind and part. Severities are those of the
+   best levels by the surrogate (``severity.with_fitted_severities``), and they are pruned: most end
+   in the same few hypotheses.
+2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
+   ``SHORTLIST_SIZE`` of them, the comparator chooses the best, with its best levels, until the
+   total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A
+   hypothesis has at most ``max_faults`` faults.
+3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
+   not significantly better (``significance.is_better``), or its gain is model error
+   (``is_model_error``).
+4. **Second descent** over the neighbours with one fault replaced, then pruning, until a hypothesis
+   repeats. Every pruned hypothesis is a local optimum.
+5. **Fit** of each local optimum's severities between the levels, and pruning again.
+6. **Choice**: from the empty hypothesis on, in order of the number of faults and then of the total
+   loss, a hypothesis replaces the current best only if it is significantly better. Its severities
+   are fitted by the comparator itself, and it is pruned again.
+7. **Mean severities** (``severity.with_mean_severities``), unless they make a fault prunable.
+
+The surrogate comparator simulates a third of the segments (a tenth from three trials on), or the
+first third of each trial. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.problem import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.severity import ZOOMS, with_fitted_severities, with_mean_severities
+from selfmodel.diagnosis.significance import MIN_Z_OF_STEP, gain_is_model_error, is_better
+from selfmodel.evolution import Evolution, GenerationCallback, evolve
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
+from selfmodel.faults.kind import Fault
+from selfmodel.settings import Settings
+
+STARTS = 3
+"""Single faults to start from, in addition to the known hypotheses."""
+
+SHORTLIST_SIZE = 8
+"""Hypotheses that pass from the surrogate comparator to the comparator itself."""
+
+PROMISING = 16
+"""Faults that replace another, at most: so many of the best alone, and so many of the best added.
+A fault that lowers the loss in neither way is not tried in the place of each fault."""
+
+
+def evolved(
+    distances: LossFunction,
+    space: HypothesisSpace,
+    settings: Settings,
+    seeds: Sequence[Hypothesis],
+    rng: np.random.Generator,
+    *,
+    on_generation: GenerationCallback,
+) -> tuple[list[Hypothesis], int]:
+    """Returns the hypotheses that the diagnostic EA evaluated, best first, and their evaluations.
+
+    Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
+
+    Args:
+        distances: Returns the distance of each hypothesis from all trials, ``(n,)``.
+        space: The hypotheses about the robot.
+        settings: Parameters of the EA.
+        seeds: Hypotheses of the initial population, in addition to random ones.
+        rng: Source of all random numbers.
+        on_generation: Callback, called after each generation.
+    """
+    totals: dict[Hypothesis, float] = {}
+
+    def fitness(genomes: FloatArray) -> FloatArray:
+        hypotheses = [space.decode(genome) for genome in genomes]
+        found = distances(hypotheses)
+        totals.update(zip(hypotheses, map(float, found), strict=True))
+        return 0.0 - found  # not -found: a perfect fitness is 0, not -0
+
+    search = Evolution(
+        settings.genes * GENE_VALUES,
+        np.random.Generator.random,
+        settings,
+        rng,
+        [space.encode(hypothesis, settings.genes) for hypothesis in seeds],
+    )
+    evolve(search, fitness, on_generation)
+    return by_distance(totals), search.evaluations
+
+
+def by_distance(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
+    """Returns hypotheses by their distance; at equal distances, by their number of faults."""
+    return sorted(totals, key=lambda one: (totals[one], len(one), one))
+
+
+class LocalSearch:
+    """Descents and pruning on one problem; the algorithm is in the docstring of the module.
+
+    Args:
+        problem: The trials to explain, and the losses of hypotheses.
+
+    Attributes:
+        problem: As the argument.
+        compared: Hypotheses that were compared with the trials.
+        proposed: Hypotheses that were compared by the surrogate.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.compared: set[Hypothesis] = set()
+        self.proposed: set[Hypothesis] = set()
+        self._space = problem.space
+        self._ends: dict[Hypothesis, Hypothesis] = {}
+
+    def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        """Returns the losses on the trials, ``(n, pieces)``; the hypotheses count as compared."""
+        self.compared.update(hypotheses)
+        return self.problem.losses(hypotheses)
+
+    def coarse(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        """Returns the losses by the surrogate; the hypotheses count as proposed."""
+        self.proposed.update(hypotheses)
+        return self.problem.coarse(hypotheses)
+
+    def refined(self, known: Iterable[Hypothesis]) -> Hypothesis:
+        """Returns the best hypothesis in which every fault is required by the trials.
+
+        Args:
+            known: Hypotheses to start from, in addition to the best single faults and ``INTACT``.
+        """
+        proposed = dict.fromkeys([*known, INTACT, *self.best_single_faults()[:STARTS]])
+        starts = dict.fromkeys(
+            self.pruned(self._fitted(start, self.coarse, zooms=0)) for start in proposed
+        )
+        local_optima = {optimum for start in starts for optimum in self.local_optima(start)}
+        refits = {self.pruned(self._fitted(optimum, self.coarse)) for optimum in local_optima}
+        chosen = INTACT
+        for hypothesis in sorted(refits, key=lambda one: (len(one), self.total_loss(one), one)):
+            if is_better(*self.losses([hypothesis, chosen])):
+                chosen = hypothesis
+        best = self.pruned(self._fitted(chosen, self.losses))
+        mean = with_mean_severities(best, self.losses, self._space)
+        return mean if self.pruned(mean) == mean else best
+
+    def total_loss(self, hypothesis: Hypothesis) -> float:
+        """Returns the sum of the losses of a hypothesis on the trials."""
+        return float(self.losses([hypothesis])[0].sum())
+
+    def _fitted(
+        self, hypothesis: Hypothesis, losses: LossFunction, zooms: int = ZOOMS
+    ) -> Hypothesis:
+        return with_fitted_severities(hypothesis, losses, self._space, zooms)
+
+    def best_single_faults(self) -> list[Hypothesis]:
+        """Single faults, best first by the surrogate, one severity per kind and part."""
+        singles = self._allowed(self._space.with_one_more(INTACT))
+        parts: dict[Fault, Hypothesis] = {}
+        for single in by_total_loss(singles, self.coarse):
+            (fault,) = single.faults
+            parts.setdefault(Fault(fault.kind, fault.part), single)
+        return list(parts.values())
+
+    def local_optima(self, start: Hypothesis) -> list[Hypothesis]:
+        """Pruned ends of successive descents from a start, until a hypothesis repeats.
+
+        The descent over replacements is needed because a replaced fault may lower the loss more
+        and correct no more than model error.
+        """
+        current = self.pruned(self._descended(start))
+        optima = dict.fromkeys([current])
+        while True:
+            current = self.pruned(self._descended_by_replacement(current))
+            if current in optima:
+                return list(optima)
+            optima[current] = None
+
+    def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis after pruning: the fault whose removal costs least is removed first."""
+        current = hypothesis
+        while True:
+            sufficient = [
+                fewer
+                for fewer in self._shortlist(self._space.with_one_less(current))
+                if not self._is_required(current, fewer)
+            ]
+            if not sufficient:
+                return current
+            current = sufficient[0]
+
+    def _descended(self, start: Hypothesis) -> Hypothesis:
+        """The end of the descent over faults added, replaced and removed; known ends are kept."""
+        passed, current = [], start
+        while current not in self._ends:
+            passed.append(current)
+            more = self._by_surrogate(self._space.with_one_more(current))
+            others = [*self._replaced(current, more), *self._space.with_one_less(current)]
+            following = self._step(current, [*more[:SHORTLIST_SIZE], *others])
+            if following is None:
+                self._ends[current] = current
+            else:
+                current = following
+        self._ends |= dict.fromkeys(passed, self._ends[current])
+        return self._ends[current]
+
+    def _descended_by_replacement(self, start: Hypothesis) -> Hypothesis:
+        current = start
+        while True:
+            more = self._by_surrogate(self._space.with_one_more(current))
+            following = self._step(current, self._replaced(current, more))
+            if following is None:
+                return current
+            current = following
+
+    def _step(self, current: Hypothesis, neighbours: Sequence[Hypothesis]) -> Hypothesis | None:
+        """The best neighbour with its best levels; None if the descent ends."""
+        best = self._shortlist(neighbours)
+        if not best or not self._is_step(best[0], current):
+            return None
+        # The fit by the surrogate may raise the loss of the comparator.
+        return min(best[0], self._fitted(best[0], self.coarse, zooms=0), key=self.total_loss)
+
+    def _replaced(self, current: Hypothesis, more: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The hypotheses with a promising fault in the place of one fault.
+
+        Args:
+            current: Hypothesis whose faults are replaced.
+            more: The hypotheses with one fault more, best first.
+        """
+        singles = [single.faults[0] for single in self.best_single_faults()[:PROMISING]]
+        added = [fault for one in more for fault in one.faults if fault not in current.faults]
+        promising = dict.fromkeys([*singles, *added[:PROMISING]])
+        faults = current.faults
+        changed = [
+            self._space.canonical([*faults[:i], *faults[i + 1 :], fault])
+            for i in range(len(faults))
+            for fault in promising
+        ]
+        return [one for one in dict.fromkeys(changed) if one != current]
+
+    def _by_surrogate(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        return by_total_loss(self._allowed(hypotheses), self.coarse)
+
+    def _is_step(self, one: Hypothesis, current: Hypothesis) -> bool:
+        """Returns whether a descent continues: a further fault has to be worth its place."""
+        if len(one) <= len(current):
+            return self.total_loss(one) < self.total_loss(current)
+        further, fewer = self.losses([one, current])
+        return is_better(further, fewer, MIN_Z_OF_STEP)
+
+    def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best hypotheses by the surrogate, sorted by the total loss of the comparator."""
+        few = self._allowed(hypotheses)
+        if len(few) > SHORTLIST_SIZE:
+            few = by_total_loss(few, self.coarse)[:SHORTLIST_SIZE]
+        return by_total_loss(few, self.losses)
+
+    def _is_required(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
+        """Returns whether the gain of the extra faults is significant and no model error."""
+        return is_better(*self.losses([hypothesis, fewer])) and not is_model_error(
+            hypothesis, fewer, self.problem
+        )
+
+    def _allowed(self, hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
+        return [one for one in hypotheses if len(one) <= self.problem.max_faults]
+
+
+def is_model_error(hypothesis: Hypothesis, fewer: Hypothesis, problem: Problem) -> bool:
+    """Returns whether extra faults improve the healthy trials about as much as the damaged ones.
+
+    Args:
+        hypothesis: The hypothesis with the extra faults.
+        fewer: The hypothesis without the extra faults.
+        problem: The trials and their losses.
+
+    Returns:
+        False if there are no comparable healthy trials.
+    """
+    extra = [fault for fault in hypothesis.faults if fault not in fewer.faults]
+    healthy = problem.healthy([problem.space.canonical(extra), INTACT])
+    # Most faults worsen the healthy trials; their losses on the damaged trials are not needed.
+    if healthy is None or not healthy[0].mean() < healthy[1].mean():
+        return False
+    return gain_is_model_error(*problem.losses([hypothesis, fewer]), *healthy)
+
+
+def any_fault_is_model_error(hypothesis: Hypothesis, problem: Problem) -> bool:
+    """Returns whether at least one fault of a hypothesis corrects model error."""
+    return any(
+        is_model_error(hypothesis, problem.space.canonical(rest), problem)
+        for rest in combinations(hypothesis.faults, max(len(hypothesis) - 1, 0))
+    )

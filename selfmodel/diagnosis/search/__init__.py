@@ -1,1 +1,0 @@
-"""The search for the best hypothesis: refinement, severities and surrogates."""

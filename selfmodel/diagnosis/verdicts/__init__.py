@@ -1,1 +1,0 @@
-"""The judgement of the best hypothesis: tests, numbers and verdict."""

@@ -1,0 +1,57 @@
+"""A problem with losses that are functions of the hypotheses, without trials and physics."""
+
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+
+import numpy as np
+
+from selfmodel.diagnosis.problem import LossFunction, Problem
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+
+HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
+
+
+class Synthetic(Problem):
+    """A problem of given losses.
+
+    Args:
+        space: The hypotheses.
+        losses: Losses on the trials, ``(n, pieces)``.
+        most: Faults of a hypothesis, at most.
+        coarse: Losses by the surrogate; those on the trials by default.
+        before: Losses on healthy trials.
+        hinges: Losses of hinges on the trials, ``(n, pieces, hinges)``.
+        hinges_before: Losses of hinges on healthy trials.
+    """
+
+    def __init__(
+        self,
+        space: HypothesisSpace,
+        losses: LossFunction,
+        *,
+        most: int = 4,
+        coarse: LossFunction | None = None,
+        before: LossFunction | None = None,
+        hinges: HingeLosses | None = None,
+        hinges_before: HingeLosses | None = None,
+    ) -> None:
+        self.space, self.max_faults, self.kept = space, most, 10
+        self.trials = self.healthy_trials = ()
+        self.losses = losses
+        self.coarse = coarse or losses
+        self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
+        self.table = SimpleNamespace(by_hinge=self._by_hinge)
+        self.has_joints = hinges is not None
+
+    def healthy(self, hypotheses: Sequence[Hypothesis]) -> np.ndarray | None:
+        """Returns the given losses."""
+        return self._before(hypotheses) if self._before else None
+
+    def healthy_of_joint(self, joint: str, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        """Returns the given losses of a joint."""
+        return self._of_joint(joint, hypotheses, "healthy")
+
+    def _by_hinge(self, hypotheses: Sequence[Hypothesis], trials: object) -> np.ndarray | None:
+        given = self._hinges_before if trials == "healthy" else self._hinges
+        return given(hypotheses) if given else None

@@ -1,0 +1,424 @@
+"""Promises of the alternatives to a best hypothesis: functions of the losses and the space."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.arrays import FloatArray
+from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
+from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.alternatives import (
+    detectable_severities,
+    indistinguishable,
+    undetectable,
+    unsearched_fault,
+)
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, UnsearchedFault
+from selfmodel.diagnosis.problem import LossFunction
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
+from selfmodel.diagnosis.text import verdict_sentences
+from selfmodel.faults import BROKEN, FRICTION, ROUGHNESS
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import JAMMED, WEAK_MOTOR
+from selfmodel.faults.kind import ENVIRONMENT, Fault
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS
+from selfmodel.faults.world import PAYLOAD
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import draw_reality
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
+from tests.diagnosis.synthetic import Synthetic
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import in_memory
+
+PIECES = 60
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
+ANATOMY = ROBOTS["quadruped"].robot().anatomy
+PAPER = HypothesisSpace(ANATOMY, PAPER_KINDS)
+KNEE = "front_left_knee"
+TOUCH, BREAK, JAM = "sensor:front_right_touch", "break:front_left_knee", "jam:back_left_knee"
+
+
+def said(text: str) -> Hypothesis:
+    return parse(text, ANATOMY)
+
+
+def of(means: Mapping[str, float], otherwise: float = 1.0, scatter: float = 0.01) -> LossFunction:
+    """Losses with scatter: a mean for each named hypothesis, another mean for the rest."""
+    noise = scatter * np.random.default_rng(0).normal(size=PIECES)
+    known = {said(text): mean for text, mean in means.items()}
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        rows = [known.get(one, otherwise) for one in hypotheses]
+        return np.array(
+            [mean + noise * (1 + mean) if mean < np.inf else np.full(PIECES, mean) for mean in rows]
+        )
+
+    return losses
+
+
+def named(found: Sequence[Hypothesis]) -> list[str]:
+    return [str(one) for one in found]
+
+
+def test_neighbours_that_predict_as_well_are_indistinguishable_and_others_are_not():
+    best = f"{BREAK}+{TOUCH}"
+    alike = {f"{BREAK}+{JAM}": 1 + 2e-7, f"{BREAK}+sensor:back_left_touch": 1 + 1e-7}
+    far = "jam:back_right_knee+jam:front_right_knee"  # two faults differ
+    larger = f"{best}+{JAM}"
+    losses = of({best: 1.0, **alike, far: 1.0, larger: 0.99}, otherwise=2.0)
+
+    found = indistinguishable(said(best), Synthetic(PAPER, losses))
+
+    assert named(found) == [f"{BREAK}+sensor:back_left_touch", f"{BREAK}+{JAM}"]
+
+
+def test_a_single_fault_in_the_place_of_two_is_a_neighbour():
+    best = f"{BREAK}+{TOUCH}"
+    losses = of({best: 1.0, JAM: 1.0}, otherwise=2.0)
+
+    assert named(indistinguishable(said(best), Synthetic(PAPER, losses))) == [JAM]
+
+
+def test_the_same_faults_at_another_severity_are_no_alternative_and_others_are_fitted():
+    space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
+    best = said("friction=0.4")
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        rows = []
+        for one in hypotheses:
+            (fault,) = one.faults or (None,)
+            weak = fault is not None and fault.part == "front_left_knee"
+            mean = (
+                1.0 + 5 * max(abs(fault.severity - 0.37) - 0.02, 0.0)
+                if weak
+                else 1.0
+                if one == best
+                else 2.0
+            )
+            rows.append(mean * np.linspace(0.99, 1.01, PIECES))
+        return np.array(rows)
+
+    (found,) = indistinguishable(best, Synthetic(space, losses))
+
+    assert found.faults[0].part == "front_left_knee"
+    assert found.faults[0].severity == pytest.approx(0.37, abs=0.021)
+
+
+def test_nothing_is_indistinguishable_from_intact():
+    assert indistinguishable(INTACT, Synthetic(PAPER, of({}))) == []
+
+
+def test_an_alternative_that_corrects_model_error_or_misses_a_joint_is_none():
+    best = said(f"motor:{KNEE}=0.4")
+    space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
+    levels = {f"friction={level}": 1.0 for level in FRICTION.levels}
+    after = of({f"motor:{KNEE}=0.4": 1.0, **levels, "intact": 1.5}, otherwise=3.0)
+    (found,) = indistinguishable(best, Synthetic(space, after))
+    assert found.faults[0].kind == FRICTION
+
+    slippery = of(dict.fromkeys(levels, 0.5))
+    assert indistinguishable(best, Synthetic(space, after, before=slippery)) == []
+
+    def hinges(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        rows = np.full((len(hypotheses), PIECES, len(ANATOMY.hinges)), 0.1)
+        rows[[one != best for one in hypotheses], :, ANATOMY.hinges.index(KNEE)] = 2.0
+        return rows * np.linspace(0.9, 1.1, PIECES)[:, np.newaxis]
+
+    assert indistinguishable(best, Synthetic(space, after, hinges=hinges)) == []
+
+
+def test_a_fault_that_makes_no_difference_is_undetectable_and_one_that_makes_one_is_not():
+    losses = of({"intact": 1.0, TOUCH: 1.0, BREAK: 0.5}, otherwise=2.0)
+
+    assert named(undetectable(INTACT, Synthetic(PAPER, losses))) == [TOUCH]
+
+
+def test_undetectable_faults_are_sorted_and_each_is_one_more():
+    # The difference is below NEGLIGIBLE_LOSS.
+    more = {f"{BREAK}+sensor:back_left_touch": 1.0, f"{BREAK}+{JAM}": 1 - 1e-7}
+    losses = of({BREAK: 1.0, **more}, otherwise=2.0)
+
+    found = undetectable(said(BREAK), Synthetic(PAPER, losses))
+
+    assert named(found) == list(more)[::-1]
+
+
+@pytest.mark.parametrize("means", [{"intact": 1.0}, {}])
+def test_beside_a_diverged_simulation_nothing_is_undetectable(means: dict[str, float]):
+    assert undetectable(INTACT, Synthetic(PAPER, of(means, otherwise=np.inf))) == []
+
+
+def test_only_what_the_surrogate_does_not_tell_apart_is_simulated():
+    asked: set[Hypothesis] = set()
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        asked.update(hypotheses)
+        return of({"intact": 1.0}, otherwise=2.0)(hypotheses)
+
+    coarse = of({"intact": 1.0, TOUCH: 1.0}, otherwise=2.0)
+
+    assert undetectable(INTACT, Synthetic(PAPER, losses, coarse=coarse)) == []
+    assert {str(one) for one in asked} == {"intact", TOUCH}
+
+
+def test_kinds_with_severities_are_never_undetectable():
+    found = undetectable(INTACT, Synthetic(HypothesisSpace(ANATOMY, ALL_KINDS), of({})))
+
+    assert {fault.kind for one in found for fault in one.faults} == set(PAPER_KINDS)
+
+
+def test_an_unsearched_fault_that_explains_more_is_returned_with_the_other_kinds():
+    after = of({"wind=12": 0.8, "crosswind=12": 0.9})
+    found = unsearched_fault(INTACT, Synthetic(PAPER, after, before=of({})))
+
+    assert found == UnsearchedFault(said("wind=12"), "wind", {"crosswind": said("crosswind=12")})
+
+
+def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
+    after, before = of({"wind=12": 0.8}), of({"wind=12": 0.79})
+
+    assert unsearched_fault(INTACT, Synthetic(PAPER, after, before=before)) is None
+
+
+def never(_: Sequence[Hypothesis]) -> FloatArray:
+    raise AssertionError
+
+
+@pytest.mark.parametrize("loss", [NEGLIGIBLE_LOSS, np.inf])
+def test_beside_an_exact_or_diverged_hypothesis_no_unsearched_fault_is_simulated(loss: float):
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        return np.full((len(hypotheses), PIECES), loss)
+
+    problem = Synthetic(PAPER, losses, coarse=never, before=of({}))
+
+    assert unsearched_fault(INTACT, problem) is None
+
+
+def test_without_comparable_healthy_trials_no_unsearched_fault_is_simulated():
+    assert unsearched_fault(INTACT, Synthetic(PAPER, of({}), coarse=never)) is None
+
+
+def test_only_unsearched_kinds_are_asked_about_and_none_that_reshapes_the_model():
+    asked: set[Hypothesis] = set()
+
+    def coarse(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        asked.update(hypotheses)
+        return of({})(hypotheses)
+
+    best = said("sensor:back_left_angle")
+    problem = Synthetic(PAPER, of({}), coarse=coarse, before=of({}))
+    assert unsearched_fault(best, problem) is None
+
+    kinds = {fault.kind for one in asked - {best} for fault in one.faults}
+    assert kinds >= set(ALL_KINDS) - set(PAPER_KINDS) - {ROUGHNESS}
+    assert ROUGHNESS not in kinds
+    # A sensor gain replaces the failed sensor; all other faults are added to it.
+    assert said("sensor:back_left_angle=gain0.5") in asked
+    assert all(best.faults[0] in one.faults or len(one) == 1 for one in asked)
+
+
+def test_with_all_kinds_searched_nothing_is_unsearched():
+    space = HypothesisSpace(ANATOMY, ALL_KINDS)
+
+    assert unsearched_fault(INTACT, Synthetic(space, of({}), before=of({}))) is None
+
+
+NOISE = np.random.default_rng(0).normal(0, 0.1, 40)
+Effect = Callable[[Fault], float]
+
+
+def with_effect(effect: Effect) -> Callable[[Sequence[Hypothesis]], np.ndarray]:
+    """Losses of 1, plus the effect of each fault with a noise of a tenth."""
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        totals = [sum(effect(fault) for fault in one.faults) for one in hypotheses]
+        return np.array([1 + total * (1 + NOISE) for total in totals])
+
+    return losses
+
+
+def shows(part: str, limit: float, nominal: float) -> Effect:
+    """The effect of a fault of a part that shows from a distance to the nominal severity on."""
+    return lambda fault: 1.0 * (fault.part == part and abs(fault.severity - nominal) >= limit)
+
+
+def limits(effect: Effect, *kinds: object, best: Hypothesis = INTACT) -> list[DetectableSeverity]:
+    return detectable_severities(best, HypothesisSpace.of(kinds, ANATOMY), with_effect(effect))
+
+
+def test_the_largest_torque_that_shows_is_named_and_a_part_that_never_shows_has_no_limit():
+    rows = {one.part: one for one in limits(shows(KNEE, 0.25, 1.0), WEAK_MOTOR)}
+
+    assert rows[KNEE] == DetectableSeverity("motor", KNEE, below=0.7, above=None)
+    assert {(one.below, one.above) for part, one in rows.items() if part != KNEE} == {(None, None)}
+    assert len(rows) == 8
+
+
+@settings(max_examples=60)
+@given(limit=st.floats(0.01, 1.2))
+def test_the_bisection_finds_the_same_severity_as_a_scan_of_the_levels(limit: float):
+    levels = sorted(WEAK_MOTOR.levels_at(ANATOMY, KNEE), reverse=True)
+    below = [level for level in levels if level < 1.0]
+    scanned = [(1.0 + below[0]) / 2, *below]
+    expected = next((level for level in scanned if 1.0 - level >= limit), None)
+    (row,) = [one for one in limits(shows(KNEE, limit, 1.0), WEAK_MOTOR) if one.part == KNEE]
+
+    assert row.below == expected
+
+
+def test_a_bisection_asks_for_few_of_the_severities():
+    asked: set[Hypothesis] = set()
+    of = with_effect(shows(KNEE, 0.25, 1.0))
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        asked.update(hypotheses)
+        return of(hypotheses)
+
+    space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
+    detectable_severities(INTACT, space, losses)
+    own = {one for one in asked if any(fault.part == KNEE for fault in one.faults)}
+
+    assert 0 < len(own) <= np.ceil(np.log2(len(WEAK_MOTOR.levels_at(ANATOMY, KNEE)) + 2))
+
+
+def test_both_sides_of_a_nominal_severity_have_a_limit():
+    slope = KINDS["slope"]
+    rows = limits(shows(ENVIRONMENT, 0.1, 0.0), slope)
+    levels = slope.levels_at(ANATOMY, ENVIRONMENT)
+
+    assert [(one.kind, one.part) for one in rows] == [("slope", ENVIRONMENT)]
+    assert rows[0].above == min(level for level in levels if level >= 0.1)
+    assert rows[0].below == max(level for level in levels if level <= -0.1)
+
+
+@pytest.mark.parametrize("true", [0.5, 0.8])
+def test_the_nominal_friction_is_the_level_with_the_smallest_loss(true: float):
+    """The model has its own friction, which no severity of the kind is nominal for."""
+    levels = sorted(FRICTION.levels_at(ANATOMY, ENVIRONMENT))
+    nominal = min(levels, key=lambda level: abs(level - true))
+
+    def effect(fault: Fault) -> float:
+        distance = abs(fault.severity - nominal)
+        return 1e-7 * distance if distance < 0.19 else 1.0
+
+    (row,) = limits(effect, FRICTION)
+
+    assert row.below is None or row.below < nominal
+    assert row.above is None or row.above > nominal
+    assert row.below == max((one for one in levels if one <= nominal - 0.19), default=None)
+    assert row.above == min((one for one in levels if one >= nominal + 0.19), default=None)
+
+
+def test_parts_with_a_fault_are_left_out():
+    faulty = Hypothesis((Fault(WEAK_MOTOR, KNEE, 0.5),))
+    parts = [one.part for one in limits(shows(KNEE, 0.25, 1.0), WEAK_MOTOR, best=faulty)]
+
+    assert len(parts) == 7
+    assert KNEE not in parts
+
+
+def test_kinds_without_a_severity_and_kinds_that_edit_the_specification_are_left_out():
+    assert limits(shows(KNEE, 0.25, 1.0), JAMMED, BROKEN) == []
+    assert limits(shows(KNEE, 0.25, 1.0), KINDS["roughness"]) == []
+    parts = [(one.kind, one.part) for one in limits(shows(KNEE, 0.25, 1.0), JAMMED, PAYLOAD)]
+    assert parts == [("payload", part) for part in PAYLOAD.parts(ANATOMY)]
+
+
+def test_a_severity_that_diverges_shows_and_a_best_that_diverges_shows_nothing():
+    rows = limits(lambda fault: np.inf if fault.severity < 0.5 else 0.0, WEAK_MOTOR)
+    assert {one.below for one in rows} == {
+        max(level for level in WEAK_MOTOR.levels_at(ANATOMY, KNEE) if level < 0.5)
+    }
+
+    space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
+    rows = detectable_severities(INTACT, space, lambda many: np.full((len(many), 40), np.inf))
+    assert {one.below for one in rows} == {None}
+
+
+def test_only_losses_clearly_worse_than_the_best_show():
+    """A difference of four standard errors is better than nothing, and too little to be found."""
+    swing = np.resize([1.0, -1.0], 40)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = np.ones((len(hypotheses), 40))
+        for row, one in zip(rows, hypotheses, strict=True):
+            if one.faults:
+                z = 6.0 if one.faults[0].part == KNEE else 4.0
+                row += 0.01 * (z + swing * np.sqrt(39))  # noqa: PLW2901  # of an array, in place
+        return rows
+
+    space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
+    rows = {one.part: one.below for one in detectable_severities(INTACT, space, losses)}
+
+    assert rows.pop(KNEE) is not None
+    assert set(rows.values()) == {None}
+
+
+def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
+    """A trial across a small reality gap."""
+    reality = draw_reality(robot, 3, 0.03)
+    physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
+    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
+    return in_memory(robot)(physical, plan)
+
+
+def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
+    search = DiagnosticSearch(
+        Simulator(robot, 1),
+        SEGMENT_PREDICTION,
+        SMALL,
+        healthy_trials=[trial(robot, "intact", gait, "before", 0)],
+    )
+    after = [trial(robot, truth, gait, "after", 1)]
+    return search(after, [], np.random.default_rng(0), lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("truth", "kind"),
+    [
+        ("wind=30", "wind"),
+        pytest.param("sensor:back_left_angle=gain0.3", "sensor-gain", marks=pytest.mark.search),
+        pytest.param("intact", None, marks=pytest.mark.search),
+    ],
+)
+def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
+    quadruped: Robot, truth: str, kind: str | None
+):
+    found = diagnosed(quadruped, truth, random_controllers(quadruped, 5)[2])
+
+    assert (found.verdict == "unexplained") == (kind is not None)
+    assert (found.unsearched.kind if found.unsearched else None) == kind
+    told = verdict_sentences(found)
+    assert told.startswith(
+        f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Intact"
+    )
+    assert (f"add {kind} to --kinds" in told) == (kind is not None)
+    assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
+
+
+@pytest.mark.search
+def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
+    gait = random_controllers(quadruped, 5)[2]
+    search = DiagnosticSearch(
+        Simulator(quadruped, 1),
+        SENSOR_SERIES,
+        dataclasses.replace(SMALL, steps=300),
+        healthy_trials=[trial(quadruped, "intact", gait, "before", 0)],
+    )
+    found = search(
+        [trial(quadruped, "wind=30", gait, "after", 1)],
+        [],
+        np.random.default_rng(0),
+        lambda _: None,
+    )
+
+    assert found.unsearched is None

@@ -1,0 +1,235 @@
+"""Tests of the change-point in time, on synthetic losses along a timeline."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.diagnosis.change import Split, best_split, change_at, is_change
+from selfmodel.diagnosis.losses import Timeline
+from selfmodel.diagnosis.problem import LossFunction as Losses
+from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z_OF_CHANGE
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.tasks import ROBOTS
+
+ANATOMY = ROBOTS["quadruped"].robot().anatomy
+JAM = parse("jam:front_left_knee", ANATOMY)
+BREAK = parse("break:back_left_knee", ANATOMY)
+PIECES = 60
+PIECE = 0.12
+"""Seconds of a piece."""
+
+
+def of(rows: Mapping[Hypothesis, np.ndarray]) -> Losses:
+    return lambda hypotheses: np.array([rows[one] for one in hypotheses])
+
+
+def losses_of(change: int, *, pieces: int = PIECES, noise: float = 0.2, seed: int = 0) -> Losses:
+    """Losses of a robot that is intact before a piece, and jammed from it on."""
+    rng = np.random.default_rng(seed)
+    common = rng.gamma(2, 0.1, pieces)
+    jammed = np.arange(pieces) >= change
+    rows = {
+        INTACT: jammed * 1.0,
+        JAM: ~jammed * 1.0,
+        BREAK: np.full(pieces, 0.9),
+    }
+    return of({one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()})
+
+
+def timeline_of(*pieces: int) -> Timeline:
+    """Times of the pieces of trials with so many pieces each."""
+    begin = np.concatenate([np.arange(count) * PIECE for count in pieces])
+    return Timeline(np.repeat(np.arange(len(pieces)), pieces), begin, begin + PIECE)
+
+
+def split_of(losses: Losses) -> Split | None:
+    return best_split([INTACT], [JAM, BREAK], losses, losses)
+
+
+@settings(max_examples=100)
+@given(
+    change=st.integers(MIN_PIECES, PIECES - MIN_PIECES),
+    noise=st.floats(0, 0.5),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_the_interval_contains_the_true_time_of_a_change(change: int, noise: float, seed: int):
+    losses = losses_of(change, noise=noise, seed=seed)
+    split = split_of(losses)
+    assert split == Split(INTACT, JAM, change)
+
+    found = change_at(split, losses, timeline_of(PIECES), ["only"])
+    assert (found.trial, found.index, found.before, found.after) == ("only", 0, INTACT, JAM)
+    assert found.time == pytest.approx(change * PIECE)
+    assert found.earliest < found.time < found.latest
+    assert found.latest - found.earliest <= 12 * PIECE
+
+
+def test_the_interval_contains_the_true_time_where_the_found_one_is_wrong():
+    covered, wrong = 0, 0
+    for seed in range(60):
+        losses = losses_of(27, noise=2.0, seed=seed)
+        split = split_of(losses)
+        assert split is not None
+        found = change_at(split, losses, timeline_of(PIECES), ["only"])
+        covered += found.earliest <= 27 * PIECE <= found.latest
+        wrong += split.piece != 27
+
+    assert wrong > 6
+    assert covered >= 0.95 * 60
+
+
+def test_the_interval_is_wider_where_the_hypotheses_differ_less_around_the_change():
+    wide = losses_of(30, noise=0.0)([INTACT, JAM])
+    wide[:, 25:35] = 0.1
+    clear, unclear = losses_of(30, noise=0.0), of(dict(zip([INTACT, JAM], wide, strict=True)))
+    split = Split(INTACT, JAM, 30)
+    narrow, broad = (
+        change_at(split, losses, timeline_of(PIECES), ["only"]) for losses in (clear, unclear)
+    )
+
+    assert broad.earliest <= 24 * PIECE + 1e-9
+    assert broad.latest >= 35 * PIECE - 1e-9
+    assert broad.earliest < narrow.earliest < narrow.latest < broad.latest
+
+
+@settings(max_examples=200)
+@given(seed=st.integers(0, 2**32 - 1), pieces=st.integers(1, 80))
+def test_there_is_no_change_in_noise(seed: int, pieces: int):
+    rng = np.random.default_rng(seed)
+    rows = {one: rng.gamma(2, 0.1, pieces) for one in (INTACT, JAM, BREAK)}
+    losses = of(rows)
+    best = min(rows, key=lambda one: rows[one].sum())
+    split = split_of(losses)
+
+    assert split is None or not is_change(split, best, losses)
+
+
+def test_there_is_no_change_where_one_hypothesis_predicts_all_pieces():
+    always = losses_of(0)
+    split = split_of(always)
+
+    assert split is not None
+    assert not is_change(split, JAM, always)
+
+
+@pytest.mark.parametrize("change", [20, 30, 40])
+def test_a_change_is_significant_against_either_hypothesis_alone(change: int):
+    losses = losses_of(change)
+    split = split_of(losses)
+
+    assert split == Split(INTACT, JAM, change)
+    assert is_change(split, INTACT, losses)
+    assert is_change(split, JAM, losses)
+    assert not is_change(Split(JAM, INTACT, change), INTACT, losses), "in the wrong order"
+
+
+def test_a_hypothesis_that_is_no_better_after_than_before_is_no_change():
+    """The whole timeline is predicted better by another hypothesis than before and after."""
+    losses = losses_of(30)
+    rows = dict(zip([INTACT, JAM], losses([INTACT, JAM]), strict=True))
+    rows[BREAK] = np.full(PIECES, 0.01)
+
+    assert is_change(Split(INTACT, JAM, 30), INTACT, of(rows))
+    assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+def test_without_a_difference_before_the_time_there_is_no_change():
+    after = np.arange(PIECES) >= 30
+    swing = np.resize([0.1, -0.1], PIECES)
+    rows = {INTACT: 0.2 + (1 + swing) * after, JAM: np.full(PIECES, 0.2), BREAK: 2.0 + swing}
+
+    assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+@pytest.mark.parametrize(("z", "expected"), [(1.01, True), (0.99, False)])
+def test_a_difference_after_the_time_has_to_be_clear(z: float, *, expected: bool):
+    after, swing = np.arange(PIECES) >= 30, np.resize([1.0, -1.0], PIECES)
+    gain = 0.1 * (MIN_Z_OF_CHANGE * z + swing * np.sqrt(29))
+    rows = {
+        INTACT: 2.0 + after * gain,
+        JAM: 2.0 + ~after * (1.0 + 0.1 * swing),
+        BREAK: 3.0 + 0.1 * swing,
+    }
+
+    assert is_change(Split(INTACT, JAM, 30), BREAK, of(rows)) == expected
+
+
+def test_a_change_between_two_trials_has_the_start_of_the_second():
+    losses = losses_of(20, pieces=50)
+    split = split_of(losses)
+    assert split is not None
+    found = change_at(split, losses, timeline_of(20, 30), ["first", "second"])
+
+    assert (found.trial, found.index, found.time) == ("second", 1, 0.0)
+    assert found.earliest == 0.0
+
+
+@settings(max_examples=60)
+@given(
+    change=st.integers(MIN_PIECES, 47),
+    first=st.integers(1, 49),
+    noise=st.floats(0, 2),
+    seed=st.integers(0, 1000),
+)
+def test_the_bounds_are_within_the_trial_of_the_change(
+    change: int, first: int, noise: float, seed: int
+):
+    losses = losses_of(change, pieces=50, noise=noise, seed=seed)
+    split = split_of(losses)
+    assert split is not None
+    counts = (first, 50 - first)
+    found = change_at(split, losses, timeline_of(*counts), ["first", "second"])
+
+    assert found.trial == ("first" if split.piece < first else "second")
+    assert 0 <= found.earliest <= found.time <= found.latest
+    assert found.latest <= counts[found.index] * PIECE + 1e-9
+
+
+def test_a_timeline_with_too_few_pieces_has_no_change():
+    assert split_of(losses_of(2, pieces=2 * MIN_PIECES - 1)) is None
+    assert split_of(losses_of(MIN_PIECES, pieces=2 * MIN_PIECES)) is not None
+    assert best_split([INTACT], [], losses_of(30), losses_of(30)) is None
+    assert best_split([INTACT], [INTACT], losses_of(30), losses_of(30)) is None
+
+
+def test_a_hypothesis_that_diverged_is_on_neither_side_of_a_change():
+    rows = dict(zip([INTACT, JAM, BREAK], losses_of(30)([INTACT, JAM, BREAK]), strict=True))
+    rows[JAM][3] = np.inf
+    split = split_of(of(rows))
+    assert split is not None
+    assert split.after == BREAK
+
+    rows[INTACT][40] = np.inf
+    assert split_of(of(rows)) is None
+
+
+def test_the_surrogate_selects_and_the_comparator_itself_decides():
+    """A surrogate with fewer pieces that ranks another hypothesis first."""
+    losses = losses_of(30)
+    few = 2 * MIN_PIECES + 4
+    coarse = of(
+        {
+            INTACT: np.linspace(0, 1, few),
+            JAM: np.full(few, 0.7),
+            BREAK: np.full(few, 0.4),
+        }
+    )
+    assert best_split([INTACT], [JAM, BREAK], coarse, coarse).after == BREAK
+    asked: set[Hypothesis] = set()
+
+    def recorded(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        asked.update(hypotheses)
+        return losses(hypotheses)
+
+    assert best_split([INTACT], [JAM, BREAK], coarse, recorded) == Split(INTACT, JAM, 30)
+    assert asked == {INTACT, JAM, BREAK}
+
+
+def test_a_change_is_a_sentence_with_its_interval_and_the_time_before():
+    losses = losses_of(30)
+    found = change_at(Split(INTACT, JAM, 30), losses, timeline_of(PIECES), ["01-after"])
+
+    assert str(found) == "changed at about t = 3.6 s (3.4 to 3.8) of 01-after; before: intact"

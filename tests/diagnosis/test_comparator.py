@@ -1,0 +1,137 @@
+"""Promises of the choice of a comparator: it can judge all trials, or is refused with another."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.comparators import COMPARATORS, PREFERENCE
+from selfmodel.diagnosis.choice import best_comparator, given_comparator, prepared_trial
+from selfmodel.diagnosis.comparator import PreparedTrial, TrialRefusedError
+from selfmodel.errors import InputError
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.signals import Signal
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_controllers
+from tests.helpers.memory import in_memory
+
+SEGMENTS, ONBOARD, NOISY, SERIES = (comparator.name for comparator in PREFERENCE)
+BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
+VELOCITIES: tuple[Signal, ...] = ("joint_velocities",)
+MOST: tuple[Signal, ...] = (
+    *("sensors", "joint_positions", "joint_velocities"),
+    *("base_orientation", "base_linear_velocity", "base_angular_velocity"),
+)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return ROBOTS["quadruped"].robot()
+
+
+@pytest.fixture(scope="module")
+def trial(robot: Robot) -> Trial:
+    (controller,) = random_controllers(robot, 1)
+    plan = TrialPlan("trial", "single", controller, 100, 0)
+    return in_memory(robot)(SimulatedRobot(robot), plan)
+
+
+def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Trial:
+    run = trial.behaviour
+    lost = {signal: np.full_like(run[signal], np.nan) for signal in signals}
+    behaviour = dataclasses.replace(run, signals={**run.signals, **lost})
+    return dataclasses.replace(trial, behaviour=behaviour, path=path)
+
+
+@pytest.mark.parametrize(
+    ("lost", "expected"),
+    [((), SEGMENTS), (BASE, ONBOARD), (VELOCITIES, NOISY), (MOST, SERIES)],
+)
+def test_the_best_comparator_is_the_first_that_the_trial_allows(
+    lost: Sequence[Signal], expected: str, robot: Robot, trial: Trial
+):
+    chosen = best_comparator(PREFERENCE, robot, [without(trial, lost)])
+
+    assert chosen.comparator.name == expected
+    assert all(signal in chosen.reason for signal in lost if signal in {*BASE, *VELOCITIES})
+    assert ("all signals" in chosen.reason) == (not lost)
+
+
+def test_several_trials_have_the_best_comparator_that_all_allow(robot: Robot, trial: Trial):
+    blind, slow = without(trial, BASE, "a.mcap"), without(trial, VELOCITIES, "b.mcap")
+
+    assert best_comparator(PREFERENCE, robot, [trial, blind]).comparator.name == ONBOARD
+    chosen = best_comparator(PREFERENCE, robot, [trial, blind, slow])
+    assert chosen.comparator.name == NOISY
+    assert f"a.mcap: {SEGMENTS} needs base_position" in chosen.reason
+    assert f"b.mcap: {ONBOARD} needs joint_velocities" in chosen.reason
+
+
+def test_a_given_comparator_is_refused_with_each_log_s_signal_and_with_one_that_can_judge(
+    robot: Robot, trial: Trial
+):
+    blind, slow = without(trial, BASE, "a.mcap"), without(trial, VELOCITIES, "b.mcap")
+    segments = COMPARATORS[SEGMENTS]
+
+    assert given_comparator(segments, PREFERENCE, robot, [trial]).comparator is segments
+    with pytest.raises(
+        InputError,
+        match=rf"a\.mcap: {SEGMENTS} needs base_position.*; b\.mcap: {SEGMENTS} needs "
+        rf"joint_velocities.*: give the comparator {NOISY}, which can judge all",
+    ):
+        given_comparator(segments, PREFERENCE, robot, [blind, trial, slow])
+
+
+def test_trials_that_no_comparator_can_judge_are_refused_one_by_one(robot: Robot, trial: Trial):
+    dark = [without(trial, (*MOST, "base_position"), f"{k}.mcap") for k in range(2)]
+    message = r"0\.mcap: .* needs at least one of sensors.*; 1\.mcap: .*: leave these trials out"
+
+    with pytest.raises(InputError, match=message):
+        best_comparator(PREFERENCE, robot, dark)
+    with pytest.raises(InputError, match=r"0\.mcap: .*; 1\.mcap: .*: leave these trials out"):
+        given_comparator(PREFERENCE[0], PREFERENCE, robot, dark)
+
+
+@pytest.mark.parametrize("name", COMPARATORS)
+@pytest.mark.parametrize("kept", [(), *((signal,) for signal in (*MOST, "base_position"))])
+def test_the_preferred_comparators_can_judge_all_that_any_other_can(
+    name: str, kept: Sequence[Signal], robot: Robot, trial: Trial
+):
+    lost = [signal for signal in (*MOST, "base_position") if signal not in kept]
+    rest = without(trial, lost)
+
+    try:
+        prepared_trial(COMPARATORS[name], robot, rest)
+    except TrialRefusedError:
+        return
+    best_comparator(PREFERENCE, robot, [rest])
+
+
+def test_an_absurd_number_is_refused_and_no_reason_for_another_comparator(
+    robot: Robot, trial: Trial
+):
+    positions = trial.behaviour["base_position"].copy()
+    positions[7] = 1e9
+    signals = {**trial.behaviour.signals, "base_position": positions}
+    absurd = dataclasses.replace(
+        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
+    )
+
+    with pytest.raises(InputError, match="base_position"):
+        best_comparator(PREFERENCE, robot, [absurd])
+
+
+def test_an_error_of_a_third_party_s_comparator_is_a_refusal(robot: Robot, trial: Trial):
+    class Picky:
+        name = "picky"
+
+        def prepare(self, trial: Trial) -> PreparedTrial:
+            raise InputError(f"{trial.path}: picky needs a smell")
+
+    with pytest.raises(TrialRefusedError, match="picky needs a smell"):
+        prepared_trial(Picky(), robot, trial)
+    with pytest.raises(InputError, match=f"picky needs a smell: give the comparator {SEGMENTS}"):
+        given_comparator(Picky(), PREFERENCE, robot, [trial])

@@ -1,0 +1,459 @@
+"""Tests of the refinement on synthetic losses, without physics and without the EA.
+
+Each fault has an effect on every segment, and the effects of a hypothesis add up. The loss is the
+squared difference from the effects of the truth, so the truth has a loss of 0.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.diagnosis.problem import LossFunction as Losses
+from selfmodel.diagnosis.search import LocalSearch, is_model_error
+from selfmodel.diagnosis.significance import MIN_Z_OF_STEP, is_better
+from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import Fault
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.tasks import ROBOTS
+from tests.diagnosis.synthetic import Synthetic
+
+ANATOMY = ROBOTS["quadruped"].robot().anatomy
+SPACE = HypothesisSpace(ANATOMY, PAPER_KINDS)
+FAULTS = tuple(fault for kind in PAPER_KINDS for fault in kind.candidates(ANATOMY))
+PIECES = 400
+MOST = 4
+
+
+def said(text: str) -> Hypothesis:
+    return parse(text, ANATOMY)
+
+
+def effects(seed: int = 0) -> Mapping[Fault, np.ndarray]:
+    """Independent effects of each fault, ``(segments,)``."""
+    rng = np.random.default_rng(seed)
+    return {fault: rng.normal(size=PIECES) for fault in FAULTS}
+
+
+def additive(truth: Hypothesis, floor: float = 0.01, seed: int = 0) -> Losses:
+    """Losses of additive effects of faults."""
+    effect = effects(seed)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = []
+        for hypothesis in hypotheses:
+            left = sum((effect[fault] for fault in truth.faults), np.zeros(PIECES))
+            for fault in hypothesis.faults:
+                left = left - effect[fault]
+            rows.append(floor + left**2)
+        return np.array(rows)
+
+    return losses
+
+
+def counted(table: Mapping[str, float], otherwise: float) -> Losses:
+    """Losses from a table, equal in all segments but for a ripple."""
+    known = {said(text): loss for text, loss in table.items()}
+    ripple = np.linspace(-0.01, 0.01, PIECES)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return np.array([known.get(one, otherwise) * (1 + ripple) for one in hypotheses])
+
+    return losses
+
+
+def centred(rng: np.random.Generator) -> np.ndarray:
+    """Noise with a mean of exactly 0."""
+    noise = rng.normal(size=PIECES)
+    return noise - noise.mean()
+
+
+@dataclass(frozen=True)
+class Proposing(HypothesisSpace):
+    """A space with given candidates in a given order."""
+
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def coarse_candidates(self) -> tuple[Fault, ...]:
+        """The candidates of the test."""
+        return self.faults
+
+
+def find(
+    losses: Losses,
+    *known: Hypothesis,
+    faults: Sequence[Fault] = FAULTS,
+    most: int = MOST,
+    before: Losses | None = None,
+) -> Hypothesis:
+    space = Proposing(ANATOMY, PAPER_KINDS, faults=tuple(faults))
+    return LocalSearch(Synthetic(space, losses, most=most, before=before)).refined(known)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "intact",
+        "jam:back_left_knee",
+        "break:front_left_knee+sensor:front_right_touch",
+        "break:front_left_shoulder+jam:back_left_shoulder+sensor:back_right_angle",
+        "jam:back_left_knee+jam:front_left_knee+jam:front_right_knee+sensor:back_right_angle",
+    ],
+)
+def test_a_compound_is_found_from_nothing_but_single_faults(text: str):
+    assert str(find(additive(said(text)))) == text
+
+
+def test_a_needle_is_found_where_only_one_of_its_faults_shows_by_itself():
+    # Alone, the sensor fault increases the loss, as every other fault does.
+    needle = "break:back_left_knee+sensor:front_left_angle"
+    losses = counted({"intact": 1.0, "break:back_left_knee": 0.9, needle: 0.1}, otherwise=1.5)
+
+    assert find(losses) == said(needle)
+
+
+def test_a_needle_that_nothing_leads_to_is_found_from_what_is_known_already():
+    needle = said("jam:back_left_knee+jam:back_right_knee+jam:front_left_knee")
+    near = said("jam:back_left_knee+jam:back_right_knee+sensor:front_left_angle")
+    losses = counted({"intact": 1.0, str(near): 0.9, str(needle): 0.1}, otherwise=1.5)
+
+    assert find(losses) == INTACT
+    assert find(losses, needle) == needle
+    assert find(losses, near) == needle
+
+
+def helped(swing: float) -> Losses:
+    """Losses with a broken knee as the truth; a failed sensor lowers them by a noisy gain."""
+    knee, helper = said("break:front_left_knee"), said("sensor:front_right_touch").faults[0]
+    of = additive(knee, floor=1.0)
+    help_ = np.resize([swing, -swing], PIECES) - 0.2
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        without = [Hypothesis(tuple(f for f in one.faults if f != helper)) for one in hypotheses]
+        helps = np.array([helper in one.faults for one in hypotheses])
+        return of(without) + helps[:, np.newaxis] * help_
+
+    return losses
+
+
+@pytest.mark.parametrize(
+    ("swing", "found"),
+    [
+        (0.1, "break:front_left_knee+sensor:front_right_touch"),
+        (3.0, "break:front_left_knee"),
+    ],
+    ids=["of use", "by chance"],
+)
+def test_a_fault_is_kept_where_it_is_of_use_and_dropped_where_chance_would_do_as_well(
+    swing: float, found: str
+):
+    losses = helped(swing)
+    more, less = (
+        said("break:front_left_knee+sensor:front_right_touch"),
+        said("break:front_left_knee"),
+    )
+
+    assert losses([more]).sum() < losses([less]).sum()
+    assert is_better(*losses([more, less])) == (len(said(found)) == 2)
+    assert str(find(losses)) == str(find(losses, more)) == str(find(losses, less)) == found
+
+
+def test_a_swap_is_found_where_neither_more_nor_less_helps():
+    wrong = said("jam:front_left_knee+sensor:front_left_angle")
+    right = said("jam:front_right_knee+sensor:front_left_angle")
+    losses = counted({str(wrong): 1.0, str(right): 0.1}, otherwise=2.0)
+
+    assert find(losses, wrong) == right
+
+
+def test_once_a_fault_is_spared_another_may_be_the_better_one_beside_what_is_left():
+    three, left, better = (
+        said(f"jam:back_left_knee+{others}")
+        for others in (
+            "jam:back_right_knee+sensor:front_left_angle",
+            "jam:back_right_knee",
+            "jam:front_right_knee",
+        )
+    )
+    ripple = np.linspace(-0.01, 0.01, PIECES)
+    # Searches from the empty hypothesis end at one of these.
+    dead_ends = [canonical([fault], ANATOMY) for fault in FAULTS[:3]]
+    known = dict.fromkeys(dead_ends, 2.9 - ripple) | {
+        three: 1.0 + ripple,
+        left: 1.2 + 2 * centred(np.random.default_rng(0)),
+        better: 1.1 - ripple,
+    }
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return np.array([known.get(one, 3.0 + 2 * ripple) for one in hypotheses])
+
+    assert is_better(*losses([three, better]))
+    assert not is_better(*losses([three, left]))
+    assert find(losses) in dead_ends
+    assert find(losses, three) == better
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_there_are_never_more_faults_than_allowed(most: int):
+    truth = said("jam:front_left_knee+jam:front_right_knee+jam:back_left_knee+jam:back_right_knee")
+    asked: set[Hypothesis] = set()
+    of = additive(truth)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        asked.update(hypotheses)
+        return of(hypotheses)
+
+    found = find(losses, most=most)
+    assert 1 <= len(found) <= most
+    assert max(map(len, asked)) == most
+    assert set(found.faults) <= set(truth.faults)
+
+
+def test_nothing_is_asked_about_but_hypotheses_in_canonical_form():
+    of = additive(said("break:front_left_shoulder+jam:back_left_knee"))
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        assert all(one == canonical(one.faults, ANATOMY) for one in hypotheses)
+        return of(hypotheses)
+
+    find(losses)
+
+
+def test_where_there_is_nothing_to_propose_nothing_changed():
+    assert find(additive(INTACT), faults=()) == INTACT
+
+
+def test_a_hypothesis_that_diverges_is_never_chosen():
+    truth = said("jam:front_left_knee")
+    of = additive(truth)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = of(hypotheses)
+        rows[[one not in (INTACT, truth) for one in hypotheses]] = np.inf
+        return rows
+
+    assert find(losses) == truth
+    assert find(losses, said("break:back_left_knee")) == truth
+
+
+def test_of_two_that_predict_the_same_the_one_with_fewer_faults_is_chosen():
+    less, more = "jam:front_left_knee", "sensor:front_left_angle+sensor:front_right_angle"
+    noise = centred(np.random.default_rng(0))
+    known = {said(less): 0.5 + 0.1 * noise, said(more): np.full(PIECES, 0.499)}
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return np.array([known.get(one, 1.0 + 0.1 * noise) for one in hypotheses])
+
+    assert find(losses, said(more)) == said(less)
+
+
+SMALL_WORLD = FAULTS[::4]
+"""A subset of the faults for tests with many searches."""
+
+NOISY, CLEAR = st.floats(0.01, 2), st.just(1e-6)
+
+
+def worlds(spread: st.SearchStrategy[float]) -> st.SearchStrategy[Losses]:
+    """Loss functions with random losses per hypothesis and noise per segment."""
+    return st.builds(_random_world, st.integers(0, 2**32 - 1), spread, st.integers(5, 12))
+
+
+def _random_world(seed: int, spread: float, pieces: int) -> Losses:
+    """Random losses, a function of the hypothesis."""
+
+    def row(hypothesis: Hypothesis) -> np.ndarray:
+        place = [FAULTS.index(fault) for fault in hypothesis.faults]
+        rng = np.random.default_rng([seed, len(place), *place])
+        if rng.random() < 0.05:
+            return np.full(pieces, np.inf)
+        return np.maximum(rng.gamma(2) + spread * rng.normal(size=pieces), 0.0)
+
+    return lambda hypotheses: np.array([row(one) for one in hypotheses])
+
+
+known_ones = st.lists(
+    st.lists(st.sampled_from(SMALL_WORLD), max_size=2).map(
+        lambda faults: canonical(faults, ANATOMY)
+    ),
+    max_size=3,
+)
+
+
+@settings(max_examples=40)
+@given(worlds(CLEAR), known_ones)
+def test_where_a_test_tells_any_two_apart_no_start_is_better_than_what_is_found(
+    losses: Losses, known: list[Hypothesis]
+):
+    found = find(losses, *known, faults=SMALL_WORLD, most=2)
+    singles = [canonical([fault], ANATOMY) for fault in SMALL_WORLD]
+
+    for start in (*known, *singles, INTACT):
+        assert not is_better(*losses([start, found]))
+
+
+@settings(max_examples=40)
+@given(worlds(NOISY), known_ones)
+def test_whatever_is_found_is_better_than_intact_if_it_is_not_intact(
+    losses: Losses, known: list[Hypothesis]
+):
+    found = find(losses, *known, faults=SMALL_WORLD, most=2)
+
+    assert len(found) <= 2
+    assert found == INTACT or np.less(*losses([found, INTACT]).sum(axis=1))
+
+
+@settings(max_examples=25)
+@given(worlds(NOISY), known_ones, st.permutations(SMALL_WORLD))
+def test_the_order_of_the_faults_and_of_what_is_known_does_not_matter(
+    losses: Losses, known: list[Hypothesis], order: list[Fault]
+):
+    straight = find(losses, *known, faults=SMALL_WORLD, most=2)
+
+    assert find(losses, *reversed(known), faults=order, most=2) == straight
+
+
+@settings(max_examples=25)
+@given(st.lists(st.sampled_from(FAULTS), max_size=3), st.integers(0, 1000))
+def test_every_truth_of_effects_that_add_up_is_found(faults: list[Fault], seed: int):
+    truth = canonical(faults, ANATOMY)
+
+    assert find(additive(truth, seed=seed), most=3) == truth
+
+
+def test_every_fault_of_what_is_found_is_worth_its_while():
+    for seed, pair in enumerate(itertools.combinations(SMALL_WORLD, 2)):
+        losses: Callable[[Sequence[Hypothesis]], np.ndarray] = _random_world(seed, 0.5, 10)
+        found = find(losses, canonical(pair, ANATOMY), faults=SMALL_WORLD, most=2)
+        for fault in found.faults:
+            fewer = Hypothesis(tuple(other for other in found.faults if other != fault))
+            assert is_better(*losses([found, fewer]))
+
+
+def test_the_screen_says_what_is_looked_at_and_the_losses_what_is_found():
+    truth = said("break:front_left_knee+sensor:front_right_touch")
+    of = additive(truth)
+    looked_at: set[Hypothesis] = set()
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        looked_at.update(hypotheses)
+        return of(hypotheses)
+
+    def screen(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return of(hypotheses)[:, ::3] + 1.0
+
+    search = LocalSearch(Synthetic(SPACE, losses, coarse=screen))
+    assert search.refined([]) == truth
+    assert looked_at == search.compared
+    few = len(looked_at)
+    looked_at.clear()
+    assert LocalSearch(Synthetic(SPACE, losses)).refined([]) == truth
+    assert few < len(looked_at) / 2
+
+
+def test_a_screen_that_prefers_what_is_wrong_does_not_decide():
+    one, right, wrong = (
+        f"jam:front_left_knee{other}"
+        for other in ("", "+sensor:front_right_touch", "+sensor:back_right_angle")
+    )
+    losses = counted({"intact": 1.5, one: 1.0, right: 0.1}, otherwise=2.0)
+    screen = counted({"intact": 1.5, one: 1.0, right: 0.5, wrong: 0.1}, otherwise=2.0)
+
+    assert LocalSearch(Synthetic(SPACE, losses, coarse=screen)).refined([]) == said(right)
+
+
+def test_a_fault_that_would_have_helped_as_much_before_only_mends_the_model():
+    truth, is_model_error = said("break:back_left_knee"), said("jam:front_left_knee")
+    both = canonical((*truth.faults, *is_model_error.faults), ANATOMY)
+    after = additive(both)
+
+    assert find(after, before=additive(truth)) == is_model_error
+    assert find(after, before=additive(INTACT)) == both
+    assert find(after, before=additive(is_model_error)) == truth
+
+
+FEW = FAULTS[-5:]
+"""Sensors, whose faults do not absorb each other."""
+
+
+def step_of(z: float) -> tuple[Hypothesis, Losses]:
+    """A pair of faults, and losses in which the second is better by z standard errors.
+
+    With a third fault, the loss is smaller by far: a descent that takes the step reaches it, and no
+    other descent does, because two decoys are better single faults.
+    """
+    first, second, third, *decoys = FEW
+    one = canonical([first], ANATOMY)
+    two, end = canonical([first, second], ANATOMY), canonical([first, third, second], ANATOMY)
+    swing = np.resize([1.0, -1.0], PIECES)
+    gain = 0.001 * (z + swing * np.sqrt(PIECES - 1))
+    known = {one: np.full(PIECES, 0.5), two: 0.5 - gain, end: np.full(PIECES, 0.01)}
+    known |= {canonical([decoy], ANATOMY): np.full(PIECES, 0.6) for decoy in decoys}
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        otherwise = np.full(PIECES, 0.9)
+        return np.array(
+            [
+                known.get(each, otherwise + 0.01 * len(each) * (1 + 0.1 * swing))
+                for each in hypotheses
+            ]
+        )
+
+    return end, losses
+
+
+@pytest.mark.parametrize(("z", "continues"), [(1.01, True), (0.99, False)])
+def test_a_descent_continues_with_a_further_fault_only_from_two_standard_errors_on(
+    z: float, *, continues: bool
+):
+    end, losses = step_of(z * MIN_Z_OF_STEP)
+    found = find(losses, faults=FEW)
+
+    assert (found == end) == continues
+
+
+def test_a_descent_with_no_further_fault_takes_any_smaller_loss():
+    """A replaced fault has no place to be worth: the smaller loss is enough."""
+    start, better, end = (
+        said(f"jam:back_left_knee+{other}")
+        for other in ("sensor:front_left_angle", "jam:front_left_knee", "jam:front_right_knee")
+    )
+    tiny = 1e-4 * centred(np.random.default_rng(0)) - 1e-6
+    far = said("jam:front_left_knee+jam:front_right_knee")
+    known = {
+        start: np.full(PIECES, 0.5),
+        better: 0.5 + tiny,
+        end: np.full(PIECES, 0.9),
+        far: np.full(PIECES, 0.01),
+    }
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        return np.array([known.get(one, np.linspace(0.89, 0.91, PIECES)) for one in hypotheses])
+
+    assert not is_better(*losses([better, start]))
+    assert find(losses, start) == far
+
+
+def test_model_error_is_a_gain_that_the_healthy_trials_have_too():
+    both, knee = (
+        said("break:front_left_knee+sensor:front_right_touch"),
+        said("break:front_left_knee"),
+    )
+    touch = said("sensor:front_right_touch")
+    scatter = 0.01 * np.random.default_rng(0).normal(size=PIECES)
+
+    def of(**means: float) -> Losses:
+        known = {Hypothesis(): 1.0, both: means["both"], knee: means["knee"], touch: means["touch"]}
+        return lambda some: np.array([known[one] * (1 + scatter) for one in some])
+
+    after, before = of(both=0.5, knee=0.7, touch=0.8), of(both=2.0, knee=2.0, touch=0.8)
+    problem = Synthetic(SPACE, after, before=before)
+
+    assert is_model_error(both, knee, problem)
+    assert not is_model_error(both, touch, problem)
+    assert not is_model_error(both, knee, Synthetic(SPACE, after))

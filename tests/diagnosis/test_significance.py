@@ -1,0 +1,239 @@
+"""Tests of the significance tests: pairing, rounding errors, infinite losses."""
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy import stats
+
+from selfmodel.diagnosis.significance import (
+    LOSS_FLOOR,
+    LOSS_RATIO,
+    MIN_Z,
+    MIN_Z_ACROSS_TRIALS,
+    NEGLIGIBLE_LOSS,
+    excess_over_healthy,
+    gain_exceeds_healthy_gain,
+    gain_is_model_error,
+    is_better,
+    paired_z,
+)
+
+LOSSES = st.one_of(st.just(np.inf), st.floats(0, 1e6))
+DIVERGED = np.full(5, np.inf)
+
+
+def exceeds(losses: np.ndarray, healthy: np.ndarray) -> bool:
+    """Returns whether the verdict about losses with this excess is ``unexplained``."""
+    return excess_over_healthy(losses, healthy) > MIN_Z_ACROSS_TRIALS
+
+
+def of_mean_and_error(mean: float, error: float, pieces: int = 100) -> np.ndarray:
+    """Losses with a given mean and standard error of the mean."""
+    swing = np.tile([-1.0, 1.0], pieces // 2)
+    return mean + swing / swing.std(ddof=1) * error * np.sqrt(pieces)
+
+
+def test_the_paired_z_is_the_statistic_of_the_paired_t_test():
+    rng = np.random.default_rng(0)
+    one, other = rng.gamma(2, size=(2, 37))
+
+    assert paired_z(one, other) == pytest.approx(stats.ttest_rel(one, other).statistic)
+
+
+def test_the_paired_z_by_hand():
+    # Differences of 1, 2, 3: mean 2, standard deviation 1, error 1 / sqrt(3).
+    larger, smaller = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 3.0])
+
+    assert paired_z(larger, smaller) == pytest.approx(2 * np.sqrt(3))
+    assert paired_z(smaller, larger) == pytest.approx(-2 * np.sqrt(3))
+
+
+def test_what_makes_a_piece_hard_for_both_does_not_count():
+    hard = np.linspace(0, 1e3, 100)
+    by_two_percent = of_mean_and_error(0.02, 0.001)
+
+    assert is_better(hard + 1, hard + 1 + by_two_percent)
+    assert not is_better(hard + 1, np.roll(hard, 50) + 1 + by_two_percent)
+
+
+@pytest.mark.parametrize(("errors", "told"), [(MIN_Z * 1.01, True), (MIN_Z * 0.99, False)])
+def test_a_difference_counts_from_three_standard_errors_on(errors: float, told: bool):  # noqa: FBT001  # what is expected
+    one = np.full(100, 10.0)
+
+    assert is_better(one, one + of_mean_and_error(errors * 0.1, 0.1)) == told
+
+
+@pytest.mark.parametrize(("times", "told"), [(LOSS_RATIO * 1.01, True), (LOSS_RATIO * 0.99, False)])
+def test_three_times_the_loss_counts_whatever_the_errors(times: float, told: bool):  # noqa: FBT001  # what is expected
+    # The whole difference is in one segment of a hundred: z is 1.
+    one = np.full(100, 0.01)
+    other = one.copy()
+    other[7] += (times - 1) * one.sum()
+
+    assert paired_z(other, one) == pytest.approx(1)
+    assert is_better(one, other) == told
+    assert not exceeds(other, one), "between trials, a ratio alone is no evidence"
+
+
+def test_the_rounding_of_arithmetic_is_no_reason():
+    perfect, rounded = np.zeros(2), np.array([0.0, 1.9 * NEGLIGIBLE_LOSS])
+
+    assert not is_better(perfect, rounded)
+    assert is_better(perfect, 2 * rounded)
+
+
+def test_an_excess_below_the_floor_is_none_however_exact_the_prediction():
+    healthy = np.full(50, 1e-7)
+
+    assert exceeds(healthy + 1.01 * LOSS_FLOOR, healthy)
+    assert excess_over_healthy(healthy + 0.99 * LOSS_FLOOR, healthy) == 0
+    assert not exceeds(np.array([0.99 * LOSS_FLOOR]), np.zeros(1))
+    assert exceeds(np.array([1.01 * LOSS_FLOOR]), np.zeros(1))
+
+
+def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
+    small, twice, four_times = np.array([[1.0], [2.0], [4.0]])
+
+    assert paired_z(twice, small) == 0
+    assert not is_better(small, twice)
+    assert is_better(small, four_times)
+    assert not exceeds(twice, small)
+    assert exceeds(four_times, small)
+
+
+def test_losses_of_one_trial_and_one_piece_of_another_are_told_by_the_ratio():
+    usual = np.full(50, 1.0)
+
+    assert not exceeds(np.array([2.9]), usual)
+    assert exceeds(np.array([3.1]), usual)
+
+
+def test_whatever_predicts_at_all_is_better_than_what_diverged():
+    finite = np.full(5, 1e9)
+
+    assert is_better(finite, DIVERGED)
+    assert not is_better(DIVERGED, finite)
+    assert not is_better(DIVERGED, DIVERGED)
+
+
+def test_a_hypothesis_that_diverged_in_one_trial_is_worse_than_ever():
+    mixed = np.array([0.0, 0.0, np.inf])
+
+    assert exceeds(mixed, np.ones(3))
+    assert exceeds(DIVERGED, np.ones(3))
+    assert not exceeds(np.ones(3), DIVERGED)
+    assert not exceeds(DIVERGED, DIVERGED)
+    assert is_better(np.full(3, 1e9), mixed)
+
+
+def test_losses_of_other_trials_are_compared_as_welch_did():
+    rng = np.random.default_rng(1)
+    usual, losses = rng.normal(10, 1, 40), rng.normal(11, 3, 80)
+    z = stats.ttest_ind(losses, usual, equal_var=False).statistic
+    lift = (MIN_Z_ACROSS_TRIALS - z) * (losses.mean() - usual.mean()) / z
+
+    assert excess_over_healthy(losses, usual) == pytest.approx(z)
+    assert not exceeds(losses + 0.99 * lift, usual)
+    assert exceeds(losses + 1.01 * lift, usual)
+    assert not exceeds(losses - 5, usual)
+
+
+@given(arrays(float, (2, 6), elements=LOSSES))
+def test_of_two_at_most_one_is_better(pair: np.ndarray):
+    one, other = pair
+
+    assert not (is_better(one, other) and is_better(other, one))
+    assert not is_better(one, one)
+    assert not exceeds(one, one)
+
+
+@given(arrays(float, (2, 6), elements=LOSSES), st.permutations(range(6)))
+def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[int]):
+    one, other = pair
+    z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
+    if abs(z - MIN_Z) > 1e-6:  # where the result does not depend on rounding
+        assert is_better(one[order], other[order]) == is_better(one, other)
+
+
+@pytest.mark.parametrize(
+    ("errors", "told"), [(MIN_Z_ACROSS_TRIALS * 1.01, True), (MIN_Z_ACROSS_TRIALS * 0.99, False)]
+)
+def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: bool):  # noqa: FBT001  # what is expected
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+    other = one + of_mean_and_error(errors * 0.1, 0.1)
+
+    assert gain_exceeds_healthy_gain(one, other, before, before) == told
+    assert not gain_exceeds_healthy_gain(other, one, before, before)
+
+
+def at_the_edge(errors: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Losses, gains on healthy trials, and gains that exceed them by some standard errors."""
+    rng = np.random.default_rng(2)
+    one, gain, earlier = rng.normal(10, 1, 80), rng.normal(1, 0.3, 80), rng.normal(0.9, 0.3, 40)
+    z = stats.ttest_ind(gain, earlier, equal_var=False).statistic
+    assert 0 < z < errors
+    return one, earlier, gain + (errors - z) * (gain.mean() - earlier.mean()) / z
+
+
+BEFORE = np.full(40, 10.0)
+
+
+def test_what_was_better_before_has_to_be_better_by_more_since():
+    one, earlier, gain = at_the_edge(MIN_Z_ACROSS_TRIALS)
+
+    assert paired_z(one + gain, one) > MIN_Z_ACROSS_TRIALS
+    assert not gain_exceeds_healthy_gain(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
+
+
+def test_what_made_it_worse_before_has_to_help_all_the_same():
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+    hardly = one + of_mean_and_error(0.2, 0.1)
+
+    assert not gain_exceeds_healthy_gain(one, hardly, before, before - 1)
+
+
+def test_what_diverged_or_has_a_single_piece_has_not_become_better():
+    one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
+
+    assert gain_exceeds_healthy_gain(one, other, one, one)
+    assert not gain_exceeds_healthy_gain(one, DIVERGED, one, one)
+    assert not gain_exceeds_healthy_gain(one, other, one, DIVERGED)
+    assert not gain_exceeds_healthy_gain(one[:1], other[:1], one, one)
+    assert not gain_exceeds_healthy_gain(one, other * NEGLIGIBLE_LOSS / 2, one, one)
+
+
+def test_what_helped_before_only_mends_unless_it_helps_significantly_more_since():
+    one, earlier, gain = at_the_edge(MIN_Z)
+
+    assert gain_is_model_error(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
+    assert not gain_is_model_error(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
+
+
+@pytest.mark.parametrize("harm", [0.0, NEGLIGIBLE_LOSS / 2, 1.0])
+def test_what_did_not_help_before_does_not_mend_however_little_it_helps_since(harm: float):
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+    hardly = one + of_mean_and_error(0.2, 0.1)
+
+    assert not gain_is_model_error(one, hardly, before, before - harm)
+    assert gain_is_model_error(one, hardly, before, before + 2 * NEGLIGIBLE_LOSS)
+
+
+@pytest.mark.parametrize(("error", "told"), [(0.19, True), (0.21, False)])
+def test_trials_that_would_not_have_shown_the_harm_say_nothing(error: float, told: bool):  # noqa: FBT001  # of a table
+    # A harm as large as the gain is 0.6 below the gain: MIN_Z standard errors of 0.2.
+    one, before = np.full(100, 10.0), np.full(100, 10.0)
+
+    assert (
+        gain_is_model_error(one, one + 0.3, before, before + of_mean_and_error(0.01, error)) == told
+    )
+
+
+def test_of_what_diverged_or_has_a_single_piece_nobody_knows_whether_it_mends():
+    one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
+
+    assert gain_is_model_error(one, other, one, other)
+    assert not gain_is_model_error(one, DIVERGED, one, other)
+    assert not gain_is_model_error(one, other, one, DIVERGED)
+    assert not gain_is_model_error(one, other, one[:1], other[:1])

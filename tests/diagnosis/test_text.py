@@ -1,0 +1,159 @@
+"""Tests of the sentences of a diagnosis: verdict, change, numbers, limits and direct evidence."""
+
+from typing import Any
+
+import pytest
+
+from selfmodel.diagnosis.diagnosis import Candidate, Change, DetectableSeverity, Diagnosis, Fit
+from selfmodel.diagnosis.direct_evidence import ConstantSensor, DirectEvidence
+from selfmodel.diagnosis.text import (
+    detectable_sentences,
+    evidence_sentences,
+    fit_sentence,
+    right_or_wrong,
+    verdict_sentences,
+)
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.tasks import ROBOTS
+
+ANATOMY = ROBOTS["quadruped"].robot().anatomy
+JAM, OTHER = (parse(f"jam:{leg}_knee", ANATOMY) for leg in ("front_left", "back_left"))
+CHANGE = Change("02-recovery", 1, 4.92, 4.8, 5.04, INTACT, JAM)
+
+
+def diagnosis(**fields: Any) -> Diagnosis:  # noqa: ANN401  # fields of a record
+    best = fields.pop("best", JAM)
+    common = {"verdict": "explained", "test": "by hand", "indistinguishable": ()}
+    return Diagnosis(
+        ranked=(Candidate(best, 0.5),), trials=1, intact_distance=2.0, **{**common, **fields}
+    )
+
+
+def test_an_intact_robot_has_a_sentence_of_its_own():
+    sentence = verdict_sentences(diagnosis(best=INTACT, verdict="intact"))
+
+    assert sentence.startswith("Intact: ")
+    assert "Changed" not in sentence
+
+
+def test_the_alternatives_are_named_with_the_test():
+    sentence = verdict_sentences(diagnosis(verdict="ambiguous", indistinguishable=(OTHER,)))
+
+    assert sentence == (
+        "Ambiguous: the trials do not distinguish jam:front_left_knee from jam:back_left_knee "
+        "(by hand)."
+    )
+
+
+def test_the_change_and_the_undetectable_faults_follow_the_verdict():
+    more = parse("jam:front_left_knee+jam:back_left_knee", ANATOMY)
+    alone = verdict_sentences(diagnosis(change=CHANGE))
+    both = verdict_sentences(diagnosis(change=CHANGE, undetectable=(more,)))
+
+    changed = "Changed at about t = 4.9 s (4.8 to 5.0) of 02-recovery; before: intact."
+    explained = "Explained: jam:front_left_knee predicts the trials"
+    assert alone == f"{explained}, and no other hypothesis does as well. {changed}"
+    assert both == f"{explained}. {changed} Undetectable in these trials: jam:back_left_knee."
+
+
+@pytest.mark.parametrize(
+    ("fit", "sentence"),
+    [
+        (None, ""),
+        (Fit(float("inf"), 1.0, 0.1, 0.0, 5.0, has_faults=True), ""),
+        (
+            Fit(0.1234, 0.5, None, None, 5.0, has_faults=True),
+            "Mean loss 0.123, intact 0.5; no trial of the healthy robot to compare with.",
+        ),
+        (
+            Fit(2e-30, float("inf"), 0.1, 0.0, 6.0, has_faults=False),
+            (
+                "Residual 0.0 \u03c3 above the healthy trials (limit 6 \u03c3, or 3 times their "
+                "loss); mean loss 0, intact infinite, healthy trials 0.1."
+            ),
+        ),
+        (
+            Fit(0.1234, 0.5, 0.0, float("inf"), 3.5, has_faults=True),
+            (
+                "Residual infinitely many \u03c3 above the healthy trials (limit 3.5 \u03c3, or "
+                "3 times their loss); mean loss 0.123, intact 0.5, healthy trials 0."
+            ),
+        ),
+    ],
+)
+def test_the_numbers_behind_a_verdict_are_a_sentence(fit: Fit | None, sentence: str):
+    assert fit_sentence(diagnosis(fit=fit)) == sentence
+
+
+def test_a_joint_that_moves_otherwise_is_named_though_the_loss_is_explained():
+    fit = Fit(0.1, 0.1, 0.1, 0.5, 3.5, has_faults=False, joints={"knee": 4.25, "hip": 4.0})
+    sentence = verdict_sentences(diagnosis(best=INTACT, fit=fit, verdict="unexplained"))
+
+    assert "not all joints. Joints that the healthy trials predict better: knee (4.2" in sentence
+    assert "hip (4.0" in sentence
+    assert "significantly worse than the self-model" not in sentence
+
+
+@pytest.mark.parametrize(
+    ("best", "truth", "is_correct", "judgement"),
+    [
+        ("friction=0.4", "friction=0.4", True, "right"),
+        ("intact", "neuron:0", True, "right"),
+        ("friction=0.3895", "friction=0.4", False, "right except for severity"),
+        ("jam:a+wind=9", "wind=12+jam:a=0.3", False, "right except for severity"),
+        ("friction=0.4", "slope=0.4", False, "wrong"),
+        ("friction=0.4+motor:a=0.9", "friction=0.4", False, "wrong"),
+        ("intact", "friction=0.4", False, "wrong"),
+        ("encoder-offset:a=0.1", "encoder-offset:a=slip0.1", False, "wrong"),
+        ("sensor:a1=gain0.2", "sensor:a1=gain0.3", False, "right except for severity"),
+        ("motor:leg1=0.2", "motor:leg2=0.2", False, "wrong"),
+    ],
+)
+def test_the_right_faults_at_another_severity_are_not_wrong(
+    best: str,
+    truth: str,
+    is_correct: bool,  # noqa: FBT001  # a parameter of cases
+    judgement: str,
+):
+    assert right_or_wrong(best, truth, correct=is_correct) == judgement
+
+
+def test_the_limits_of_a_kind_are_one_clause_and_equal_limits_are_named_together():
+    rows = (
+        DetectableSeverity("motor", "a", below=0.7, above=None),
+        DetectableSeverity("motor", "b", below=0.5, above=None),
+        DetectableSeverity("motor", "c", below=0.7, above=None),
+        DetectableSeverity("motor", "d", below=None, above=None),
+        DetectableSeverity("friction", "", below=0.5, above=1.25),
+    )
+    sentences = detectable_sentences(diagnosis(best=INTACT, verdict="intact", detectable=rows))
+
+    assert sentences == [
+        (
+            "These trials would have shown: motor up to 0.7 (a, c), up to 0.5 (b), no severity "
+            "(d); friction up to 0.5 or from 1.25. Smaller changes are below the limit."
+        ),
+    ]
+
+
+def test_without_limits_there_is_no_sentence():
+    assert detectable_sentences(diagnosis()) == []
+
+
+def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
+    knees = ("front_left_knee", "back_left_knee")
+    touch, ones = ConstantSensor("front_left_touch", 0.0), ConstantSensor("a", 1.0)
+    evidence = (
+        DirectEvidence("00", (), (touch,), knees),
+        DirectEvidence("01", (), (), ()),
+        DirectEvidence("02", (), (ones, ConstantSensor("b", 0.25)), ()),
+    )
+
+    assert evidence_sentences(evidence) == [
+        (
+            "In 00, commands without effect: front_left_knee, back_left_knee; constant readings: "
+            "front_left_touch (0)."
+        ),
+        "In 02, constant readings: a (1), b (0.25).",
+    ]
