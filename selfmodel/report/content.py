@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.results import RecoveryResult, Search, as_json
+from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.report.charts import (
     BarChart,
