@@ -34,13 +34,15 @@ def main(wheel: Path) -> None:
 
 
 def run_installed(wheel: Path, folder: Path) -> None:
-    """Runs a trial with the wheel in an environment of its own, far from the sources."""
+    """Runs a trial and makes a report with the wheel, in an environment far from the sources."""
     venv.create(folder / "venv", with_pip=True)
     python = folder / "venv" / "bin" / "python"
     constraints = Path("constraints.txt").resolve()
     install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     subprocess.run([*install, "--constraint", str(constraints), str(wheel)], check=True)
-    for arguments in (["robots"], ["trial", "hexapod", "--out", "trial.mcap"]):
+    (folder / "results.csv").write_text("robot,correct\nhexapod,true\n", encoding="utf-8")
+    commands = (["robots"], ["trial", "hexapod", "--out", "trial.mcap"], ["report", "."])
+    for arguments in commands:
         subprocess.run([str(python), "-m", "selfmodel", *arguments], check=True, cwd=folder)
 
 

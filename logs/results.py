@@ -102,7 +102,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
 
     Attributes:
         robot: Name of the robot.
-        model: Digest of the self-model, ``self_model_digest``; None in a file of version 0.1.
+        model: Digest of the self-model, ``self_model_digest``.
         comparator: Name of the comparator.
         comparator_reason: Reason for its choice.
         kinds: Names of the fault kinds that were searched.
@@ -116,7 +116,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     """
 
     robot: str
-    model: str | None = None
+    model: str
     comparator: str
     comparator_reason: str = ""
     kinds: tuple[str, ...]
@@ -225,7 +225,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
 class CalibrationResult(Struct, frozen=True):
     """The part of a calibration's JSON of which a self-model is made, ``Calibration.to_dict``.
 
-    A calibration of version 0.1 has no contacts. With ``joints``, the fit of a robot with a fixed
+    With ``joints``, the fit of a robot with a fixed
     base, the other values do not determine the self-model.
     """
 
@@ -241,8 +241,8 @@ class CalibrationResult(Struct, frozen=True):
     set: str
     determined: tuple[bool, ...]
     held_out_gain: float
-    contact_stiffness: ContactFactor = 1.0
-    contact_damping: ContactFactor = 1.0
+    contact_stiffness: ContactFactor
+    contact_damping: ContactFactor
     joints: dict[str, Any] | None = None
 
 
@@ -325,11 +325,12 @@ def best_hypothesis(path: Path) -> str:
     remedy = "name the hypothesis by --hypothesis"
     try:
         values = parse_json(read_file(path, what, MAX_BYTES))
-        values = values[-1:] if isinstance(values, list) else [verified(values).content]
+        found = values if isinstance(values, list) else verified(values).content
     except ValueError as error:
         raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
-    (found,) = converted(path, values, _OneRanking, what, remedy)
-    return found.best
+    if isinstance(found, list):
+        return converted(path, found, _Journal, what, remedy)[-1].ranked[0].hypothesis
+    return converted(path, found, _Printed, what, remedy).diagnosis[0].hypothesis
 
 
 class _Candidate(Struct):
@@ -339,17 +340,12 @@ class _Candidate(Struct):
 _Ranking = Annotated[list[_Candidate], Meta(min_length=1)]
 
 
-class _Ranked(Struct):
-    ranked: _Ranking | None = None
-    diagnosis: _Ranking | None = None
-
-    def __post_init__(self) -> None:
-        if not (self.ranked or self.diagnosis):
-            raise ValueError("no hypothesis is ranked")
-
-    @property
-    def best(self) -> str:
-        return (self.ranked or self.diagnosis or [])[0].hypothesis
+class _Printed(Struct):
+    diagnosis: _Ranking
 
 
-_OneRanking = Annotated[list[_Ranked], Meta(min_length=1, max_length=1)]
+class _Logged(Struct):
+    ranked: _Ranking
+
+
+_Journal = Annotated[list[_Logged], Meta(min_length=1)]

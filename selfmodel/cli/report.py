@@ -22,7 +22,7 @@ from selfmodel.cli.arguments.options import (
     Threads,
 )
 from selfmodel.cli.diagnosed_logs import diagnose_logs
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
+from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.errors import LogWriteError
@@ -104,7 +104,6 @@ def report(
             comparator=comparator,
             kinds=searched,
         )
-        print_notes(*(f"note: {note}" for note in subject.notes))
         made = report_of(subject)
     else:
         found = diagnose_logs(

@@ -11,21 +11,12 @@ from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sente
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
-from selfmodel.report.charts import (
-    BarChart,
-    Estimate,
-    Group,
-    IntervalChart,
-    LineChart,
-    Report,
-    Section,
-    Series,
-    Table,
-)
+from selfmodel.report import charts
+from selfmodel.report.charts import Report, Section
 from selfmodel.report.evidence import residual_section, separation_section
-from selfmodel.report.scene import Motion, Shot, scene_of
+from selfmodel.report.scene import scene_of
 from selfmodel.report.subject import Subject
-from selfmodel.report.trials import TrialRollouts, gait_section, rollouts_of, trials_section
+from selfmodel.report.trials import gait_section, shots_of, trials_section
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 
 NOT_FINISHED = "The recovery is not finished"
@@ -45,15 +36,15 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
         subject: The trials and diagnoses.
         finished: Whether the recovery that they are of is finished.
     """
-    rolled = rollouts_of(subject)
+    shots = shots_of(subject)
     found = [
-        trials_section(subject, rolled),
+        trials_section(subject, shots),
         hypotheses_section(subject),
         residual_section(subject),
         separation_section(subject),
         searches_section(subject.searches),
         calibration_section(subject.calibration),
-        gait_section(subject, rolled),
+        gait_section(subject, shots),
     ]
     said = headline(subject)
     return Report(
@@ -61,7 +52,7 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
         headline=said if finished else f"{NOT_FINISHED}: {said}",
         verdict=details(subject),
         sections=tuple(section for section in found if section is not None),
-        scene=scene_of(subject.robot, [_shot(subject, one) for one in rolled]),
+        scene=scene_of(subject.robot, shots),
         made_with=subject.made_with,
     )
 
@@ -131,30 +122,19 @@ def _verdict(diagnosis: Diagnosis) -> str:
     return f"moves in a way that no searched hypothesis explains; the nearest is {diagnosis.best}"
 
 
-def _shot(subject: Subject, rolled: TrialRollouts) -> Shot:
-    change = subject.change_of(rolled.trial)
-    drawn = [
-        Motion(one.name, one.hypothesis, one.behaviour)
-        for one in rolled.rollouts
-        if not one.diverged and np.isfinite(one.behaviour["joint_positions"]).all()
-    ]
-    measured = Motion("measured", rolled.rollouts[0].hypothesis, rolled.trial.behaviour)
-    return Shot(rolled.name, (measured, *drawn), None if change is None else change[0])
-
-
 def hypotheses_section(subject: Subject) -> Section:
     """Returns the section of the hypotheses: the loss of each, and how it went over diagnoses."""
     diagnosis = subject.diagnosis
     ranked = [(one.hypothesis, one.distance) for one in diagnosis.ranked]
     if INTACT not in (one for one, _ in ranked):
         ranked.append((INTACT, diagnosis.intact_distance))
-    chart = BarChart(
+    chart = charts.BarChart(
         title="Loss of each hypothesis",
         x_label=f"distance by {subject.comparator.name}, summed over the trials",
         names=("distance",),
-        groups=tuple(Group(str(one), (distance,)) for one, distance in ranked),
+        groups=tuple(charts.Group(str(one), (distance,)) for one, distance in ranked),
     )
-    table = Table(
+    table = charts.Table(
         "Hypotheses",
         ("rank", "hypothesis", "distance", "against the best"),
         tuple(
@@ -181,7 +161,7 @@ def _standing(diagnosis: Diagnosis, hypothesis: Hypothesis) -> str:
     return "worse, or not better with more faults"
 
 
-def _over_time(subject: Subject) -> LineChart:
+def _over_time(subject: Subject) -> charts.LineChart:
     """Returns the distance per trial of the hypotheses of the last diagnosis, by diagnosis."""
     counts = tuple(float(diagnosis.trials) for diagnosis in subject.diagnoses)
     lines = {"intact": tuple(one.intact_distance / one.trials for one in subject.diagnoses)}
@@ -191,23 +171,23 @@ def _over_time(subject: Subject) -> LineChart:
             / one.trials
             for one in subject.diagnoses
         )
-    return LineChart(
+    return charts.LineChart(
         title="Distance per trial after each diagnosis",
         x_label="trials explained",
         y_label="distance per trial",
-        series=tuple(Series(name, counts, values) for name, values in lines.items()),
+        series=tuple(charts.Series(name, counts, values) for name, values in lines.items()),
     )
 
 
 def searches_section(searches: Sequence[Search]) -> Section | None:
     """Returns the section of the searches; None if their progress was not recorded."""
-    charts = tuple(
-        LineChart(
+    shown = tuple(
+        charts.LineChart(
             title=title,
             x_label="generation",
             y_label=y_label,
             series=tuple(
-                Series(
+                charts.Series(
                     name=f"{number}. {one.hypothesis or 'diagnosis'}",
                     x=tuple(map(float, range(1, len(one.best) + 1))),
                     y=one.best,
@@ -222,20 +202,20 @@ def searches_section(searches: Sequence[Search]) -> Section | None:
         if any(one.kind == kind and one.best for one in searches)
     )
     text = "Each line is one search: a repair before a trial, or the diagnosis after it."
-    return Section("searches", "Progress of the searches", (text,), charts) if charts else None
+    return Section("searches", "Progress of the searches", (text,), shown) if shown else None
 
 
 def calibration_section(fit: Calibration | None) -> Section | None:
     """Returns the section of the calibration: errors, and factors with intervals; None without."""
     if fit is None:
         return None
-    error = BarChart(
+    error = charts.BarChart(
         title="Prediction error of the self-model on the healthy trials",
         x_label="root mean square error, in units of each signal's scale",
         names=("error",),
-        groups=(Group("before", (fit.error_before,)), Group("after", (fit.error,))),
+        groups=(charts.Group("before", (fit.error_before,)), charts.Group("after", (fit.error,))),
     )
-    factors = IntervalChart(
+    factors = charts.IntervalChart(
         title="Fitted factors, with 95 % intervals",
         x_label="factor of the nominal value (1: as in the model)",
         estimates=tuple(_estimate(row) for row in fit.rows()),
@@ -253,8 +233,8 @@ def calibration_section(fit: Calibration | None) -> Section | None:
     return Section("calibration", "Calibration", tuple(text), (error, factors))
 
 
-def _estimate(row: dict[str, Any]) -> Estimate:
+def _estimate(row: dict[str, Any]) -> charts.Estimate:
     value, deviation = row["factor"], row["deviation"]
     with np.errstate(over="ignore"):  # a deviation of a changed file may be of any size
         low, high = (float(value * np.exp(sign * Z * deviation)) for sign in (-1, 1))
-    return Estimate(row["name"], value, low, high, "" if row["determined"] else UNDETERMINED)
+    return charts.Estimate(row["name"], value, low, high, "" if row["determined"] else UNDETERMINED)

@@ -19,19 +19,8 @@ from selfmodel.recovery.next_trial import (
     disagreements,
     discriminating_controller,
 )
-from selfmodel.report.charts import (
-    Attachment,
-    BarChart,
-    Group,
-    HeatMap,
-    Item,
-    LineChart,
-    Mark,
-    Row,
-    Section,
-    Series,
-    Table,
-)
+from selfmodel.report import charts
+from selfmodel.report.charts import Item, Section
 from selfmodel.report.subject import Subject
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop, Segments
@@ -80,7 +69,7 @@ class Axis:
     """
 
     offset: dict[str, float]
-    marks: tuple[Mark, ...]
+    marks: tuple[charts.Mark, ...]
 
 
 def residual_section(subject: Subject) -> Section | None:
@@ -102,15 +91,15 @@ def residual_section(subject: Subject) -> Section | None:
 
 def _axis(subject: Subject) -> Axis:
     offset: dict[str, float] = {}
-    marks: list[Mark] = []
+    marks: list[charts.Mark] = []
     now = 0.0
     for trial in subject.damaged:
         offset[trial.path] = now
-        marks.append(Mark(subject.names[trial.path], now))
+        marks.append(charts.Mark(subject.names[trial.path], now))
         change = subject.change_of(trial)
         if change is not None:
             time, low, high = (now + one for one in change)
-            marks.append(Mark("change of the robot", time, low, high))
+            marks.append(charts.Mark("change of the robot", time, low, high))
         now += float(trial.behaviour.time[-1]) + subject.robot.control_timestep
     return Axis(offset, tuple(marks))
 
@@ -126,7 +115,7 @@ def _loss_charts(subject: Subject, axis: Axis) -> list[Item]:
     losses = table.losses([one for _, one in shown], trials)
     by_signal = table.by_signal(subject.diagnosis.best, trials)
     found: list[Item] = [
-        LineChart(
+        charts.LineChart(
             "Loss over time of each hypothesis",
             TIME,
             "loss of a piece",
@@ -136,7 +125,7 @@ def _loss_charts(subject: Subject, axis: Axis) -> list[Item]:
     ]
     if by_signal:
         found.append(
-            LineChart(
+            charts.LineChart(
                 f"Loss over time by signal, of {subject.diagnosis.best}",
                 TIME,
                 "part of the loss of a piece",
@@ -147,8 +136,8 @@ def _loss_charts(subject: Subject, axis: Axis) -> list[Item]:
     return found
 
 
-def _series(name: str, x: FloatArray, y: FloatArray) -> Series:
-    return Series(name, tuple(map(float, x)), tuple(map(float, y)))
+def _series(name: str, x: FloatArray, y: FloatArray) -> charts.Series:
+    return charts.Series(name, tuple(map(float, x)), tuple(map(float, y)))
 
 
 def _heat_map(subject: Subject, axis: Axis) -> list[Item]:
@@ -167,13 +156,13 @@ def _heat_map(subject: Subject, axis: Axis) -> list[Item]:
     begins, ends, every = zip(*known, strict=True)
     rows = zip(every[0].names, errors, strict=True)
     return [
-        HeatMap(
+        charts.HeatMap(
             title=f"Error by sensor over time, of {best}",
             x_label=TIME,
             value_label="root mean square error, 1: large",
             begin=tuple(np.concatenate(begins).tolist()),
             end=tuple(np.concatenate(ends).tolist()),
-            rows=tuple(Row(name, tuple(row.tolist())) for name, row in rows),
+            rows=tuple(charts.Row(name, tuple(row.tolist())) for name, row in rows),
             largest=max(largest, 1.0),
             marks=axis.marks,
         )
@@ -250,7 +239,7 @@ def separation_section(subject: Subject) -> Section:
         text = "No other hypothesis predicts the trials as well, and no fault is undetectable."
         return Section("separation", "What cannot be distinguished", (text,))
     text = "These hypotheses predict the trials as well as the best one, or nearly so."
-    listed = Table(
+    listed = charts.Table(
         "Hypotheses that cannot be distinguished from the best",
         ("hypothesis", "reason"),
         tuple(
@@ -270,7 +259,7 @@ def separation_section(subject: Subject) -> Section:
     return Section("separation", "What cannot be distinguished", (text, advice), (listed, *found))
 
 
-def _trials(subject: Subject, apart: Sequence[Hypothesis]) -> tuple[BarChart | Attachment, ...]:
+def _trials(subject: Subject, apart: Sequence[Hypothesis]) -> tuple[Item, ...]:
     """Returns the disagreement of the hypotheses by trial, and a controller evolved for it."""
     drivers: dict[str, CommandSource] = {
         subject.names[trial.path]: trial.plan.controller for trial in subject.damaged
@@ -280,19 +269,19 @@ def _trials(subject: Subject, apart: Sequence[Hypothesis]) -> tuple[BarChart | A
     if separating is not None:
         drivers["a separating trial"] = separating
     found = _disagreement(subject, apart, list(drivers.values()), steps)
-    chart = BarChart(
+    chart = charts.BarChart(
         title="Disagreement of these hypotheses by trial",
         x_label=f"disagreement in the first {min(steps, EARLY_STEPS)} steps, from 0 to 1",
         names=("disagreement",),
         groups=tuple(
-            Group(name, (float(value),)) for name, value in zip(drivers, found, strict=True)
+            charts.Group(name, (float(value),)) for name, value in zip(drivers, found, strict=True)
         ),
     )
     if separating is None:
         return (chart,)
     data = base64.b64encode(controller_bytes(separating)).decode("ascii")
     title = f"the controller of a separating trial, for selfmodel trial --controller {FILE}"
-    return chart, Attachment(title, FILE, data)
+    return chart, charts.Attachment(title, FILE, data)
 
 
 def _separating(subject: Subject, steps: int) -> Controller | None:

@@ -3,8 +3,8 @@
 No name in a file is imported: plug-ins that are no entry points have to be given.
 """
 
+import dataclasses
 from collections.abc import Iterable, Sequence
-from functools import cache
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -52,13 +52,6 @@ class DiagnosisFile:
             raise InputError(
                 f"{path}: expected {self.WHAT}, got one that explains no log; {self.REMEDY}"
             )
-        digests = self.result.files or {}
-        # The paths in a result.json are relative to its folder, and those of its logs are not.
-        by_name = {_file_name(log): digest for log, digest in digests.items()}
-        self._digests = {
-            log: digests.get(log) or by_name.get(_file_name(log))
-            for log in (*self.result.explained, *self.result.healthy)
-        }
 
     def diagnosis(self, space: HypothesisSpace) -> Diagnosis:
         """Returns the diagnosis.
@@ -88,32 +81,27 @@ class DiagnosisFile:
     def matched(self, paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
         """Returns those of some logs that the diagnosis explains, in its order, and the healthy.
 
-        A log is known by its digest, or else by its path or its name.
-
         Args:
-            paths: All logs of the diagnosis, in any order.
+            paths: All logs of the diagnosis, in any order and under any names.
 
         Raises:
             InputError: The logs are others than those of the diagnosis.
         """
-        digest_of, found = cache(file_digest), dict[str, Path]()
-        for log, digest in self._digests.items():
-            if digest is not None:
-                fitting = [path for path in paths if digest_of(path) == digest]
-            else:
-                fitting = [path for path in paths if path == Path(log)]
-                fitting = fitting or [path for path in paths if path.name == _file_name(log)]
-            if len(fitting) != 1:
-                number = len(fitting) or "none"
-                raise self._of_other_logs(paths, f"{number} of them could be {log}")
-            found[log] = fitting[0]
-        others = [str(path) for path in paths if path not in found.values()]
-        if others:
-            raise self._of_other_logs(paths, f"{', '.join(others)} is no log of it")
-        return (
-            [found[log] for log in self.result.explained],
-            [found[log] for log in self.result.healthy],
+        given = {file_digest(path): path for path in paths}
+        # The paths in a result.json are relative to its folder, and those of its logs are not.
+        known = {PurePath(path).name: digest for path, digest in (self.result.files or {}).items()}
+        known |= self.result.files or {}
+        explained, healthy = (
+            [known.get(log) or known.get(PurePath(log).name, "") for log in logs]
+            for logs in (self.result.explained, self.result.healthy)
         )
+        if len(given) != len(paths) or given.keys() != {*explained, *healthy}:
+            own = ", ".join((*self.result.explained, *self.result.healthy))
+            raise InputError(
+                f"{self.path} is a diagnosis of other logs: expected {own}, the same by SHA-256, "
+                f"got {', '.join(map(str, paths))}: give these logs, or {self.REMEDY}"
+            )
+        return [given[digest] for digest in explained], [given[digest] for digest in healthy]
 
     def check_self_model(self, robot: Robot) -> None:
         """Checks that a robot is the self-model of the diagnosis, by its name and its digest.
@@ -127,34 +115,12 @@ class DiagnosisFile:
                 f"of the robot {robot.name}: give --robot as it was given to the diagnosis"
             )
         given, model = self_model_digest(robot), self.result.model
-        if model is not None and model != given:
+        if model != given:
             raise InputError(
                 f"{self.path} is a diagnosis with another self-model of the name {robot.name}: "
                 f"expected the digest {model[:12]}, got {given[:12]}: give --robot as it was given "
                 f"to the diagnosis, or {self.REMEDY}"
             )
-
-    def notes(self) -> tuple[str, ...]:
-        """Returns what could not be checked, as sentences."""
-        if self.result.model is not None:
-            return ()
-        note = (
-            f"{self.path} is of an earlier version, which did not record the self-model: that of "
-            f"this report has the same name, {self.result.robot}, and may be another"
-        )
-        return (note,)
-
-    def _of_other_logs(self, paths: Sequence[Path], reason: str) -> InputError:
-        by = "SHA-256" if all(map(self._digests.get, self.result.explained)) else "name"
-        return InputError(
-            f"{self.path} is a diagnosis of other logs: expected {', '.join(self._digests)}, the "
-            f"same by {by}, got {', '.join(map(str, paths))}; {reason}: give these logs, or "
-            f"{self.REMEDY}"
-        )
-
-
-def _file_name(path: str) -> str:
-    return PurePath(path.replace("\\", "/")).name
 
 
 def comparator_name(path: Path, recorded: str, given: str) -> str:
@@ -239,16 +205,8 @@ def recorded_calibration(
     fit = converted(path, result.calibration, CalibrationResult, what, remedy)
     if fit.joints is not None:
         return fitted(robot, healthy, threads)
-    parameters = Parameters(
-        root_mass=fit.root_mass,
-        limb_mass=fit.limb_mass,
-        friction=fit.friction,
-        damping=fit.damping,
-        motor_gains=fit.motor_gains,
-        delay=fit.delay,
-        contact_stiffness=fit.contact_stiffness,
-        contact_damping=fit.contact_damping,
-    )
+    names = (field.name for field in dataclasses.fields(Parameters))
+    parameters = Parameters(**{name: getattr(fit, name) for name in names})
     count = len(factor_names(robot))
     sizes = {len(parameters.factors), len(fit.deviations), len(fit.determined) or count}
     if sizes != {count}:

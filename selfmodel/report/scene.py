@@ -24,6 +24,7 @@ from selfmodel.robot.motion import (
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trial import Trial
 
 MAX_POSES = 400_000
 """Poses of single bodies in a report, over all motions and frames: 14 bytes each, before base64."""
@@ -43,33 +44,55 @@ LEVELS = 65535
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One motion of the robot.
+    """One motion of the robot in a trial.
 
     Attributes:
-        name: Name in the legend, such as ``measured``.
+        name: Name in legends, such as ``measured`` or ``best hypothesis``.
         hypothesis: Faults of the robot in this motion; of the measured robot, those of the best
             hypothesis.
         behaviour: The motion, with the signals of a pose.
+        diverged: Whether a simulation diverged; its signals are then invalid.
     """
 
     name: str
     hypothesis: Hypothesis
     behaviour: Behaviour
+    diverged: bool = False
+
+    @property
+    def displacement(self) -> float:
+        """Forward displacement, m; NaN if the simulation diverged."""
+        x = self.behaviour["base_position"][:, 0]
+        return np.nan if self.diverged else float(x[-1] - x[0])
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the motion is finite."""
+        return not self.diverged and bool(np.isfinite(self.behaviour["joint_positions"]).all())
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The motions of one trial.
+    """A trial with the simulations of it.
 
     Attributes:
         name: Name of the trial.
-        motions: The measured motion, then the simulated ones.
+        trial: The trial.
+        rollouts: The trial simulated in closed loop from the initial pose, with all signals, best
+            hypothesis first; a healthy trial by the self-model.
         mark: Time of a change of the robot, s; None without one.
     """
 
     name: str
-    motions: tuple[Motion, ...]
+    trial: Trial
+    rollouts: tuple[Motion, ...]
     mark: float | None = None
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The measured motion, then those that are drawn."""
+        measured = Motion("measured", self.rollouts[0].hypothesis, self.trial.behaviour)
+        return (measured, *(one for one in self.rollouts if one.is_drawn))
 
 
 def scene_of(robot: Robot, shots: Sequence[Shot], most_poses: int = MAX_POSES) -> dict[str, Any]:
@@ -83,7 +106,7 @@ def scene_of(robot: Robot, shots: Sequence[Shot], most_poses: int = MAX_POSES) -
         most_poses: Largest number of poses of single bodies, about.
     """
     bodies = bodies_of(robot.model, robot.root)
-    poses = sum(shot.motions[0].behaviour.steps * len(shot.motions) for shot in shots) * len(bodies)
+    poses = sum(shot.trial.behaviour.steps * len(shot.motions) for shot in shots) * len(bodies)
     stride = max(1, -(-poses // most_poses))
     return {**geometry_of(robot), "shots": [_shot(robot, bodies, one, stride) for one in shots]}
 
@@ -147,7 +170,7 @@ def _turned(robot: Robot, index: Mapping[int, int]) -> Iterator[dict[str, Any]]:
 
 
 def _shot(robot: Robot, bodies: IndexArray, shot: Shot, stride: int) -> dict[str, Any]:
-    time = shot.motions[0].behaviour.time
+    time = shot.trial.behaviour.time
     steps = np.unique(np.append(np.arange(0, len(time), stride), len(time) - 1))
     return {
         "name": shot.name,

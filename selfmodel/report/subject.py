@@ -67,7 +67,6 @@ class Subject:
         result: Result of a run; None for logs, and for a run that is not finished.
         searches: Progress of the searches; empty if it was not recorded.
         made_with: Versions by the name of the software.
-        notes: What could not be checked, as sentences.
         threads: Threads of the physics.
     """
 
@@ -81,7 +80,6 @@ class Subject:
     result: RecoveryResult | None = None
     searches: tuple[Search, ...] = ()
     made_with: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
     threads: int = 0
 
     @property
@@ -255,7 +253,6 @@ def subject_of_logs(
             diagnosis, file.result, model, healthy, threads=count, words=(file.WHAT, file.REMEDY)
         ),
         made_with=logs[0].software,
-        notes=file.notes(),
         threads=count,
     )
 

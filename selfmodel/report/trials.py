@@ -2,23 +2,15 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import TrialResult
-from selfmodel.report.charts import (
-    BarChart,
-    Cell,
-    GaitDiagram,
-    Group,
-    Item,
-    Lane,
-    Section,
-    Table,
-)
+from selfmodel.report import charts
+from selfmodel.report.charts import Item, Section
+from selfmodel.report.scene import Motion, Shot
 from selfmodel.report.subject import Subject
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.behaviour import Behaviour
@@ -29,69 +21,32 @@ MAX_DIAGRAMS = 12
 """Trials with a gait diagram, at most: the last ones."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rollout:
-    """A trial simulated in closed loop, from the initial pose, under one hypothesis.
-
-    Attributes:
-        name: Name in legends, such as ``best hypothesis``.
-        hypothesis: The hypothesis.
-        behaviour: All signals.
-        diverged: Whether the simulation diverged; the signals are then invalid.
-    """
-
-    name: str
-    hypothesis: Hypothesis
-    behaviour: Behaviour
-    diverged: bool
-
-    @property
-    def displacement(self) -> float:
-        """Forward displacement, m; NaN if the simulation diverged."""
-        x = self.behaviour["base_position"][:, 0]
-        return np.nan if self.diverged else float(x[-1] - x[0])
-
-
-@dataclass(frozen=True, eq=False)
-class TrialRollouts:
-    """A trial and its rollouts.
-
-    Attributes:
-        name: Name of the trial.
-        trial: The trial.
-        rollouts: Rollouts, best hypothesis first; of a healthy trial, that of the self-model.
-    """
-
-    name: str
-    trial: Trial
-    rollouts: tuple[Rollout, ...]
-
-
-def rollouts_of(subject: Subject) -> tuple[TrialRollouts, ...]:
-    """Returns the rollouts of every trial of a report."""
+def shots_of(subject: Subject) -> tuple[Shot, ...]:
+    """Returns every trial of a report with its simulations."""
     after = [("best hypothesis", subject.diagnosis.best)]
     if subject.runner_up is not None:
         after.append(("runner-up", subject.runner_up))
     before = [("self-model", INTACT)]
     return tuple(
-        TrialRollouts(
-            subject.names[trial.path],
-            trial,
-            tuple(_rollout(subject, trial, *named) for named in hypotheses),
-        )
+        _shot(subject, trial, hypotheses)
         for trials, hypotheses in ((subject.healthy, before), (subject.damaged, after))
         for trial in trials
     )
 
 
-def _rollout(subject: Subject, trial: Trial, name: str, hypothesis: Hypothesis) -> Rollout:
-    result = replay(trial, hypothesis, subject.simulator)
-    signals = {signal: result.simulated[signal] for signal in SIGNALS}
-    simulated = Behaviour(result.simulated.names, trial.behaviour.time, signals)
-    return Rollout(name, hypothesis, simulated, result.diverged)
+def _shot(subject: Subject, trial: Trial, hypotheses: Sequence[tuple[str, Hypothesis]]) -> Shot:
+    rollouts = []
+    for name, hypothesis in hypotheses:
+        result = replay(trial, hypothesis, subject.simulator)
+        signals = {signal: result.simulated[signal] for signal in SIGNALS}
+        behaviour = Behaviour(result.simulated.names, trial.behaviour.time, signals)
+        rollouts.append(Motion(name, hypothesis, behaviour, result.diverged))
+    change = subject.change_of(trial)
+    mark = None if change is None else change[0]
+    return Shot(subject.names[trial.path], trial, tuple(rollouts), mark)
 
 
-def trials_section(subject: Subject, rolled: Sequence[TrialRollouts]) -> Section:
+def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
     """Returns the section of the trials: displacement, predicted against observed."""
     text = (
         "A prediction is a simulation of the whole trial by the self-model, with the same "
@@ -101,23 +56,23 @@ def trials_section(subject: Subject, rolled: Sequence[TrialRollouts]) -> Section
     items: list[Item] = []
     if not subject.robot.has_fixed_base:
         items.append(
-            BarChart(
+            charts.BarChart(
                 title="Forward displacement of each trial, observed and predicted",
                 x_label="forward displacement, m",
                 names=("observed", "best hypothesis or self-model", "runner-up"),
-                groups=tuple(Group(one.name, _displacements(one)) for one in rolled),
+                groups=tuple(charts.Group(one.name, _displacements(one)) for one in shots),
             )
         )
-    items.append(_trials_table(subject, rolled))
+    items.append(_trials_table(subject, shots))
     return Section("trials", "Trials", (text,), tuple(items))
 
 
-def _displacements(rolled: TrialRollouts) -> tuple[float, ...]:
-    predicted = [rollout.displacement for rollout in rolled.rollouts]
-    return (rolled.trial.displacement, *(*predicted, math.nan)[:2])
+def _displacements(shot: Shot) -> tuple[float, ...]:
+    predicted = [rollout.displacement for rollout in shot.rollouts]
+    return (shot.trial.displacement, *(*predicted, math.nan)[:2])
 
 
-def _trials_table(subject: Subject, rolled: Sequence[TrialRollouts]) -> Table:
+def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
     columns = ["trial", "stage", "steps", "observed displacement, m"]
     columns += ["predicted displacement, m", "predicted under"]
     result = subject.result
@@ -126,26 +81,26 @@ def _trials_table(subject: Subject, rolled: Sequence[TrialRollouts]) -> Table:
         columns += [f"{result.score.name}, {result.score.unit}".removesuffix(", ")]
         columns += ["predicted before the trial", "hypothesis at the time", "fell at step"]
     rows = []
-    for one in rolled:
+    for one in shots:
         first = one.rollouts[0]
-        row: list[Cell] = [one.name, one.trial.plan.stage, one.trial.behaviour.steps]
+        row: list[charts.Cell] = [one.name, one.trial.plan.stage, one.trial.behaviour.steps]
         row += [one.trial.displacement, first.displacement, str(first.hypothesis)]
         row += [] if result is None else _scores(results.get(one.name))
         rows.append(tuple(row))
-    return Table("Trials", tuple(columns), tuple(rows))
+    return charts.Table("Trials", tuple(columns), tuple(rows))
 
 
-def _scores(found: TrialResult | None) -> list[Cell]:
+def _scores(found: TrialResult | None) -> list[charts.Cell]:
     if found is None:
         return [None] * 4
     return [found.score, found.predicted_score, found.hypothesis, found.fell_at_step]
 
 
-def gait_section(subject: Subject, rolled: Sequence[TrialRollouts]) -> Section | None:
+def gait_section(subject: Subject, shots: Sequence[Shot]) -> Section | None:
     """Returns the section of the gait, contacts over time; None without touch sensors."""
     sensors = subject.robot.anatomy.sensors
     touch = {one.name: i for i, one in enumerate(sensors) if one.kind == "touch"}
-    diagrams = tuple(_diagram(one, touch) for one in rolled[-MAX_DIAGRAMS:] if touch)
+    diagrams = tuple(_diagram(one, touch) for one in shots[-MAX_DIAGRAMS:] if touch)
     shown = tuple(one for one in diagrams if one.groups)
     text = (
         "A bar is the time in which a touch sensor has contact (after Hildebrand, 1965). The "
@@ -154,20 +109,20 @@ def gait_section(subject: Subject, rolled: Sequence[TrialRollouts]) -> Section |
     return Section("gait", "Gait diagram", (text,), shown) if shown else None
 
 
-def _diagram(rolled: TrialRollouts, touch: dict[str, int]) -> GaitDiagram:
-    motions = [("measured", rolled.trial.behaviour)]
-    motions += [(one.name, one.behaviour) for one in rolled.rollouts[:1] if not one.diverged]
-    return GaitDiagram(
-        title=f"Contacts in {rolled.name}",
+def _diagram(shot: Shot, touch: dict[str, int]) -> charts.GaitDiagram:
+    motions = [("measured", shot.trial.behaviour)]
+    motions += [(one.name, one.behaviour) for one in shot.rollouts[:1] if not one.diverged]
+    return charts.GaitDiagram(
+        title=f"Contacts in {shot.name}",
         groups={
             name: tuple(
-                Lane(sensor, tuple(_spans(behaviour.time, behaviour["sensors"][:, i])))
+                charts.Lane(sensor, tuple(_spans(behaviour.time, behaviour["sensors"][:, i])))
                 for sensor, i in touch.items()
             )
             for name, behaviour in motions
             if np.isfinite(behaviour["sensors"][:, list(touch.values())]).any()
         },
-        end=float(rolled.trial.behaviour.time[-1]),
+        end=float(shot.trial.behaviour.time[-1]),
     )
 
 

@@ -63,28 +63,21 @@ def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
         )
 
         assert (done.returncode, done.stdout) == (2, "")
-        assert (
-            "found.json is a diagnosis of other logs: expected after.mcap, before.mcap, the "
-            in (done.stderr)
-        )
+        assert "is a diagnosis of other logs: expected after.mcap, before.mcap" in done.stderr
 
 
-def test_a_diagnosis_with_another_self_model_is_refused_and_without_a_digest_noted(
-    logs: Path, diagnosed: Path
-):
+def test_a_diagnosis_with_another_self_model_is_refused(logs: Path, diagnosed: Path):
     values = json.loads(diagnosed.read_text())
     (logs / "other.json").write_text(json.dumps({**values, "model": "0" * 64}))
-    del values["model"]
-    (logs / "earlier.json").write_text(json.dumps(values))
-    given = ("report", "before.mcap", "after.mcap", "-o")
 
-    refused = selfmodel(*given, "refused.html", "--diagnosis", "other.json", cwd=logs)
-    noted = selfmodel(*given, "noted.html", "--diagnosis", "earlier.json", cwd=logs)
+    refused = selfmodel(
+        *("report", "before.mcap", "after.mcap", "-o", "refused.html"),
+        *("--diagnosis", "other.json"),
+        cwd=logs,
+    )
 
     assert refused.returncode == 2
     assert "other.json is a diagnosis with another self-model of the name" in refused.stderr
-    assert noted.returncode == 0, noted.stderr
-    assert "note: earlier.json is of an earlier version, which did not record" in noted.stderr
 
 
 def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):

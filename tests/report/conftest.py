@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject, subject_of_run
-from selfmodel.report.trials import TrialRollouts, rollouts_of
+from selfmodel.report.trials import shots_of
 from tests.helpers.command import SMALL, selfmodel
 
 
@@ -25,5 +26,5 @@ def subject(run: Path) -> Subject:
 
 
 @pytest.fixture(scope="session")
-def rolled(subject: Subject) -> tuple[TrialRollouts, ...]:
-    return rollouts_of(subject)
+def shots(subject: Subject) -> tuple[Shot, ...]:
+    return shots_of(subject)

@@ -10,8 +10,9 @@ import pytest
 from selfmodel.faults.notation import parse
 from selfmodel.report.charts import GaitDiagram
 from selfmodel.report.content import details, headline, report_of
+from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject
-from selfmodel.report.trials import TrialRollouts, gait_section
+from selfmodel.report.trials import gait_section
 
 
 def with_verdict(subject: Subject, **changes: object) -> Subject:
@@ -67,14 +68,12 @@ def test_the_truth_of_a_run_is_named(subject: Subject):
     assert not any("True" in one for one in details(with_verdict(subject)))
 
 
-def test_the_spans_of_a_lane_are_the_times_of_contact(
-    subject: Subject, rolled: tuple[TrialRollouts, ...]
-):
-    section = gait_section(subject, rolled)
+def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: tuple[Shot, ...]):
+    section = gait_section(subject, shots)
     assert section is not None
     diagram = section.items[0]
     assert isinstance(diagram, GaitDiagram)
-    behaviour = rolled[0].trial.behaviour
+    behaviour = shots[0].trial.behaviour
     for lane in diagram.groups["measured"]:
         column = behaviour.names.sensors.index(lane.label)
         contact = np.zeros(behaviour.steps, dtype=bool)
@@ -84,12 +83,10 @@ def test_the_spans_of_a_lane_are_the_times_of_contact(
         assert np.array_equal(contact[:-1], (behaviour["sensors"][:, column] > 0.5)[:-1])
 
 
-def test_a_simulation_that_diverged_has_no_contacts(
-    subject: Subject, rolled: tuple[TrialRollouts, ...]
-):
-    first = dataclasses.replace(rolled[0].rollouts[0], diverged=True)
+def test_a_simulation_that_diverged_has_no_contacts(subject: Subject, shots: tuple[Shot, ...]):
+    first = dataclasses.replace(shots[0].rollouts[0], diverged=True)
 
-    section = gait_section(subject, (dataclasses.replace(rolled[0], rollouts=(first,)),))
+    section = gait_section(subject, (dataclasses.replace(shots[0], rollouts=(first,)),))
 
     assert section is not None
     assert isinstance(section.items[0], GaitDiagram)

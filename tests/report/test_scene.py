@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.report.scene import Motion, Shot, geometry_of, quantised, scene_of, simplified
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.robots.arms import quadruped_on_a_stand
 
@@ -44,15 +45,22 @@ def moved(robot: Robot) -> Behaviour:
     return Behaviour(batch.names, batch.time, {one: batch[one][0] for one in SIGNALS})
 
 
+def shot(robot: Robot, behaviour: Behaviour, hypothesis: Hypothesis = INTACT) -> Shot:
+    """A trial whose only simulation diverged, so that the measured motion alone is drawn."""
+    (controller,) = random_controllers(robot, 1)
+    trial = Trial(TrialPlan("a", "after", controller, STEPS, 0), robot.name, behaviour, "a.mcap")
+    return Shot("a", trial, (Motion("best", hypothesis, behaviour, diverged=True),))
+
+
 @pytest.mark.parametrize("place", ["free", "on a stand"])
 def test_the_angles_of_a_motion_are_those_of_the_log(place: str, robot: Robot):
     robot = robot if place == "free" else quadruped_on_a_stand()
     behaviour = moved(robot)
 
-    scene = scene_of(robot, [Shot("a", (Motion("measured", INTACT, behaviour),))])
+    scene = scene_of(robot, [shot(robot, behaviour)])
 
-    (shot,) = scene["shots"]
-    (motion,) = shot["motions"]
+    (drawn_shot,) = scene["shots"]
+    (motion,) = drawn_shot["motions"]
     rotations = decoded(motion["rotation"]).reshape(STEPS, len(scene["bodies"]), 4)
     drawn = np.array(
         [
@@ -65,14 +73,14 @@ def test_the_angles_of_a_motion_are_those_of_the_log(place: str, robot: Robot):
     assert turned
     assert np.abs(decoded(motion["angles"]) - logged).max() < 1e-4
     assert np.abs(drawn - logged[:, turned]).max() < 2e-4
-    assert shot["time"] == behaviour.time.tolist()
+    assert drawn_shot["time"] == behaviour.time.tolist()
     assert motion["travelled"] == behaviour["base_position"][:, 0].tolist()
 
 
 def test_detached_and_jammed_bodies_of_the_hypothesis_are_named(quadruped: Robot):
     hypothesis = parse("break:front_left_knee+jam:back_right_shoulder", quadruped.anatomy)
 
-    scene = scene_of(quadruped, [Shot("a", (Motion("b", hypothesis, moved(quadruped)),))])
+    scene = scene_of(quadruped, [shot(quadruped, moved(quadruped), hypothesis)])
 
     (motion,) = scene["shots"][0]["motions"]
     assert [scene["bodies"][i] for i in motion["detached"]] == ["front_left_lower"]
@@ -81,12 +89,12 @@ def test_detached_and_jammed_bodies_of_the_hypothesis_are_named(quadruped: Robot
 
 def test_a_long_trial_loses_steps_but_neither_its_first_nor_its_last(quadruped: Robot):
     behaviour = moved(quadruped)
-    shots = [Shot("a", (Motion("measured", INTACT, behaviour),))]
 
-    (shot,) = scene_of(quadruped, shots, most_poses=STEPS * 9 // 4)["shots"]
+    scene = scene_of(quadruped, [shot(quadruped, behaviour)], most_poses=STEPS * 9 // 4)
 
-    assert len(shot["time"]) <= STEPS // 4 + 2
-    assert [shot["time"][0], shot["time"][-1]] == [behaviour.time[0], behaviour.time[-1]]
+    time = scene["shots"][0]["time"]
+    assert len(time) <= STEPS // 4 + 2
+    assert [time[0], time[-1]] == [behaviour.time[0], behaviour.time[-1]]
 
 
 def test_every_body_of_the_robot_has_its_shapes_and_the_world_has_none(robot: Robot):
