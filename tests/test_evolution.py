@@ -77,12 +77,6 @@ def test_seeds_start_in_the_population():
     assert evolution.ask()[0].tobytes() == seed.tobytes()
 
 
-def test_more_seeds_than_population_are_cut():
-    evolution = search(seeds=tuple(np.full(LENGTH, i / 200) for i in range(120)))
-
-    assert evolution.ask().shape == (100, LENGTH)
-
-
 def test_the_worst_fitness_does_not_survive():
     evolution = search()
     fitness = np.where(np.arange(100) < 50, -np.inf, np.arange(100))

@@ -1,4 +1,4 @@
-"""What a recovery knows while it runs, and its result."""
+"""What has been tried and diagnosed in a recovery, and its result."""
 
 import dataclasses
 import math

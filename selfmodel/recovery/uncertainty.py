@@ -140,11 +140,13 @@ def estimated_uncertainty(
     """
     robot, assumed = simulator.robot, assumed_uncertainty(simulator.robot)
     touch = _touch(robot.anatomy)
-    pairs = [(trial.behaviour, _simulated(simulator, trial)) for trial in trials]
-    noise = [_excess(_variance, *_signals(pair, _readings)) for pair in pairs]
-    wrong = [_excess(_flips, *_signals(pair, _readings)) for pair in pairs]
-    angles = [_start_variance(*_signals(pair, _angles)) for pair in pairs]
-    tilts = [_start_variance(*_signals(pair, _tilts)) for pair in pairs]
+    noise, wrong, angles, tilts = [], [], [], []
+    for trial in trials:
+        logged, simulated = trial.behaviour, _simulated(simulator, trial)
+        noise.append(_excess(_variance, logged["sensors"], simulated["sensors"]))
+        wrong.append(_excess(_flips, logged["sensors"], simulated["sensors"]))
+        angles.append(_start_variance(logged["joint_positions"], simulated["joint_positions"]))
+        tilts.append(_start_variance(_tilts(logged), _tilts(simulated)))
     angle = _deviation(angles)
     found = Uncertainty(
         models=exact(robot),
@@ -176,20 +178,6 @@ def _simulated(simulator: Simulator, trial: Trial) -> Behaviour:
     )
     signals = {signal: values[0] for signal, values in outcome.behaviour.signals.items()}
     return Behaviour(outcome.behaviour.names, outcome.behaviour.time, signals)
-
-
-def _signals(
-    pair: tuple[Behaviour, Behaviour], columns: Callable[[Behaviour], FloatArray]
-) -> tuple[FloatArray, FloatArray]:
-    return columns(pair[0]), columns(pair[1])
-
-
-def _readings(behaviour: Behaviour) -> FloatArray:
-    return behaviour["sensors"]
-
-
-def _angles(behaviour: Behaviour) -> FloatArray:
-    return behaviour["joint_positions"]
 
 
 def _tilts(behaviour: Behaviour) -> FloatArray:

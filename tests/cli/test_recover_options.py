@@ -54,7 +54,7 @@ def test_a_name_that_is_unknown_is_refused_before_any_work(
         (("--max-joint-torque", "8"), "upright within 8 N m"),
         (("--repair", "paper"), "displacement"),
         (("--search", "ea", "--score", "energy"), "energy"),
-        (("--score", "selfmodel.recovery.scores.energy:ENERGY"), "energy"),
+        (("--score", "selfmodel.recovery.scores:ENERGY"), "energy"),
     ],
 )
 def test_the_score_is_that_of_the_repair_unless_another_is_given(

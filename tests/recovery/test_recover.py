@@ -3,7 +3,6 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,9 @@ from numpy.random import Generator
 from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.errors import InputError
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -25,7 +26,6 @@ from selfmodel.logs.journal import FolderJournal, create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.next_trial import discriminating_controller
 from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.result import Recovery
@@ -40,20 +40,6 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import MemoryJournal, in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
-SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=120)
-BUDGET = TINY
-"""The settings of every recovery here: each test runs with both budgets."""
-
-
-@pytest.fixture(
-    autouse=True,
-    params=[
-        pytest.param(TINY, id="tiny"),
-        pytest.param(SMALL, id="small", marks=pytest.mark.search),
-    ],
-)
-def _budget(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(globals(), "BUDGET", request.param)
 
 
 class CountingSimulator(Simulator):
@@ -107,7 +93,7 @@ def recovery(
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
         run_trial=in_memory(robot),
         journal=MemoryJournal(),
-        settings=dataclasses.replace(BUDGET, trials=trials),
+        settings=dataclasses.replace(TINY, trials=trials),
         seed=seed,
         on_event=events.append,
         kinds=PAPER_KINDS,
@@ -139,8 +125,8 @@ def test_a_recovery_tells_the_papers_story(robot: Robot):
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
     assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
-    children = BUDGET.population // 2
-    evaluations = BUDGET.population + (BUDGET.generations - 1) * children
+    children = TINY.population // 2
+    evaluations = TINY.population + (TINY.generations - 1) * children
     assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * evaluations
     assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
 
@@ -178,37 +164,6 @@ def test_the_algorithm_cannot_see_what_is_hidden(quadruped: Robot):
         _ = Sealed(SimulatedRobot(quadruped, truth))._embodiment
 
 
-def test_the_truth_changes_a_diagnosis_only_through_what_the_robot_did(quadruped: Robot):
-    """A robot that hides another fault but replays the same samples gets the same diagnosis."""
-
-    class Replay:
-        def __init__(self, source: SimulatedRobot, hidden: Hypothesis) -> None:
-            self._source, self.hidden = source, hidden
-
-        def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
-            """Runs a controller."""
-            return self._source.run(controller, steps)
-
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    diagnoses = []
-    for hidden in (truth, INTACT):
-        events: list[Event] = []
-        damaged = Replay(SimulatedRobot(quadruped, truth), hidden)
-        RecoveryLoop(
-            simulator=Simulator(quadruped, 2),
-            choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
-            run_trial=in_memory(quadruped),
-            journal=MemoryJournal(),
-            settings=dataclasses.replace(BUDGET, trials=1),
-            seed=1,
-            on_event=events.append,
-            kinds=PAPER_KINDS,
-        ).run(SimulatedRobot(quadruped), damaged)
-        diagnoses.append([event for event in events if isinstance(event, Diagnosis)])
-
-    assert diagnoses[0] == diagnoses[1]
-
-
 def test_the_same_seed_recovers_the_same_way_at_any_number_of_threads(quadruped: Robot):
     truth = parse("jam:front_left_shoulder", quadruped.anatomy)
     outcomes = [recovery(quadruped, truth, Simulator(quadruped, n), []) for n in (1, 2)]
@@ -239,7 +194,7 @@ def test_every_search_starts_from_what_the_database_holds(
     genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
     space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
     encoded = [
-        [space.encode(c.hypothesis, BUDGET.genes).tobytes() for c in d.ranked] for d in diagnoses
+        [space.encode(c.hypothesis, TINY.genes).tobytes() for c in d.ranked] for d in diagnoses
     ]
 
     def newest_first(count: int) -> list[bytes]:
@@ -298,9 +253,9 @@ def recovery_in_files(
     outcome = RecoveryLoop(
         simulator=Simulator(robot, 2),
         choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
-        run_trial=TrialRunner(journal.trials, robot, BUDGET, hidden).__call__,
+        run_trial=TrialRunner(journal.trials, robot, TINY, hidden).__call__,
         journal=SealedJournal(),
-        settings=dataclasses.replace(BUDGET, trials=1),
+        settings=dataclasses.replace(TINY, trials=1),
         seed=1,
         on_event=lambda _: None,
         kinds=PAPER_KINDS,
@@ -366,21 +321,24 @@ def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robo
     assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
 
 
-@pytest.mark.search
-def test_trials_that_tell_apart_differ_from_the_one_before_and_are_the_same_at_any_threads(
+def test_a_comparator_that_refuses_the_healthy_trial_ends_the_recovery_before_the_failure(
     quadruped: Robot,
 ):
-    def ask(loop: RecoveryLoop) -> Controller:
-        diagnosis, known = loop.known.diagnoses[-1], loop.known.controllers
-        return discriminating_controller(diagnosis, known, loop.simulator, loop.settings, loop.rng)
+    events: list[object] = []
 
-    truth = parse("sensor:front_left_touch", quadruped.anatomy)
-    gait = random_controllers(quadruped, 1)[0]
+    def refuse(_robot: Robot, _trials: Sequence[Trial]) -> ChosenComparator:
+        raise InputError("no position")
 
-    def drivers(threads: int) -> list[Controller]:
-        rest = {"trials": 2, "gait": gait, "next_trial": ask}
-        outcome = recovery(quadruped, truth, Simulator(quadruped, threads), [], **rest)
-        return [trial.plan.controller for trial in outcome.trials[1:]]
-
-    assert drivers(1) == drivers(2)
-    assert all(one != other for one, other in pairwise(drivers(1)))
+    with pytest.raises(InputError, match="no position"):
+        RecoveryLoop(
+            simulator=Simulator(quadruped, 1),
+            choose_comparator=refuse,
+            run_trial=in_memory(quadruped),
+            journal=MemoryJournal(),
+            settings=TINY,
+            seed=1,
+            on_event=events.append,
+            calibrate=lambda _trials: pytest.fail("calibrated"),
+            gait=random_controllers(quadruped, 1)[0],
+        ).run(SimulatedRobot(quadruped), SimulatedRobot(quadruped))
+    assert [event.plan.stage for event in events if isinstance(event, Trial)] == ["before"]

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +16,13 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery import recover as module
-from selfmodel.recovery.recover import RecoveryLoop
-from selfmodel.recovery.repair import CandidateController
+from selfmodel.recovery.next_trial import discriminating_controller
+from selfmodel.recovery.recover import RecoveryLoop, by_repair
+from selfmodel.recovery.repair import CandidateController, RepairSearch
+from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import Score
+from selfmodel.robot.designs import DESIGNS
+from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
@@ -130,3 +135,55 @@ def test_a_recovery_fell_if_the_robot_fell_in_its_best_trial(
     assert recovery.fell == fell
     best = recovery.trials[2 + scores.index(max(scores))]
     assert recovery.recovered == best.displacement
+
+
+FEW = dataclasses.replace(Settings(generations=2, steps=60, trials=2).scaled(8), kept=4)
+
+
+def evolved(robot: Robot, kind: str, next_trial: str = "repair") -> Recovery:
+    """A small recovery whose self-model was fitted, and written with fewer digits by that."""
+    fitted = with_parameters(robot, dataclasses.replace(nominal(robot), friction=1.1))
+
+    def choose(loop: RecoveryLoop) -> Controller:
+        if next_trial == "repair":
+            return by_repair(loop)
+        known = loop.known
+        rest = (loop.simulator, loop.settings, loop.rng)
+        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
+
+    return RecoveryLoop(
+        simulator=Simulator(robot, 1),
+        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
+        run_trial=in_memory(robot),
+        journal=MemoryJournal(),
+        settings=FEW,
+        seed=0,
+        on_event=lambda _event: None,
+        design=DESIGNS[kind](robot, None),
+        calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
+        next_trial=choose,
+        make_repair=RepairSearch,
+    ).run(
+        SimulatedRobot(robot), SimulatedRobot(robot, parse("break:back_left_knee", robot.anatomy))
+    )
+
+
+@pytest.fixture(scope="module")
+def asymmetric(quadruped: Robot) -> Robot:
+    """The quadruped, with command ranges of more digits than a model is written with."""
+    ours = "-0.7853981633974483 0.7853981633974483"
+    mjcf = quadruped.mjcf.replace(ours, "-0.71234567891 0.6543210987")
+    return dataclasses.replace(quadruped, mjcf=mjcf)
+
+
+@pytest.mark.search
+@pytest.mark.parametrize("kind", ["network", "cpg"])
+@pytest.mark.parametrize("next_trial", ["repair", "disagreement"])
+def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
+    asymmetric: Robot, kind: str, next_trial: str
+):
+    trials = evolved(asymmetric, kind, next_trial).trials
+    designs = {trial.plan.controller.design for trial in trials}
+
+    assert designs == {DESIGNS[kind](asymmetric, None)}
+    assert designs != {DESIGNS[kind](with_parameters(asymmetric, nominal(asymmetric)), None)}

@@ -8,12 +8,13 @@ import pytest
 from selfmodel.errors import WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair import RepairSearch
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
-from tests.helpers.drivers import random_controllers
+from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable
 
 SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
@@ -52,3 +53,12 @@ def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
     search = RepairSearch(Simulator(unstable(quadruped), 2), few)
     with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite, wi"):
         search((INTACT,), assumed, (), np.random.default_rng(0), lambda _: None)
+
+
+def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quadruped: Robot):
+    seeds = [*random_controllers(quadruped, 2), *random_cpgs(quadruped, 2)]
+    for kind in ("network", "cpg"):
+        design = DESIGNS[kind](quadruped, None)
+        search = RepairSearch(Simulator(quadruped, 1), dataclasses.replace(SMALL, steps=60), design)
+        rest = None, seeds, np.random.default_rng(0), lambda _generation: None
+        assert {one.controller.design for one in search((INTACT,), *rest)} == {design}
