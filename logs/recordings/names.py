@@ -53,10 +53,6 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, tuple[st
     Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
     ``front_left_knee``.
 
-    Args:
-        wanted: Names of the model.
-        offered: Names in the recording.
-
     Returns:
         Offered name, and whether the match is certain, by wanted name; names without a match are
         left out.
@@ -160,11 +156,7 @@ class Classified:
 
 
 def classified(names: Sequence[str]) -> Classified:
-    """Returns the columns of a table by their quantity.
-
-    Args:
-        names: Names of the columns.
-    """
+    """Returns the columns of a table by their quantity."""
     found = Classified(vectors=_vectors(names))
     used = {n for vectors in found.vectors.values() for some in vectors.values() for n in some}
     for name in (name for name in names if name not in used):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,13 +20,10 @@ MAX_GAPS_IN_FACTS, MAX_GAPS_IN_NOTES = 100, 5
 """Maximum listed gaps of a topic."""
 
 
-@dataclass(frozen=True)
-class Gap:
-    """Interval between two messages longer than ``MAX_PERIOD_RATIO`` usual periods.
+class Gap(NamedTuple):
+    """Interval between two messages longer than ``MAX_PERIOD_RATIO`` usual periods, s.
 
-    Attributes:
-        start: Time of the message before the gap, from the start of the trial, s; may be negative.
-        length: Duration, s.
+    It starts at the message before it, from the start of the trial, perhaps before it.
     """
 
     start: float
@@ -72,21 +69,13 @@ class Quality:
     def facts(self) -> dict[str, Any]:
         """Returns the quality as JSON values, with the first gaps."""
         longest = max((gap.length for gap in self.gaps), default=0.0)
-        where = [[gap.start, gap.length] for gap in self.gaps[:MAX_GAPS_IN_FACTS]]
-        return asdict(self) | {
-            "gaps": {"count": len(self.gaps), "longest": longest, "where": where}
-        }
+        where = [list(gap) for gap in self.gaps[:MAX_GAPS_IN_FACTS]]
+        gaps = {"count": len(self.gaps), "longest": longest, "where": where}
+        return asdict(self) | {"gaps": gaps}
 
 
 def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...]) -> Quality:
-    """Returns the quality of a topic.
-
-    Args:
-        series: Messages of the topic.
-        clock: Times of the messages.
-        origin: Start of the trial, ns.
-        roles: Roles of the topic.
-    """
+    """Returns the quality of a topic in a trial that starts at ``origin``, ns."""
     usable = clock.times[clock.usable]
     times = np.unique(usable)
     periods = np.diff(times) / 1e9

@@ -33,13 +33,7 @@ Tracks = dict[tuple[str, str], Track]
 def tracks_of(
     mapping: RecordingMapping, recording: Recording, clocks: Mapping[str, Clocked]
 ) -> Tracks:
-    """Returns the tracks of a recording.
-
-    Args:
-        mapping: Mapping, checked against the recording.
-        recording: The recording.
-        clocks: Times by topic.
-    """
+    """Returns the tracks of a recording, whose topics have the times of the clocks."""
     tracks: Tracks = {}
     for key, place in mapping.places.items():
         columns = recording.series[place.topic].columns

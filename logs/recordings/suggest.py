@@ -45,20 +45,18 @@ def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
 
 @dataclass(frozen=True)
 class _Offer:
-    """What a recording offers.
+    """What a recording offers for a mapping, as lines or by name.
 
     Attributes:
         what: Word for the recording.
-        clock: Line of the clock; none for a table.
-        time: Lines of the table of the time; none for a bag.
         heads: First lines of the tables of the joints and of the commands.
         names: Names by quantity and label, which may be a joint's.
         known: Names to list where none fits.
+        touches: Thresholds by names that may be of touch sensors; None for a Bool.
         base: Lines of the table of the base.
         imu: Lines of the table of the IMU.
-        touches: Names that may be of touch sensors.
-        touch: Key of such a name in the mapping.
-        thresholds: Thresholds by such a name.
+        clock: Line of the clock of a bag.
+        time: Table of the time of a table.
     """
 
     what: str

@@ -327,30 +327,17 @@ def _read_parquet(path: Path, wanted: Collection[str], _exact: str) -> Content:
             fields = [f for f in file.schema_arrow if any(check(f.type) for check in checks)]
             names = [field.name for field in fields]
             table = file.read([name for name in names if name in wanted], use_threads=False)
-            columns = {}
-            for name in table.column_names:
-                column = table[name]
-                if types.is_timestamp(column.type) or types.is_duration(column.type):
-                    kind = (
-                        pa.timestamp("ns") if types.is_timestamp(column.type) else pa.duration("ns")
-                    )
-                    column = column.cast(kind)
-                elif types.is_boolean(column.type):
-                    column = column.cast(pa.int8())
-                columns[name] = np.asarray(column.to_numpy())
+            columns = {
+                name: np.asarray(column.cast(pa.int8()) if column.type == pa.bool_() else column)
+                for name, column in zip(table.column_names, table.columns, strict=True)
+            }
     except pa.ArrowException as failure:
         raise ValueError(str(failure)) from failure
     return names, columns
 
 
 class Format(NamedTuple):
-    """Format of a table.
-
-    Attributes:
-        name: Its name.
-        read: Reader; its arguments are the file, the wanted columns, and the exact one.
-        advice: What to do if the file is damaged.
-    """
+    """Format of a table: its reader, and what to do about a damaged file."""
 
     name: str
     read: Callable[[Path, Collection[str], str], Content]

@@ -71,34 +71,19 @@ def test_degrees_and_velocities_in_the_world_are_converted(biped: Robot, tmp_pat
         'unit = "m"\norientation = ["quat_w", "quat_x", "quat_y", "quat_z"]\n'
         'linear_velocity = ["vel_x", "vel_y", "vel_z"]\nvelocity_frame = "world"',
     )
+    text = text.replace("[commands]\n", '[joints.efforts]\nleft_hip_y = "cmd_1"\n\n[commands]\n')
+    path = write_npz(tmp_path / "t.npz", found)
 
-    signals = imported(write_npz(tmp_path / "t.npz", found), biped, text).behaviour
+    signals = imported(path, biped, text).behaviour
+    of_base = imported(path, biped, text.replace('velocity_frame = "world"', "")).behaviour
 
     assert np.allclose(signals["joint_positions"][:, 0], np.deg2rad(found["q_0"][::2]))
     # The heading at the start, +y, is turned to +x: so is the velocity.
     assert np.allclose(signals["base_linear_velocity"][0], [1.0, 0.0, 2.0])
-
-
-def test_torques_have_the_sign_of_their_angle_and_velocities_are_of_the_base_by_default(
-    biped: Robot, tmp_path: Path
-):
-    found = columns()
-    half = math.sqrt(0.5)
-    base = {"w": half, "x": 0.0, "y": 0.0, "z": half}
-    found |= {f"quat_{axis}": np.full(40, value) for axis, value in base.items()}
-    found |= {f"vel_{axis}": np.full(40, float(k)) for k, axis in enumerate("xyz")}
-    text = MAPPING.replace("[commands]\n", '[joints.efforts]\nleft_hip_y = "cmd_1"\n\n[commands]\n')
-    text = text.replace(
-        'unit = "mm"',
-        'unit = "m"\norientation = ["quat_w", "quat_x", "quat_y", "quat_z"]\n'
-        'linear_velocity = ["vel_x", "vel_y", "vel_z"]',
-    )
-
-    signals = imported(write_npz(tmp_path / "t.npz", found), biped, text).behaviour
-
+    # There, the axes of the base are those of the world.
+    assert np.allclose(of_base["base_linear_velocity"][0], [0.0, 1.0, 2.0])
+    # A torque has the sign of its angle.
     np.testing.assert_array_equal(signals["joint_efforts"][:, 1], -found["cmd_1"][::2])
-    # The heading at the start is turned to +x, where the axes of the base are those of the world.
-    assert np.allclose(signals["base_linear_velocity"][0], [0.0, 1.0, 2.0])
 
 
 def test_rows_without_a_time_are_left_out_and_a_gap_is_nan(biped: Robot, tmp_path: Path):
@@ -182,6 +167,12 @@ def test_columns_of_other_lengths_and_impossible_times_are_refused(biped: Robot,
         path = write_npz(tmp_path / "u.npz", {**columns(), "time": columns()["time"] + start})
         with pytest.raises(InputError, match="in row 1: check the unit in"):
             imported(path, biped)
+
+
+def test_a_trial_is_of_a_length_that_its_log_may_have(biped: Robot, tmp_path: Path):
+    path = write_csv(tmp_path / "t.csv", {**columns(), "time": columns()["time"] * 1e4})
+    with pytest.raises(InputError, match=r"2 to 100000 steps, got 195001"):
+        imported(path, biped)
 
 
 def test_the_mapping_of_a_table_is_not_that_of_a_bag(biped: Robot, tmp_path: Path):
