@@ -14,7 +14,7 @@ NEEDED = (
     *("selfmodel/py.typed", "selfmodel/__init__.pyi", "selfmodel/robot/__init__.pyi"),
     *("selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml"),
     "selfmodel/cli/logs/foxglove-layout.json",
-    "selfmodel/experiments/study/figures.mplstyle",
+    "selfmodel/studies/figures.mplstyle",
     "selfmodel/report/template.html",
 )
 

@@ -12,20 +12,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import stats
 
 from selfmodel.arrays import FloatArray
-from selfmodel.experiments.confidence_intervals import Interval
-from selfmodel.experiments.statistics import (
-    Outcome,
-    compare,
+from selfmodel.studies.comparisons import OUTCOME, compare, marginal_means
+from selfmodel.studies.statistics import (
+    Interval,
     holm,
-    marginal_means,
     paired_interval,
     paired_proportion_interval,
 )
-from selfmodel.experiments.statistics.outcome import Measure
 
 SHARED = 0.3
 """Share of the variance of one run, apart from its seed's, that two methods have in common."""
@@ -155,8 +153,8 @@ def coverage_of_numbers(studies: int, rng: np.random.Generator) -> None:
                 run = np.sqrt(1 - dependence) * rng.standard_normal((2, seeds, 4))
                 values = medians[:, None] * np.exp(scale * (of_seed + run))
                 pairs.append(_contains(paired_interval, values, float(truth[0] - truth[1]), rng))
-                (mean,) = marginal_means(_outcomes(values[:1], "number"))
-                means.append(mean.mean.low <= truth[0] <= mean.mean.high)
+                mean = marginal_means(_outcomes(values[:1], "number")).iloc[0]
+                means.append(mean["mean_low"] <= truth[0] <= mean["mean_high"])
             print(f"| {seeds} | {dependence:g} | {_share(pairs)} | {_share(means)} |")
 
 
@@ -173,10 +171,10 @@ def family_errors(studies: int, rng: np.random.Generator) -> None:
                 equal = right([np.array(UNEQUAL)] * METHODS, seeds, dependence, rng)
                 found = compare(_outcomes(equal, "share"))
                 errors[study] = (
-                    any(one.p_runs < 0.05 for one in found),
-                    any(p < 0.05 for p in holm([one.p_runs for one in found])),
-                    any(p < 0.05 for p in holm([one.p_seeds for one in found])),
-                    any(one.better for one in found),
+                    any(found["p_runs"] < 0.05),
+                    any(p < 0.05 for p in holm(found["p_runs"].tolist())),
+                    any(p < 0.05 for p in holm(found["p_seeds"].tolist())),
+                    any(found["better"].notna()),
                 )
             print(f"| {seeds} | {dependence:g} | {' | '.join(map(_share, errors.T))} |")
 
@@ -197,17 +195,18 @@ def power(studies: int, rng: np.random.Generator) -> None:
                 simulated = (
                     right([good, good - difference], seeds, dependence, rng) for _ in range(studies)
                 )
-                found = [compare(_outcomes(one, "share"))[0] for one in simulated]
-                shares.append([max(one.p_runs, one.p_seeds) < 0.05 / pairs for one in found])
+                found = [compare(_outcomes(one, "share")).iloc[0] for one in simulated]
+                shares.append([max(one["p_runs"], one["p_seeds"]) < 0.05 / pairs for one in found])
             print(f"| {difference:g} | {dependence:g} | {' | '.join(map(_share, shares))} |")
 
 
-def _outcomes(values: FloatArray, measure: Measure) -> list[Outcome]:
+def _outcomes(values: FloatArray, measure: str) -> pd.DataFrame:
     """Returns the outcomes of simulated values, ``(methods, seeds, cases)``."""
-    return [
-        Outcome(("simulated",), f"method {method}", (f"case {case}",), seed, float(value), measure)
+    found = [
+        (("simulated",), f"method {method}", (f"case {case}",), seed, float(value), measure)
         for (method, seed, case), value in np.ndenumerate(values)
     ]
+    return pd.DataFrame(found, columns=list(OUTCOME))
 
 
 def _share(of: ArrayLike) -> str:

@@ -6,27 +6,31 @@ Usage: python examples/ablation.py FOLDER
 import sys
 from pathlib import Path
 
-from selfmodel.experiments import processes
-from selfmodel.experiments.ablation import Ablation, ablate, write_results
 from selfmodel.settings import Settings
+from selfmodel.studies import ablation
+from selfmodel.studies.rows import study_rows
+from selfmodel.studies.tables import ablation_scores, results_files, write_files
 
 
 def main(folder: Path) -> None:
     """Runs a small grid; a second call with the same folder continues an interrupted grid."""
-    ablation = Ablation(
+    study = ablation(
+        folder,
         robots=["quadruped"],
         cases=[1, 9],
         comparators=["forward-displacement"],  # or your own, as package.module:object
         gaps=[0.0],
         seeds=range(2),
-        folder=folder,
         settings=Settings(steps=200, generations=3).scaled(10),
     )
-    failed = ablate(ablation, workers=processes(2), on_progress=print)
-    results = write_results(folder)
-    for score in results.scores:
-        print(f"{score.comparator}, {score.trials} trials: {score.right} of {score.runs} right")
-    print(f"{len(results.rows)} rows, {len(failed)} failed: {results.files[0]}")
+    failed = study.run(workers=2, on_progress=print)
+    rows = study_rows("ablate", folder)
+    scores = ablation_scores(rows)
+    for score in scores:
+        name, trials = score["comparator"], score["trials"]
+        print(f"{name}, {trials} trials: {score['right']} of {score['runs']} right")
+    table, *_ = write_files(folder, results_files("ablate", rows, "scores", scores))
+    print(f"{len(rows)} rows, {len(failed)} failed: {table}")
 
 
 if __name__ == "__main__":  # the grid's processes import this file

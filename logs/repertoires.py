@@ -24,8 +24,7 @@ from selfmodel.files import read_file
 from selfmodel.logs.controllers import controller_bytes, parse_controller
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.npz import NPZ_FAILURES, read_array
-from selfmodel.recovery.repertoire.model_digest import Modelled, model_digest
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
+from selfmodel.recovery.repertoire import Modelled, Origin, Repertoire, model_digest
 
 MAX_BYTES = 2**28
 """Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have

@@ -42,7 +42,7 @@ from selfmodel.recovery.events import Event
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair, diagnose_trials
 from selfmodel.recovery.repair import RepairSearch
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty

@@ -19,7 +19,7 @@ from selfmodel.files import encodable, file_digest, read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.adaptation import adapt
 from selfmodel.robot.mjcf.isolated_model import check_compiles

@@ -22,7 +22,7 @@ from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
 from selfmodel.recovery.repair import MakeRepair, RepairSearch
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair, from_repertoire
 from selfmodel.recovery.scores import DISPLACEMENT, ENERGY, TRACKING, UPRIGHT, Score, checked
 from selfmodel.robot.designs import DESIGNS

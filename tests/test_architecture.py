@@ -66,7 +66,6 @@ ROOMS = (
     "arguments",
     "studies",
     "api",
-    "experiments",
     "report",
     "cli",
 )
@@ -166,8 +165,8 @@ def test_the_folders_are_imported_under_one_name(module: str):
             "selfmodel.logs",
             "selfmodel.faults.notation",
         ),
-        *("selfmodel.experiments.grid", "selfmodel.experiments.confidence_intervals"),
-        "selfmodel.experiments.statistics",
+        *("selfmodel.studies.grid", "selfmodel.studies.statistics"),
+        "selfmodel.studies.comparisons",
     ],
 )
 def test_what_needs_no_simulator_imports_without_mujoco(module: str):

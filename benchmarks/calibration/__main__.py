@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from selfmodel.controllers.controller import Controller
-from selfmodel.experiments.ablation.bank import gait
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
@@ -32,6 +31,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate, prediction_error
 from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.recoveries import bank_gait
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import BASE
@@ -153,7 +153,7 @@ def _trial(robot: Robot, physical: SimulatedRobot, driver: Controller) -> Trial:
 
 def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
     if bank is not None:
-        return gait(bank, robot.name, number)
+        return bank_gait(bank, robot.name, number)
     repair = RepairSearch(Simulator(robot, threads=1), Settings())
     assumed, stream = partial(assumed_uncertainty, robot), repair_stream(number, 0)
     return repair((INTACT,), assumed, (), stream, lambda _generation: None)[0].controller

@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.experiments.ablation.bank import gait
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_contacts
+from selfmodel.studies.recoveries import bank_gait
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial
 
@@ -85,7 +85,7 @@ def drawn(model: mujoco.MjModel, spread: float, rng: np.random.Generator) -> Tru
 
 def commands_of(robot: Robot, bank: Path, number: int, steps: int) -> FloatArray:
     """Returns the commands of a gait of the bank on the nominal model, ``(steps, motors)``."""
-    samples = SimulatedRobot(robot).run(gait(bank, robot.name, number), steps)
+    samples = SimulatedRobot(robot).run(bank_gait(bank, robot.name, number), steps)
     return np.asarray(collect(robot.anatomy.names, samples)["commands"])
 
 

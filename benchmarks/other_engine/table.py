@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.experiments.confidence_intervals import proportion
+from selfmodel.studies.statistics import proportion
 
 Row = dict[str, Any]
 

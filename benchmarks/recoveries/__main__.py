@@ -3,9 +3,8 @@
 import argparse
 from pathlib import Path
 
-from benchmarks.recoveries.cells import cells, read_rows, write_rows
+from benchmarks.recoveries.study import read_rows, study, write_rows
 from benchmarks.recoveries.table import table
-from selfmodel.experiments.grid import processes, run_grid
 from selfmodel.settings import Settings
 
 
@@ -27,7 +26,7 @@ def main() -> None:
     command.set_defaults(run=_run)
     command = commands.add_parser("table", help="print the ratios by case")
     command.add_argument("rows", type=Path, help="file of the rows")
-    command.add_argument("--oracles", type=Path, help="results.jsonl of `selfmodel baseline`")
+    command.add_argument("--oracles", type=Path, help="results.jsonl of benchmarks.rivals")
     command.set_defaults(run=_table)
     options = parser.parse_args()
     options.run(options)
@@ -35,7 +34,8 @@ def main() -> None:
 
 def _run(options: argparse.Namespace) -> None:
     settings = Settings(steps=options.steps, generations=options.generations)
-    wanted = cells(
+    wanted = study(
+        options.folder,
         options.robots.split(","),
         [int(case) for case in options.cases.split(",")],
         [float(gap) for gap in options.gaps.split(",")],
@@ -43,10 +43,10 @@ def _run(options: argparse.Namespace) -> None:
         repair=options.repair,
         settings=settings.scaled(options.population),
     )
-    failed = run_grid(options.folder, wanted, workers=processes(options.jobs), on_progress=print)
-    print(write_rows(options.folder, wanted))
+    failed = wanted.run(workers=options.jobs, on_progress=print)
+    print(write_rows(wanted))
     if failed:
-        raise SystemExit("\n".join(f"{end.key} failed: {end.error}" for end in failed))
+        raise SystemExit("\n".join(f"{end.name} failed: {end.error}" for end in failed))
 
 
 def _table(options: argparse.Namespace) -> None:

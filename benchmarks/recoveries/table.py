@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.experiments.confidence_intervals import proportion
-from selfmodel.recovery.baselines.registry import ORACLE
+from selfmodel.studies.rows import ORACLE
+from selfmodel.studies.statistics import proportion
 
 RESAMPLES = 2000
 
@@ -31,7 +31,7 @@ def table(rows: Sequence[dict[str, Any]], oracles: Sequence[dict[str, Any]]) -> 
 
     Args:
         rows: Rows of recoveries.
-        oracles: Rows of ``selfmodel baseline``, of which those of the oracle count, each with the
+        oracles: Rows of ``benchmarks.rivals``, of which those of the oracle count, each with the
             mean of its trials. The oracle of the healthy robot is that of case 9.
     """
     best = {_cell(row): mean(row["upright"]) for row in oracles if row["method"] == ORACLE}

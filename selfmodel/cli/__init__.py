@@ -24,17 +24,10 @@ COMMANDS = {
     "render": ("selfmodel.cli.render:render", "Draw a logged trial beside its simulation."),
     "view": ("selfmodel.cli.view:view", "Open a logged trial and its simulation in Rerun."),
     "report": ("selfmodel.cli.report:report", "Write a run, logs or a campaign as one HTML page."),
-    "ablate": ("selfmodel.cli.studies.ablate:ablate", "Compare comparators on the same trials."),
+    "ablate": ("selfmodel.cli.studies:ablate", "Compare comparators on the same trials."),
     "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
-    "paper": ("selfmodel.cli.studies.paper:paper", "Repeat the paper's experiment on its robots."),
-    "baseline": (
-        "selfmodel.cli.studies.baseline:baseline",
-        "Recover by other methods, and an oracle.",
-    ),
-    "compare": (
-        "selfmodel.cli.studies.compare:compare",
-        "Compare the methods of a study by pairs.",
-    ),
+    "paper": ("selfmodel.cli.studies:paper", "Repeat the paper's experiment on its robots."),
+    "compare": ("selfmodel.cli.compare:compare", "Compare the methods of a study by pairs."),
     "repertoire": ("selfmodel.cli.repertoire:app", "Make a repertoire of a robot's gaits."),
     "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
 }

@@ -35,7 +35,7 @@ from selfmodel.diagnosis.text import (
 )
 from selfmodel.files import file_digest
 from selfmodel.logs.results import LogsResult, as_json as values_of
-from selfmodel.recovery.repertoire.model_digest import self_model_digest
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.trials.trial import trial_names
 
 

@@ -1,4 +1,11 @@
 from .events import Event as Event
+from .map_elites import (
+    Evaluate as Evaluate,
+    Reevaluation as Reevaluation,
+    make_repertoire as make_repertoire,
+    reevaluate as reevaluate,
+    simulated_evaluation as simulated_evaluation,
+)
 from .next_trial import by_disagreement as by_disagreement
 from .recover import (
     Journal as Journal,
@@ -7,16 +14,7 @@ from .recover import (
     by_repair as by_repair,
 )
 from .repair import RepairSearch as RepairSearch
-from .repertoire.evaluation import (
-    Evaluate as Evaluate,
-    simulated_evaluation as simulated_evaluation,
-)
-from .repertoire.make import (
-    Reevaluation as Reevaluation,
-    make_repertoire as make_repertoire,
-    reevaluate as reevaluate,
-)
-from .repertoire.repertoire import Repertoire as Repertoire
+from .repertoire import Repertoire as Repertoire
 from .result import Database as Database, Recovery as Recovery
 from .scores import (
     DISPLACEMENT as DISPLACEMENT,

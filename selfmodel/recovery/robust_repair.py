@@ -22,7 +22,7 @@ from selfmodel.evolution import Draw, Generation, GenerationCallback
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.cma_es import SEED_DEVIATION, CmaEs
 from selfmodel.recovery.repair import CandidateController, mutants
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import UPRIGHT, Score, scores_of
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty, draw_conditions

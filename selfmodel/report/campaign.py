@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError
-from selfmodel.experiments.confidence_intervals import proportion
 from selfmodel.files import check_regular, encodable, read_file
 from selfmodel.logs.result_files import parse_json
 from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Report, Section, Table
+from selfmodel.studies.statistics import proportion
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 """Media types of figures; an SVG file is preferred to a PNG file of the same name."""

@@ -24,7 +24,7 @@ from selfmodel.logs.results import (
     converted,
     read_as,
 )
-from selfmodel.recovery.repertoire.model_digest import self_model_digest
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.parameters import Parameters, factor_names, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration

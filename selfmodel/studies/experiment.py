@@ -24,7 +24,7 @@ from selfmodel.plugins import NEXT_TRIAL, PAPER, repair
 from selfmodel.recovery.events import Event
 from selfmodel.recovery.random_streams import gap_stream
 from selfmodel.recovery.recover import RecoveryLoop
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.robot.parameters import with_model

@@ -32,7 +32,7 @@ def test_the_help_of_a_group_imports_nothing_heavy(words: list[str], tmp_path: P
     imported = done.stdout.splitlines()[-1].split()
 
     assert not set(HEAVY) & set(imported)
-    assert not any(module.startswith("selfmodel.experiments") for module in imported)
+    assert not any(module.startswith("selfmodel.studies") for module in imported)
 
 
 @pytest.mark.process

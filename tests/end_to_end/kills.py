@@ -3,7 +3,7 @@
     python -m tests.end_to_end.kills --count 140 --seed 0
 
 Studies (``ablate``, ``suite run``), which resume, have a harness of their own:
-``tests.experiments.kill_study``.
+``tests.studies.kill_study``.
 """
 
 import argparse

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from selfmodel.experiments.confidence_intervals import Interval
+from selfmodel.studies.statistics import Interval
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "examples" / "comparators.ipynb"
@@ -57,7 +57,12 @@ def test_the_notebook_redraws_every_figure_of_the_page(
 
     assert drawn == {f"{name}.{suffix}" for name in shown for suffix in ("png", "pdf", "svg")}
     made = ("at_each_gap_too", "by_trials", "by_gap_alone", "without_position")
-    known = {text for name in made for one in names[name] for text in both_ways(one.difference)}
+    known = {
+        text
+        for name in made
+        for row in names[name].itertuples()
+        for text in both_ways(Interval(row.difference, row.difference_low, row.difference_high))
+    }
     stated = re.findall(r"−?\d\.\d\d \(−?\d\.\d\d to −?\d\.\d\d(?=[),])", compared())  # noqa: RUF001
     assert len(stated) > 60
     assert set(stated) - known == set()

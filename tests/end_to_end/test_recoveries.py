@@ -1,6 +1,5 @@
 """The benchmark of recoveries: its rows are written, and its ratios are those of the rows."""
 
-import dataclasses
 import json
 from functools import partial
 from pathlib import Path
@@ -8,14 +7,12 @@ from typing import Any
 
 import pytest
 
-from benchmarks.recoveries.cells import cells, read_rows, write_rows
-from benchmarks.recoveries.recover import make_gait, recovered
+from benchmarks.recoveries.study import read_rows, recovered, study, write_rows
 from benchmarks.recoveries.table import table
 from selfmodel import load_robot, recover, simulated_robot
-from selfmodel.experiments.grid import Cell, processes, run_grid
-from selfmodel.experiments.grid.cell_file import CELL, cell_bytes
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.settings import Settings
+from selfmodel.studies.recoveries import evolve_gait
 
 FAULTS = ("intact", "break:front_left_knee")
 SMALL = Settings(steps=60, generations=1, trials=1).scaled(4)
@@ -54,39 +51,13 @@ def test_ratios_are_to_the_oracle_of_the_same_robot_and_the_gait_before_counts_o
     assert (first[10], second[10], both[10]) == ("0 of 1 |", "1 of 1 |", "1 of 2 |")
 
 
-def test_the_seeds_change_last():
-    wanted = cells(["quadruped", "hexapod"], [1], [0.0], [0, 1], repair="robust", settings=SMALL)
+def test_the_seeds_change_last(tmp_path: Path):
+    robots, options = ["quadruped", "hexapod"], {"repair": "robust", "settings": SMALL}
+    wanted = study(tmp_path, robots, [1], [0.0], [0, 1], **options)
 
-    assert [(cell.parameters["robot"], cell.seed) for cell in wanted] == [
+    assert [(point["robot"], point["seed"]) for point in wanted.points.values()] == [
         *(("quadruped", 0), ("hexapod", 0), ("quadruped", 1), ("hexapod", 1))
     ]
-
-
-def finish(study: Path, cell: Cell, result: dict[str, Any]) -> None:
-    """Writes a cell as finished."""
-    folder = study / cell.place
-    folder.mkdir(parents=True)
-    (folder / CELL).write_bytes(cell_bytes(folder, cell, result, 1.0, {}))
-
-
-def test_the_rows_of_finished_cells_are_written(tmp_path: Path):
-    wanted = cells(["quadruped"], [1, 2], [0.0], [0], repair="robust", settings=SMALL)
-    finish(tmp_path, wanted[0], row(1, 0, [1.0]))
-
-    assert read_rows(write_rows(tmp_path, wanted)) == [row(1, 0, [1.0])]
-
-
-def test_rows_of_another_repair_or_budget_in_the_folder_are_left_out(tmp_path: Path):
-    larger = dataclasses.replace(SMALL, generations=2)
-    studies = [
-        cells(["quadruped"], [1], [0.0], [0], repair=repair, settings=settings)
-        for repair, settings in (("robust", SMALL), ("paper", SMALL), ("robust", larger))
-    ]
-    for number, (cell,) in enumerate(studies):
-        finish(tmp_path, cell, row(1, 0, [float(number)]))
-
-    for number, wanted in enumerate(studies):
-        assert read_rows(write_rows(tmp_path, wanted)) == [row(1, 0, [float(number)])]
 
 
 def test_a_table_of_several_repairs_has_lines_of_each():
@@ -104,9 +75,10 @@ def test_a_table_of_several_repairs_has_lines_of_each():
 @pytest.mark.search
 @pytest.mark.parametrize("repair", ["robust", "paper"])
 def test_a_row_has_each_trial_with_its_prediction(repair: str, tmp_path: Path):
-    (cell,) = cells(["quadruped"], [1], [0.05], [3], repair=repair, settings=SMALL)
-    make_gait(cell.needs["gait"], {}, tmp_path)
-    found = recovered(cell, {"gait": tmp_path}, tmp_path)
+    options = {"repair": repair, "settings": SMALL}
+    (cell,) = study(tmp_path, ["quadruped"], [1], [0.05], [3], **options).cells()
+    evolve_gait(cell.needs["gait"].parameters, {}, tmp_path)
+    found = recovered(cell.parameters, {"gait": tmp_path}, tmp_path)
 
     assert len(found["upright"]) == len(found["predicted"]) == len(found["falls"]) == 3
     assert found["predicted"][1] is None
@@ -132,9 +104,10 @@ def test_a_row_has_each_trial_with_its_prediction(repair: str, tmp_path: Path):
 @pytest.mark.search
 def test_two_processes_share_a_gait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
-    wanted = cells(["quadruped"], [1, 2], [0.1], [0], repair="robust", settings=SMALL)
-    assert run_grid(tmp_path, wanted, workers=processes(2), on_progress=lambda _: None) == ()
-    rows = read_rows(write_rows(tmp_path, wanted))
+    options = {"repair": "robust", "settings": SMALL}
+    wanted = study(tmp_path, ["quadruped"], [1, 2], [0.1], [0], **options)
+    assert wanted.run(workers=2) == ()
+    rows = read_rows(write_rows(wanted))
 
     assert sorted(row["case"] for row in rows) == [1, 2]
     assert rows[0]["upright"][0] == rows[1]["upright"][0]

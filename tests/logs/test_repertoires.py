@@ -15,8 +15,7 @@ from selfmodel.logs.repertoires import (
     repertoire_bytes,
     save_repertoire,
 )
-from selfmodel.recovery.repertoire.model_digest import model_digest
-from selfmodel.recovery.repertoire.repertoire import Origin, Repertoire
+from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from tests.helpers.drivers import random_controllers

@@ -15,7 +15,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.recovery import robust_repair
 from selfmodel.recovery.cma_es import STARTS
 from selfmodel.recovery.repair import CandidateController
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.robust_repair import (
     COST,
     FIRST_COST,
@@ -35,7 +35,7 @@ from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable
-from tests.recovery.repertoire.test_repertoire import ORIGIN
+from tests.recovery.test_repertoire import ORIGIN
 
 NOISY_EA = partial(Evolution, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])

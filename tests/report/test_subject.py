@@ -16,7 +16,7 @@ from selfmodel.files import file_digest
 from selfmodel.logs.journal import OPTIONS
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.results import as_json
-from selfmodel.recovery.repertoire.model_digest import self_model_digest
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.report.recorded import DiagnosisFile
 from selfmodel.report.subject import Subject, is_run, subject_of_logs, subject_of_run
 

@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.experiments.suite.bodies import DOMAINS
 from selfmodel.robot.motion import opacity, stick_geoms, visible_geoms
+from selfmodel.studies.plans import DOMAINS
 from selfmodel.tasks import ROBOTS
 from tests.helpers.opengl import WORKS, draws
 from tests.robot.mjcf.samples import GYMNASIUM, SAMPLES

@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.scoring.judge import Judgement, judged, matters
 from benchmarks.foreign.world.gap import LEVELS
-from selfmodel.experiments.confidence_intervals import proportion
+from selfmodel.studies.statistics import proportion
 
 HEADINGS = (
     "recordings",

@@ -302,24 +302,22 @@ Threads = Annotated[
 ]
 Workers = Annotated[
     int,
-    typer.Option(
-        min=0, max=1024, metavar="N", help="Processes, or jobs of Slurm; 0 for one per processor."
-    ),
+    typer.Option(min=0, max=1024, metavar="N", help="Processes; 0 for one per processor."),
 ]
 ExecutorName = Annotated[
     str,
     typer.Option(
         "--executor",
-        metavar="NAME",
-        help="What computes the runs: processes of this machine, slurm, or dask://HOST:PORT.",
+        metavar="processes|dask",
+        help="What computes the runs: processes of this machine, or a Dask cluster.",
     ),
 ]
-ExecutorOptions = Annotated[
-    str,
+Scheduler = Annotated[
+    str | None,
     typer.Option(
-        "--executor-option",
-        metavar="A=B,C=D",
-        help="Options of the jobs of Slurm, such as partition=cpu,timeout=04:00:00.",
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask's scheduler, HOST:PORT; tls://HOST:PORT for a connection that is encrypted.",
         show_default="none",
     ),
 ]

@@ -3,8 +3,7 @@
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import contextmanager, nullcontext
 from time import monotonic
 
 import typer
@@ -17,18 +16,16 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from selfmodel.cli.arguments import inputs
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_notes
-from selfmodel.experiments.grid import (
-    Cell,
-    GridBegins,
-    PartEnds,
-    run_grid,
-)
-from selfmodel.experiments.grid.executors import PROCESSES, choose_workers
+from selfmodel.errors import InputError, unknown_name
 from selfmodel.simulation.threads import thread_count
+from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor
+from selfmodel.studies.study import Study
+
+PROCESSES, DASK = EXECUTORS = ("processes", "dask")
+"""What may compute the cells: processes of this machine, or the workers of a Dask cluster."""
 
 
 class Watch:
@@ -49,7 +46,7 @@ class Watch:
         self._progress = progress
         self._before, self._start = 0, monotonic()
 
-    def __call__(self, event: GridBegins | PartEnds) -> None:
+    def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         match event:
             case GridBegins():
@@ -59,7 +56,7 @@ class Watch:
                     self._progress.add_task("", total=event.total, completed=event.finished)
                 elif event.finished:
                     self._print_line(f"{event.finished} of {event.total} were done before")
-            case PartEnds():
+            case CellEnds():
                 self.done = event.number
                 seconds = monotonic() - self._start
                 speed = pace(event.number - self._before, event.total - event.number, seconds)
@@ -111,53 +108,57 @@ def grid_display() -> Iterator[Watch]:
         yield Watch(progress.console, progress)
 
 
-def _line(event: PartEnds) -> str:
+def _line(event: CellEnds) -> str:
     what = f"failed: {event.error}" if event.error else f"done in {event.seconds:.1f} s"
-    return f"[{event.number}/{event.total}] {event.key} {event.part}: {what}"
+    return f"[{event.number}/{event.total}] {event.name}: {what}"
 
 
 def run_shown(
-    cells: Sequence[Cell], out: Path, *, executor: str, options: str, workers: int
-) -> Sequence[PartEnds]:
+    study: Study, *, executor: str, scheduler: str | None, workers: int
+) -> Sequence[CellEnds]:
     """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.
 
     Args:
-        cells: The cells.
-        out: Folder of the study.
-        executor: Value of ``--executor``.
-        options: Value of ``--executor-option``.
-        workers: Value of ``--workers``.
+        study: The study.
+        executor: ``processes`` or ``dask``.
+        scheduler: Address of Dask's scheduler.
+        workers: Number of processes; 0 for one per processor.
 
     Raises:
-        InputError: The executor or an option is unknown, or the folder contains another study.
+        InputError: The executor is unknown, the scheduler is missing or does not answer, or the
+            folder contains another study.
     """
-    given = inputs.assignments("--executor-option", options)
-    # The workers of a cluster have another current folder.
-    folder = out if executor == PROCESSES else out.resolve()
-    with grid_display() as on_event:
+    if executor not in EXECUTORS:
+        raise unknown_name("executor", executor, EXECUTORS)
+    if (scheduler is None) == (executor == DASK):
+        raise InputError(
+            f"expected --scheduler ADDRESS with --executor {DASK}, and with no other: give both, "
+            f"such as --executor {DASK} --scheduler 192.0.2.1:8786"
+        )
+    opened = nullcontext() if scheduler is None else dask_executor(scheduler)
+    with opened as given, grid_display() as on_event:
         try:
-            opened = choose_workers(executor, given, thread_count(workers), folder)
-            return run_grid(folder, cells, workers=opened, on_progress=on_event)
+            return study.run(executor=given, workers=thread_count(workers), on_progress=on_event)
         except KeyboardInterrupt as interruption:
             interruption.add_note(
-                f"{on_event.done} of {on_event.total} are done and kept in {out}; the same command "
-                f"continues with the rest"
+                f"{on_event.done} of {on_event.total} are done and kept in {study.folder}; the "
+                f"same command continues with the rest"
             )
             raise
 
 
-def as_objects(failed: Sequence[PartEnds]) -> list[dict[str, str | None]]:
-    """Returns failed parts as JSON values."""
-    return [{"run": one.key, "part": one.part, "error": one.error} for one in failed]
+def as_objects(failed: Sequence[CellEnds]) -> list[dict[str, str | None]]:
+    """Returns failed cells as JSON values."""
+    return [{"run": one.name, "error": one.error} for one in failed]
 
 
-def end(failed: Sequence[PartEnds]) -> None:
-    """Ends the command with status 1 and a line if a part failed."""
+def end(failed: Sequence[CellEnds]) -> None:
+    """Ends the command with status 1 and a line if a cell failed."""
     if failed:
         print_notes(
-            f"{len(failed)} failed, the first of them {failed[0].key} {failed[0].part}: "
-            f"{failed[0].error}; the same command tries them again"
+            f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
+            f"same command tries them again"
         )
         raise typer.Exit(1)

@@ -13,7 +13,7 @@ from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, verdict_sentences
 from selfmodel.logs.results import RecoveryResult, ScoreResult, TrialResult
-from selfmodel.recovery.repertoire.model_digest import self_model_digest
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 from selfmodel.studies.experiment import Experiment, Outcome

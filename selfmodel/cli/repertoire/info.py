@@ -10,7 +10,7 @@ import typer
 from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.logs.repertoires import load_repertoire
-from selfmodel.recovery.repertoire.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire
 
 
 def info(

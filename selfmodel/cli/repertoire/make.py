@@ -24,8 +24,12 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.repertoires import save_repertoire
-from selfmodel.recovery.repertoire.evaluation import simulated_evaluation
-from selfmodel.recovery.repertoire.make import EVALUATIONS, Filling, make_repertoire
+from selfmodel.recovery.map_elites import (
+    EVALUATIONS,
+    Filling,
+    make_repertoire,
+    simulated_evaluation,
+)
 from selfmodel.simulation.simulator import Simulator
 
 NOTES = 10

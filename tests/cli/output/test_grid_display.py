@@ -3,7 +3,7 @@
 import pytest
 
 from selfmodel.cli.output.grid_display import grid_display, pace
-from selfmodel.experiments.grid import GridBegins, PartEnds
+from selfmodel.studies.grid import CellEnds, GridBegins
 
 
 @pytest.mark.parametrize(
@@ -27,8 +27,8 @@ def test_off_a_terminal_every_cell_is_a_line_with_rate_and_time_left(
 ):
     with grid_display() as on_event:
         on_event(GridBegins(total=3, finished=1))
-        on_event(PartEnds("run-1", "auto", 2, 3, 1.25, None))
-        on_event(PartEnds("run-2", "auto", 3, 3, 1.25, "it diverged"))
+        on_event(CellEnds("run-1 auto", 2, 3, 1.25, None))
+        on_event(CellEnds("run-2 auto", 3, 3, 1.25, "it diverged"))
     before, done, failed = capsys.readouterr().err.splitlines()
 
     assert before == "1 of 3 were done before"

@@ -10,8 +10,8 @@ from mcap.records import Attachment, Channel, McapRecord, Metadata
 from selfmodel.cli.output.grid_display import grid_display
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import folding, print_tables, show
-from selfmodel.experiments.grid import PartEnds
 from selfmodel.logs import records
+from selfmodel.studies.grid import CellEnds
 from tests.helpers.command import SMALL, Done, selfmodel
 from tests.logs.conftest import MJCF
 from tests.logs.edits import rewritten, says
@@ -166,7 +166,7 @@ def test_tables_and_progress_print_names_as_they_are(capsys: pytest.CaptureFixtu
     rows = [["[red]:smile:" + EVIL_NAME, EVIL]]
     show(("a", "b"), rows)
     print_tables(folding(("a", "b"), rows, title="t" + EVIL))
-    end = PartEnds(key=EVIL, part=EVIL, number=1, total=2, seconds=0.0, error=EVIL)
+    end = CellEnds(name=EVIL, number=1, total=2, seconds=0.0, error=EVIL)
     with grid_display() as on_event:
         on_event(end)
     told = capsys.readouterr()

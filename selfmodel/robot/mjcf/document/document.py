@@ -90,7 +90,7 @@ def parse_xml(data: bytes) -> ET.Element:
     _check_xml(data)
     try:
         return ET.fromstring(data)  # noqa: S314  # _check_xml refuses unsafe XML
-    except (ET.ParseError, ValueError, LookupError) as error:
+    except (ET.ParseError, ValueError) as error:
         raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
 
 
@@ -116,7 +116,7 @@ def _check_xml(data: bytes) -> None:
     parser.StartDoctypeDeclHandler = doctype
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, ValueError, LookupError) as error:  # an unknown encoding
+    except (expat.ExpatError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error

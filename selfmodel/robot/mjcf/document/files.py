@@ -99,7 +99,7 @@ class Folder:
         folders = [folder for folder in (self.root, self.assets) if folder is not None]
         try:
             return any(place.resolve().is_relative_to(folder.resolve()) for folder in folders)
-        except (OSError, ValueError, RuntimeError):  # a loop of links; a path with a zero byte
+        except (OSError, ValueError):  # a loop of links; a path with a zero byte
             return False
 
 

@@ -1,0 +1,1 @@
+"""Other methods of recovery on the same physical robots, and an oracle."""

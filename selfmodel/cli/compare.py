@@ -1,0 +1,157 @@
+"""``selfmodel compare``: paired comparisons of the methods of a study, as tables and figures."""
+
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import typer
+
+from selfmodel.cli.arguments.options import Json
+from selfmodel.cli.output.printing import print_json, print_lines, print_notes
+from selfmodel.cli.output.tables import show
+from selfmodel.errors import InputError
+from selfmodel.studies import figures
+from selfmodel.studies.comparisons import LEVEL
+from selfmodel.studies.rows import LoadedStudy, load, whole
+from selfmodel.studies.study import Row
+from selfmodel.studies.tables import (
+    FORMATS,
+    as_json as json_of,
+    check_format,
+    frame_table,
+    table_files,
+    write_files,
+)
+
+COMPARISON = "comparison"
+"""Folder of the files, in the folder of a study."""
+
+
+def compare(
+    study: Annotated[
+        Path,
+        typer.Argument(
+            metavar="STUDY",
+            help="Folder of ablate, paper or suite run; or its results.csv; or the results.jsonl "
+            "of other methods.",
+        ),
+    ],
+    *,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            *("--out", "-o"),
+            metavar="DIR",
+            help="Folder of the tables and figures.",
+            show_default=f"STUDY/{COMPARISON}",
+        ),
+    ] = None,
+    table: Annotated[
+        str,
+        typer.Option(
+            "--table", "--table-format", metavar="|".join(FORMATS), help="Format of the tables."
+        ),
+    ] = "csv",
+    as_json: Json = False,
+) -> None:
+    """Compare the methods of a study by pairs: tests, intervals, marginal means, figures.
+
+    Two methods are compared on the physical robots and trials that both had. The p values are
+    corrected for the number of pairs in a table by Holm's method. Nothing is run.
+    """
+    check_format(table)
+    if out is None and not study.is_dir():
+        raise InputError(f"{study} is no folder of a study: give the folder of the tables, -o DIR")
+    found = load(study)
+    pairs, means = found.comparisons(), found.marginal_means()
+    tables = [
+        frame_table("rows", found.rows),
+        frame_table("marginal-means", means, list(map(_mean_texts, _records(means))), texts=2),
+        frame_table("comparisons", pairs, list(map(_pair_texts, _records(pairs))), texts=3),
+    ]
+    content = table_files(tables, table) | figures.of_comparisons(pairs)
+    files = list(map(str, write_files(out or study / COMPARISON, content)))
+    if as_json:
+        shown = {"comparisons": pairs, "marginal_means": means}
+        facts = {"study": found.kind, "rows": len(found.rows), "warnings": list(found.warnings())}
+        print_json(
+            json_of(facts | {n: _records(one) for n, one in shown.items()} | {"files": files}),
+            indent=1,
+        )
+        return
+    _print_comparison(found, pairs, means)
+    print_lines(*files)
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Returns the rows of a frame of statistics; the names of a table as one text."""
+    return [{**row, "table": ", ".join(row["table"])} for row in json_of(frame.to_dict("records"))]
+
+
+def _print_comparison(study: LoadedStudy, pairs: pd.DataFrame, means: pd.DataFrame) -> None:
+    """Prints the tables that are over all conditions; the files have the others too."""
+    if not len(means):
+        print_lines(f"{study.path}: {len(study.rows)} rows of one method: nothing to compare")
+        return
+    print_notes(*(f"warning: {warning}" for warning in study.warnings()))
+    found = _records(pairs)
+    for name, own in groupby(_records(whole(means)), key=lambda row: row["table"]):
+        print_lines(f"{name}:")
+        texts = pd.DataFrame(map(_mean_texts, own)).drop(columns="table")
+        show(list(texts.columns), texts.to_numpy().tolist(), texts=1)
+        print_lines(*(_pair_line(one) for one in found if one["table"] == name))
+    print_lines(
+        "Means are over the cells that all methods have. Differences are on the n runs that both "
+        "methods have, with 95 % intervals over seeds. p: the larger of a test over runs (exact "
+        "McNemar, or sign flips) and one over seeds (Student's), corrected for the number of pairs "
+        "(Holm). Better: p below 0.05."
+    )
+
+
+def _pair_line(one: Row) -> str:
+    pair = f"{one['first']} or {one['second']}, not decided"
+    if one["better"]:
+        pair = f"{one['first']} better than {one['second']}"
+    return f"  {pair}: {_ends(one, 'difference')}, n {one['n']}, p {_p(one['p_holm'])}"
+
+
+def _mean_texts(one: Row) -> dict[str, str]:
+    counts = {name: str(one[name]) for name in ("n", "seeds", "cells")}
+    named = {"table": one["table"], "method": one["method"]}
+    return {**named, **counts, "mean (95 %)": _ends(one, "mean")}
+
+
+def _pair_texts(one: Row) -> dict[str, str]:
+    return {
+        **{name: one[name] for name in ("table", "first", "second")},
+        **{name: str(one[name]) for name in ("n", "seeds")},
+        "difference (95 %)": _ends(one, "difference"),
+        "only first": str(one["only_first"]),
+        "only second": str(one["only_second"]),
+        "p, runs": _p(one["p_runs"]),
+        "p, runs, Holm": _p(one["p_runs_holm"]),
+        "p, seeds": _p(one["p_seeds"]),
+        "p, Holm": _p(one["p_holm"]),
+        "better": one["better"] or "-",
+    }
+
+
+def _ends(one: Row, name: str) -> str:
+    """Returns an estimate with the ends of its interval as text: 0.257 (0.036 to 0.413)."""
+    low, high = one[f"{name}_low"], one[f"{name}_high"]
+    if low is None or high is None:
+        return f"{one[name]:.3f} (-)"
+    return f"{one[name]:.3f} ({low:.3f} to {high:.3f})"
+
+
+def _p(p: float) -> str:
+    """Returns a p value as text; very small ones as a bound.
+
+    It has two digits, or as many as are necessary to distinguish it from the level: 0.0496 is not
+    0.05.
+    """
+    if p < 0.0001:
+        return "< 0.0001"
+    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
+    return next(text for text in texts if (float(text) < LEVEL) == (p < LEVEL))

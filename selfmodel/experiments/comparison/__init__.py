@@ -1,1 +1,0 @@
-"""Comparison of the methods of a study: its rows as outcomes, tables, figures."""

@@ -1,1 +1,0 @@
-"""The paper's experiment on its two robots, beside what the paper reports."""

@@ -1,0 +1,135 @@
+"""Repertoires: many diverse gaits of one robot, with their origin; read without MuJoCo."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+from xml.etree import ElementTree as ET  # the model of a robot: MuJoCo has compiled it
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, IndexArray, frozen
+from selfmodel.controllers.controller import Controller, Design
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What determines a repertoire.
+
+    Attributes:
+        robot: Name of the robot.
+        model: Digest of the robot's model; see ``model_digest``.
+        steps: Control steps of a rollout.
+        evaluations: Number of gaits that were evaluated.
+        levels: Number of cells along each axis of the grid.
+        seed: Seed of all random numbers.
+        version: Version of selfmodel.
+    """
+
+    robot: str
+    model: str
+    steps: int
+    evaluations: int
+    levels: int
+    seed: int
+    version: str
+
+
+@dataclass(frozen=True, eq=False)
+class Repertoire:
+    """Gaits of one robot with diverse duty factors, sorted by score, best first.
+
+    Attributes:
+        design: Design of all controllers.
+        genomes: ``(gaits, weights)``.
+        scores: Score of each gait of the healthy robot in simulation, ``(gaits,)``.
+        descriptors: Duty factor of each foot, 0 to 1, ``(gaits, feet)``.
+        origin: What determines the repertoire.
+
+    Raises:
+        ValueError: There are no gaits, or the arrays have inconsistent shapes.
+    """
+
+    design: Design
+    genomes: FloatArray
+    scores: FloatArray
+    descriptors: FloatArray
+    origin: Origin
+
+    def __post_init__(self) -> None:
+        gaits = len(self.scores)
+        if (
+            not gaits
+            or self.scores.shape != (gaits,)
+            or self.genomes.shape != (gaits, self.design.weights)
+            or self.descriptors.ndim != 2
+            or len(self.descriptors) != gaits
+        ):
+            raise ValueError(
+                f"expected genomes (gaits, {self.design.weights}), scores (gaits,) and "
+                f"descriptors (gaits, feet) of at least one gait, got shapes "
+                f"{self.genomes.shape}, {self.scores.shape} and {self.descriptors.shape}"
+            )
+        order = np.argsort(-self.scores, kind="stable")
+        for name in ("genomes", "scores", "descriptors"):
+            object.__setattr__(self, name, frozen(getattr(self, name)[order]))
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    def controller(self, gait: int) -> Controller:
+        """Returns the controller of a gait."""
+        return Controller(self.design, self.genomes[gait])
+
+    def controllers(self, gaits: Sequence[int] | IndexArray) -> list[Controller]:
+        """Returns the controllers of some gaits, in their order."""
+        return [self.controller(int(gait)) for gait in gaits]
+
+
+class Modelled(Protocol):
+    """A robot with all that defines it; a ``Robot``."""
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        ...
+
+    @property
+    def mjcf(self) -> str:
+        """The model, as XML."""
+        ...
+
+    @property
+    def control_timestep(self) -> float:
+        """Control time step, s."""
+        ...
+
+    @property
+    def assets(self) -> Mapping[str, bytes]:
+        """Files that the model names."""
+        ...
+
+
+def model_digest(robot: Modelled) -> str:
+    """Returns the SHA-256 of all that defines a robot: MJCF, control time step, assets."""
+    return _digest(robot.mjcf, robot)
+
+
+def self_model_digest(robot: Modelled) -> str:
+    """Returns the SHA-256 of a robot that is the same for the model in its logs.
+
+    The MJCF of a log is serialised anew when it is read: this is the digest of its canonical form,
+    in which order of attributes, comments and space between elements do not matter.
+    """
+    return _digest(ET.canonicalize(robot.mjcf, strip_text=True), robot)
+
+
+def _digest(mjcf: str, robot: Modelled) -> str:
+    digest = hashlib.sha256()
+    parts = [mjcf.encode(), repr(robot.control_timestep).encode()]
+    for name, content in sorted(robot.assets.items()):
+        parts += [name.encode(), content]
+    for part in parts:
+        # Digests have a fixed length, so that names and contents cannot be confused.
+        digest.update(hashlib.sha256(part).digest())
+    return digest.hexdigest()

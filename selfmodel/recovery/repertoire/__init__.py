@@ -1,1 +1,0 @@
-"""Repertoires: many diverse gaits of one robot, one per cell of a grid of duty factors."""

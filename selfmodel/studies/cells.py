@@ -1,0 +1,305 @@
+"""Cells of a study: each a function, its parameters and the cells that it needs, in a folder.
+
+The folder of a cell, ``FOLDER/KIND/NAME-DIGEST``, is named by the digest of these and of the code
+that computes it. It is filled under a new random name and renamed when it is complete, so a cell is
+finished if its ``cell.json`` stands there, and nothing else has to be kept.
+"""
+
+import errno
+import hashlib
+import importlib.util
+import json
+import os
+import re
+import secrets
+import shutil
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from selfmodel.errors import InputError, WorkError
+from selfmodel.files import read_file, sync_folder
+from selfmodel.logs.errors import is_full
+from selfmodel.logs.files import make_folder, not_written, replace_file
+
+CELL, UNFINISHED, ERRORS = "cell.json", "unfinished", "errors"
+"""File of a finished cell; folders of the cells that are being computed, and of the failures."""
+
+MAX_BYTES = 2**26
+"""Largest ``cell.json`` that is read, bytes."""
+
+REMEDY = "delete its folder, and the same command computes its cell again"
+
+Work = Callable[[Mapping[str, Any], Mapping[str, Path], Path], Any]
+"""Function of a cell: from its parameters, the folders of the cells that it needs, and a new folder
+for files of its own, it returns the result as JSON."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """One computation.
+
+    Attributes:
+        function: The ``Work`` that computes the cell, as ``package.module:function``.
+        name: Name for readers: letters, digits, ``.``, ``_``, ``-``, ``=``, ``%``.
+        parameters: All inputs of the function, as JSON, the seed of its random numbers included.
+        needs: Cells whose files the function reads, each by a name of its own.
+        kind: Folder of the study for cells of this kind.
+    """
+
+    function: str
+    name: str
+    parameters: Mapping[str, Any]
+    needs: Mapping[str, "Cell"] = field(default_factory=dict)
+    kind: str = "runs"
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"\w[\w.=%-]*", self.name, re.ASCII):
+            raise ValueError(f"expected a name that is a valid folder name, got {self.name!r}")
+
+    @cached_property
+    def definition(self) -> Mapping[str, Any]:
+        """Everything that determines the result but the code, as JSON."""
+        needs = {name: cell.place for name, cell in self.needs.items()}
+        given = {"function": self.function, "name": self.name, "parameters": self.parameters}
+        return dict(json.loads(json.dumps({**given, "needs": needs}, allow_nan=False)))
+
+    @cached_property
+    def place(self) -> str:
+        """Folder of the cell, relative to that of the study."""
+        return f"{self.kind}/{_folder_name(self.definition, made_with(self.function))}"
+
+
+@dataclass(frozen=True)
+class FinishedCell:
+    """A finished cell with its result.
+
+    Attributes:
+        name: Name for readers.
+        parameters: Inputs.
+        result: The result, as JSON.
+        path: ``cell.json``, beside the other files of the cell.
+        made_with: Versions, and the digest of the code, that computed the cell.
+        files: Names of the other files, relative to the folder.
+    """
+
+    name: str
+    parameters: Mapping[str, Any]
+    result: Any
+    path: Path = field(compare=False)
+    made_with: Mapping[str, str] = field(compare=False)
+    files: Sequence[str] = field(compare=False)
+
+    @property
+    def has_files(self) -> bool:
+        """Whether all files are in the folder: a user may delete logs."""
+        return all((self.path.parent / name).exists() for name in self.files)
+
+
+def finished(folder: Path) -> Iterator[FinishedCell]:
+    """Yields every finished cell in a folder of cells, in the order of the names.
+
+    Raises:
+        InputError: A cell is damaged, or cells were made by different code.
+    """
+    first: FinishedCell | None = None
+    for path in sorted(folder.glob(f"*/{CELL}")):
+        cell = read_cell(path)
+        first = first or cell
+        if cell.made_with != first.made_with:
+            raise InputError(
+                f"{path.parent} was made with {listed(cell.made_with)}, {first.path.parent} with "
+                f"{listed(first.made_with)}: a table is of one version of each; move the cells of "
+                f"other versions into a folder of their own"
+            )
+        yield cell
+
+
+def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, str | None]:
+    """Computes a cell in a worker, unless it is finished meanwhile.
+
+    Args:
+        folder: Folder of the study.
+        cell: The cell.
+        made: The versions and the digest of the code of the command.
+
+    Returns:
+        Wall time, s, and the reason of a failure.
+
+    Raises:
+        InputError: The worker has other code than the command.
+        OSError: The disk is full or not writable.
+    """
+    own = dict(made_with(cell.function))
+    if own != made:
+        raise InputError(
+            f"the worker on {os.uname().nodename} has {listed(own)}, the command has "
+            f"{listed(made)}: a study is of one version of each; install the same there"
+        )
+    begin = time.perf_counter()
+    place = folder / f"{cell.kind}/{_folder_name(cell.definition, made)}"
+    if _is_complete(place):
+        return 0.0, None
+    make_folder(folder / UNFINISHED / cell.kind)
+    # A new name that nobody has: no link is followed, and no file is replaced.
+    own_folder = folder / UNFINISHED / cell.kind / f"{place.name}.{secrets.token_hex(8)}"
+    own_folder.mkdir()
+    try:
+        error = _perform(folder, cell, own_folder, begin, made)
+        if error is None:
+            _publish(own_folder, place)
+            (folder / ERRORS / f"{place.name}.txt").unlink(missing_ok=True)  # of an earlier failure
+        return time.perf_counter() - begin, error
+    except OSError as cause:
+        if _is_complete(place):  # another worker was first
+            return 0.0, None
+        raise OSError(str(cause)) from None  # errors with arguments of their own cannot be sent
+    finally:
+        shutil.rmtree(own_folder, ignore_errors=True)
+
+
+def _perform(
+    folder: Path, cell: Cell, own: Path, begin: float, made: Mapping[str, str]
+) -> str | None:
+    """Calls the function of a cell, and writes its ``cell.json`` or the reason of its failure."""
+    module, _, name = cell.function.partition(":")
+    try:
+        needs = {key: folder / need.place for key, need in cell.needs.items()}
+        with warnings.catch_warnings():
+            # A result contains whether a simulation diverged; raw text does not name the cell.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            work: Work = getattr(importlib.import_module(module), name)
+            result = work(cell.parameters, needs, own)
+        paths = sorted(path for path in own.rglob("*") if path.is_file())
+        content = {
+            "cell": cell.definition,
+            "result": result,
+            "files": [path.relative_to(own).as_posix() for path in paths],
+            "seconds": time.perf_counter() - begin,
+            "made_with": dict(made),
+        }
+        text = json.dumps({**content, "sha256": _digest(content)}, indent=1, allow_nan=False)
+    except OSError as cause:
+        if is_full(cause):
+            raise not_written(cause.filename or own, cause) from cause
+        reason = text = str(cause) or type(cause).__name__
+    except (InputError, WorkError, MemoryError) as cause:
+        reason = text = str(cause) or type(cause).__name__
+    except Exception as cause:  # noqa: BLE001  # a plug-in may raise any exception
+        line = " ".join(traceback.format_exception_only(cause)[-1].split())
+        text = "".join(traceback.format_exception(cause))
+        reason = f"an unexpected error, {line[:300]}"
+    else:
+        replace_file(own / CELL, f"{text}\n".encode())
+        return None
+    place = f"{cell.kind}/{_folder_name(cell.definition, made)}"
+    kept = keep_error(folder, place, text)
+    return kept if reason == text else f"{reason}; its traceback is in {folder / ERRORS}"
+
+
+def keep_error(folder: Path, place: str, text: str) -> str:
+    """Writes the error of a cell, and returns it."""
+    make_folder(folder / ERRORS)
+    path = folder / ERRORS / f"{Path(place).name}.txt"
+    replace_file(path, f"{text}\n".encode(errors="replace"))
+    return text
+
+
+def _publish(unfinished: Path, place: Path) -> None:
+    """Moves the folder of a cell to its place; of two workers, the first one keeps it."""
+    make_folder(place.parent)
+    sync_folder(unfinished)
+    try:
+        unfinished.rename(place)
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            raise not_written(place, error) from error
+        if _is_complete(place):
+            return
+        # A cell without its result, or without files that are needed again.
+        place.rename(unfinished.with_name(f"{unfinished.name}.old"))
+        unfinished.rename(place)
+        shutil.rmtree(unfinished.with_name(f"{unfinished.name}.old"), ignore_errors=True)
+    sync_folder(place.parent)
+
+
+def _is_complete(place: Path) -> bool:
+    return (place / CELL).exists() and read_cell(place / CELL).has_files
+
+
+def read_cell(path: Path) -> FinishedCell:
+    """Returns a finished cell, verified.
+
+    Raises:
+        InputError: The file is damaged, altered, or of another cell.
+    """
+    data = read_file(path, "a cell of a study", MAX_BYTES)
+    try:
+        content = json.loads(data)
+        digest = content.pop("sha256")
+        cell, made = content["cell"], content["made_with"]
+        found = FinishedCell(
+            cell["name"], cell["parameters"], content["result"], path, made, content["files"]
+        )
+        damaged = digest != _digest(content)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path}: expected a cell of a study, got {error!r}; {REMEDY}") from error
+    if damaged:
+        raise InputError(f"{path} was altered or damaged: {REMEDY}")
+    if path.parent.name != _folder_name(cell, made):
+        raise InputError(
+            f"{path}: expected the cell of its folder, got that of {_folder_name(cell, made)}; "
+            f"{REMEDY}, or restore the folder's name"
+        )
+    return found
+
+
+@cache
+def made_with(function: str) -> Mapping[str, str]:
+    """Returns what determines the bits of a cell besides its definition.
+
+    Args:
+        function: Function of the cell, as ``package.module:function``.
+
+    Returns:
+        The versions of selfmodel, MuJoCo and numpy, and the digest of the code: of all modules and
+        models of selfmodel, and of the function's module.
+    """
+    found = {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
+    digest = hashlib.sha256(_own_code())
+    module = importlib.util.find_spec(function.partition(":")[0])
+    if module is not None and module.origin and not module.name.startswith("selfmodel."):
+        digest.update(hashlib.sha256(Path(module.origin).read_bytes()).digest())
+    return {**found, "code": digest.hexdigest()[:16]}
+
+
+@cache
+def _own_code() -> bytes:
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for folder, _, names in sorted(os.walk(root, followlinks=True)):
+        for name in sorted(name for name in names if name.endswith((".py", ".xml"))):
+            path = Path(folder, name)
+            for part in (path.relative_to(root).as_posix().encode(), path.read_bytes()):
+                digest.update(hashlib.sha256(part).digest())
+    return digest.digest()
+
+
+def _folder_name(definition: Mapping[str, Any], made: Mapping[str, str]) -> str:
+    return f"{definition['name'][:150]}-{_digest([definition, dict(made)])[:16]}"
+
+
+def _digest(values: Any) -> str:  # noqa: ANN401  # JSON
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def listed(made: Mapping[str, str]) -> str:
+    """Returns versions and the digest of the code as text."""
+    return ", ".join(f"{name} {one}" for name, one in made.items())[:300]

@@ -1,0 +1,269 @@
+"""Paired comparisons of the methods of a study, and their marginal means, by frames of outcomes.
+
+An outcome is the value that one method reached in one run. Outcomes with the same ``table``,
+``cell`` and ``seed`` are of the same physical robot and the same trials, so methods are compared by
+pairs.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.errors import InputError
+from selfmodel.studies.statistics import (
+    NORMAL,
+    TAIL,
+    UNKNOWN,
+    Interval,
+    exact_mcnemar,
+    holm,
+    paired_interval,
+    paired_proportion_interval,
+    seed_test,
+    sign_flip_test,
+)
+
+OUTCOME = ("table", "method", "cell", "seed", "value", "measure")
+"""Columns of a frame of outcomes.
+
+``table``: names of what is compared apart from other outcomes, such as robot and number of trials,
+a tuple; methods are compared, and their number is corrected for, within one table. ``method``: name
+of the method. ``cell``: names of the fixed conditions of the run, a tuple: gap and failure.
+``seed``: seed of the run; runs of one seed share gaits and parameters of the physical robot.
+``value``: 1 or 0 for right or wrong, or a finite number in the unit of the table. ``measure``:
+``share`` for right and wrong, ``number`` for other values; one in a table.
+"""
+
+LEVEL = 0.05
+"""Largest probability of any false "better" in a table."""
+
+
+def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
+    """Returns the paired comparisons of all methods of each table, a row each.
+
+    Two methods differ if a test over runs and a test over seeds both reject equality: the first is
+    wrong where runs of one seed depend on each other, the second where the means of few runs are
+    equal by chance. The larger p is corrected for the number of pairs of its table by Holm's
+    method; several tables are not corrected for each other.
+
+    Args:
+        outcomes: Outcomes of all methods, with the columns ``OUTCOME``.
+        seed: Seed of the bootstrap and of the sign flips, the same for each pair.
+
+    Returns:
+        ``table``; ``first``, the method with the larger mean, and ``second``; ``n``, the number of
+        runs that both have, and ``seeds``; ``first_mean``, ``second_mean``; ``difference``, its
+        mean over these runs, with the ends of its interval over seeds, ``difference_low`` and
+        ``difference_high``; ``only_first`` and ``only_second``, the numbers of runs in which one is
+        larger; ``p_runs``, of the exact McNemar test for a share, of the sign-flip test for
+        numbers, and ``p_runs_holm``; ``p_seeds``, of Student's paired test over the means of the
+        seeds; ``p_holm``, the larger of both, corrected; ``better``, the first method if that is
+        below ``LEVEL``, else None.
+
+    Raises:
+        InputError: A value is not finite, or no 0 or 1 in a share; a method has two outcomes of one
+            run; or a table has two measures.
+    """
+    found: list[dict[str, Any]] = []
+    for table, measure, runs in _tables(outcomes):
+        seeds = runs.index.get_level_values("seed").to_numpy()
+        values = {method: runs[method].to_numpy(dtype=float) for method in runs}
+        pairs = [
+            {"table": table, **_compared((one, other), values, seeds, measure, seed)}
+            for one, other in itertools.combinations(values, 2)
+            if np.isfinite(values[one] + values[other]).any()
+        ]
+        over_runs = holm([one["p_runs"] for one in pairs])
+        over_both = holm([max(one["p_runs"], one["p_seeds"]) for one in pairs])
+        for one, p_runs, p in zip(pairs, over_runs, over_both, strict=True):
+            one |= {"p_runs_holm": p_runs, "p_seeds": one.pop("p_seeds"), "p_holm": p}
+            one["better"] = one["first"] if p < LEVEL else None
+        found += pairs
+    frame = pd.DataFrame(found)
+    if found:  # pandas' texts have no None
+        frame["better"] = pd.Series([one["better"] for one in found], dtype=object)
+    return frame
+
+
+def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
+    """Returns the mean of each method over the cells that all methods of its table have.
+
+    The cells have equal weights. Of shares, the interval contains Wilson's, for the effective
+    number of independent runs. All intervals contain Student's over the means of the seeds, unless
+    a seed lacks a cell.
+
+    Assumptions: the cells are fixed and equally important; a cell mean does not depend on which
+    seeds a method has. Paired differences need neither, and are preferable.
+
+    Source: S. R. Searle, F. M. Speed and G. A. Milliken, *Population Marginal Means in the Linear
+    Model*, The American Statistician 34 (1980).
+
+    Args:
+        outcomes: Outcomes of all methods, with the columns ``OUTCOME``.
+
+    Returns:
+        ``table``, ``method``; ``n``, the number of its runs in these cells, ``seeds``, ``cells``;
+        ``left_out``, the number of its runs in other cells; ``mean``, ``mean_low``, ``mean_high``.
+
+    Raises:
+        InputError: As for ``compare``.
+    """
+    found = []
+    for table, measure, runs in _tables(outcomes):
+        cells = runs.notna().groupby(level="cell").any().all(axis=1)
+        common = runs[runs.index.get_level_values("cell").map(cells)]
+        for method in runs.columns:
+            values = common[method].unstack("cell").dropna(how="all").to_numpy(dtype=float)  # noqa: PD010  # a pivot of one column
+            mean = _marginal(values, measure) if values.size else UNKNOWN
+            found.append(
+                {
+                    "table": table,
+                    "method": method,
+                    "n": int(np.isfinite(values).sum()),
+                    "seeds": len(values),
+                    "cells": int(cells.sum()),
+                    "left_out": int(runs[method].notna().sum() - common[method].notna().sum()),
+                    **ends("mean", mean),
+                }
+            )
+    return pd.DataFrame(found)
+
+
+def balance_warnings(outcomes: pd.DataFrame) -> tuple[str, ...]:
+    """Returns a sentence for the tables whose methods have different runs, or uneven cells."""
+    tables: dict[str, list[str]] = {}
+    for table, _, runs in _tables(outcomes):
+        known = runs.notna()
+        per_cell = known.groupby(level="cell").sum()
+        if known.all(axis=None) and (per_cell.min() == per_cell.max()).all():
+            continue
+        counts = [
+            f"{method} {known[method].sum()}"
+            + ("" if low == high else f" ({low} to {high} per cell)")
+            for method, low, high in zip(known, per_cell.min(), per_cell.max(), strict=True)
+        ]
+        if not known.all(axis=None) and known.sum().min() == known.sum().max():
+            counts.append("not the same runs")
+        tables.setdefault(", ".join(counts), []).append(", ".join(table))
+    return tuple(
+        f"{'; '.join(names)}: the cells are unbalanced (runs: {counts}): compare paired "
+        f"differences, not means of all runs; marginal means balance the cells, and not the seeds"
+        for counts, names in tables.items()
+    )
+
+
+def ends(name: str, interval: Interval) -> dict[str, float]:
+    """Returns an interval as the columns of a table: ``NAME``, ``NAME_low``, ``NAME_high``."""
+    return {name: interval.estimate, f"{name}_low": interval.low, f"{name}_high": interval.high}
+
+
+def _tables(outcomes: pd.DataFrame) -> list[tuple[tuple[str, ...], str, pd.DataFrame]]:
+    """Returns names, measure and values of each table, in the order of the first outcomes.
+
+    The values have a row per run, by cell and seed, and a column per method; NaN for none.
+    """
+    found = []
+    for table in dict.fromkeys(outcomes["table"] if len(outcomes) else ()):
+        own = outcomes[[one == table for one in outcomes["table"]]]
+        named = ", ".join(table)
+        measures = own["measure"].unique()
+        if len(measures) > 1:
+            raise InputError(
+                f"expected one measure in the table {named}, got {' and '.join(measures)}: name "
+                f"two tables"
+            )
+        share = measures[0] == "share"
+        allowed = own["value"].isin([0, 1]) if share else np.isfinite(own["value"])
+        twice = own.duplicated(["method", "cell", "seed"])
+        expected = "1 or 0, for right or wrong," if share else "a finite value"
+        for wrong, what in ((~allowed, expected), (twice, "one outcome")):
+            if wrong.any():
+                row = own[wrong].iloc[0]
+                run = ", ".join((*table, *map(str.strip, row["cell"]), f"seed {row['seed']}"))
+                got = "two" if wrong is twice else row["value"]
+                raise InputError(
+                    f"expected {what} of {row['method']} in {run}, got {got}: compare the rows of "
+                    f"one study, each once, without runs that have no value"
+                )
+        runs = own.pivot(index=["cell", "seed"], columns="method", values="value")  # noqa: PD010  # not to be aggregated
+        found.append((table, str(measures[0]), runs))
+    return found
+
+
+def _compared(
+    pair: tuple[str, str],
+    values: Mapping[str, FloatArray],
+    seeds: IndexArray,
+    measure: str,
+    seed: int,
+) -> dict[str, Any]:
+    """Returns the comparison of two methods on the runs that both have, not corrected.
+
+    Args:
+        pair: Names of the methods.
+        values: Value of each run by method, ``(runs,)``; NaN for none.
+        seeds: Seed of each run.
+        measure: ``share`` or ``number``.
+        seed: Seed of all random numbers.
+    """
+    common = np.isfinite(values[pair[0]] + values[pair[1]])
+    own = {name: values[name][common] for name in pair}
+    means = {name: float(np.mean(of_method)) for name, of_method in own.items()}
+    first, second = sorted(own, key=lambda name: -means[name])  # stable: by name if equal
+    differences, drawn = (own[first] - own[second]).tolist(), seeds[common].tolist()
+    rng = np.random.default_rng(seed)
+    if measure == "share":
+        difference = paired_proportion_interval(differences, drawn, rng)
+        p = exact_mcnemar([one > 0 for one in differences], [one < 0 for one in differences])
+    else:
+        difference = paired_interval(differences, drawn, rng)
+        p = sign_flip_test(differences, rng)
+    return {
+        "first": first,
+        "second": second,
+        "n": len(drawn),
+        "seeds": len(set(drawn)),
+        "first_mean": means[first],
+        "second_mean": means[second],
+        **ends("difference", difference),
+        "only_first": sum(one > 0 for one in differences),
+        "only_second": sum(one < 0 for one in differences),
+        "p_runs": p,
+        "p_seeds": seed_test(differences, drawn),
+    }
+
+
+def _marginal(values: FloatArray, measure: str) -> Interval:
+    """Returns the mean of cell means with its interval.
+
+    Args:
+        values: ``(seeds, cells)``; NaN for a run that is missing. If there is one, or a single
+            seed, the interval over seeds is NaN.
+        measure: ``share`` or ``number``.
+    """
+    mean = float(np.nanmean(values, axis=0).mean())
+    low = high = math.nan
+    if len(values) >= 2 and not np.isnan(values).any():
+        deviation = float(values.mean(axis=1).std(ddof=1))
+        half = float(stats.t.ppf(TAIL, len(values) - 1)) * deviation / math.sqrt(len(values))
+        low, high = mean - half, mean + half
+    if measure == "share":
+        # The variance of a mean of cell means is that of this many runs in one cell.
+        runs = values.shape[1] ** 2 / float((1 / np.isfinite(values).sum(axis=0)).sum())
+        least, most = _wilson(mean, runs)
+        low, high = max(0.0, float(np.fmin(least, low))), min(1.0, float(np.fmax(most, high)))
+    return Interval(mean, low, high)
+
+
+def _wilson(share: float, runs: float) -> tuple[float, float]:
+    """Returns the ends of Wilson's score interval; the number of runs may be a fraction."""
+    middle = (share + NORMAL**2 / (2 * runs)) / (1 + NORMAL**2 / runs)
+    root = math.sqrt(share * (1 - share) / runs + (NORMAL / (2 * runs)) ** 2)
+    half = NORMAL * root / (1 + NORMAL**2 / runs)
+    return middle - half, middle + half

@@ -1,0 +1,484 @@
+"""The studies of this package: an ablation of comparators, recoveries of many bodies, the paper."""
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+from urllib.parse import quote
+
+from selfmodel import plugins
+from selfmodel.arguments import AUTO, comparator_choice, is_model, robot_entry
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, notation_kinds
+from selfmodel.faults.sensors import silent_neurons
+from selfmodel.settings import Settings
+from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
+from selfmodel.studies import recoveries
+from selfmodel.studies.cells import Cell
+from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, robot_key
+from selfmodel.studies.scores import check_score
+from selfmodel.studies.study import Point, Study
+from selfmodel.tasks import ROBOTS, suite_bodies
+
+BANK = "bank"
+NEXT_TRIAL = (BANK, *plugins.NEXT_TRIAL)
+"""Choices of the controllers of an ablation's trials: gaits from the bank, the same for every
+comparator; or, after the first trial, as in a recovery, by the diagnosis so far."""
+
+GAITS = 6
+"""Number of gaits per robot in the bank."""
+
+DEFAULT_KIND_NAMES, PAPER_KIND_NAMES = (
+    ",".join(kind.name for kind in kinds) for kinds in (DEFAULT_KINDS, PAPER_KINDS)
+)
+
+TABLE_ONE: Mapping[int, str] = MappingProxyType(
+    {
+        1: "a lower leg breaks off",
+        2: "a whole leg breaks off",
+        3: "a touch sensor fails",
+        4: "2, and the touch sensor of another leg fails",
+        5: "an angle sensor fails",
+        6: "an upper-leg joint jams",
+        7: "2, and the upper-leg joint of another leg jams",
+        8: "7, and the angle sensor of a further leg fails",
+        9: "nothing fails",
+        10: "a hidden neuron fails",
+    }
+)
+"""Failures by their number in the paper's Table I."""
+
+DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {name: tuple(entry.suite) for name, entry in ROBOTS.items()}
+    | {f"{suite_bodies.PREFIX}{name}": tasks for name, tasks in suite_bodies.DOMAINS.items()}
+)
+"""Tasks of every domain, the default task first."""
+
+PAPER_COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
+"""Comparators of the paper's experiment by default: the paper's, then selfmodel's."""
+
+Share = tuple[int, int]
+"""``(i, n)``: share i of n of the runs, from 1, for n machines with a folder each."""
+
+ALL: Share = (1, 1)
+
+
+def ablation(
+    folder: Path,
+    *,
+    robots: Sequence[str],
+    cases: Sequence[int] | None,
+    comparators: Sequence[str],
+    gaps: Sequence[float],
+    seeds: Sequence[int],
+    settings: Settings = Settings(),  # noqa: B008  # frozen
+    damages: Sequence[str] = (),
+    kinds: str = DEFAULT_KIND_NAMES,
+    next_trial: str = BANK,
+    bank: Path | None = None,
+    score: str | None = None,
+    repair: str = plugins.PAPER,
+    search: str | None = None,
+    only: Share = ALL,
+) -> Study:
+    """Returns a study in which every comparator diagnoses the same trials.
+
+    The diagnoses of a run need its trials, which need its gaits. With other choices of the next
+    trial than the bank, a recovery needs the first gait alone.
+
+    Args:
+        folder: Folder of the study.
+        robots: Names of robots, or paths of MJCF or URDF files.
+        cases: Numbers of failures of Table I; None for all that apply to each robot.
+        comparators: Names of comparators, or ``package.module:object``.
+        gaps: Levels of the reality gap.
+        seeds: Seeds, one run each.
+        settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
+        damages: Further failures, in notation.
+        kinds: Fault kinds to search, as in ``--kinds``.
+        next_trial: One of ``NEXT_TRIAL``.
+        bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
+        score: Name of the fitness of the repair; None for that of the repair.
+        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
+        search: Name of its search; None for that of the repair.
+        only: Share of the runs.
+
+    Raises:
+        InputError: The definition is invalid, or the bank lacks a gait.
+    """
+    chosen = _checked_repair(repair, search, score)
+    lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
+    _check_ablation(lists, cases, damages, settings.trials, next_trial)
+    if bank is not None and next_trial == BANK and repair != plugins.PAPER:
+        raise InputError(
+            f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
+            f"--repair {repair}: leave one of them out, or give --next-trial repair"
+        )
+    failures = {robot: _failures(robot, cases, damages, kinds) for robot in robots}
+    for robot in robots:
+        check_score(chosen["score"], robot_entry(robot))
+    runs: list[dict[str, Any]] = [
+        {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed}
+        for seed, robot in itertools.product(seeds, robots)
+        for case, truth in failures[robot]
+        for gap in gaps
+    ][only[0] - 1 :: only[1]]
+    models = {robot: recoveries.planned(robot) for robot in {run["robot"] for run in runs}}
+    count = max(HEALTHY_TRIALS, settings.trials) if next_trial == BANK else 1
+    wanted = {(run["robot"], k) for run in runs for k in _gait_numbers(run["seed"], count)}
+    gaits = {
+        (robot, number): recoveries.gait_cell(models[robot], settings, number, chosen)
+        if bank is None
+        else recoveries.given_gait_cell(bank, models[robot], number)
+        for robot, number in sorted(wanted)
+    }
+    if next_trial != BANK:  # the trials of a recovery exclude the failing one
+        settings = dataclasses.replace(settings, trials=settings.trials - 1)
+    evolves = bank is None or next_trial != BANK
+    shared = {
+        **_shared(settings, kinds, chosen, next_trial=next_trial),
+        "evolves": evolves,
+    }
+
+    def needs(point: Point) -> dict[str, Cell]:
+        own = [gaits[point["robot"], number] for number in _gait_numbers(point["seed"], count)]
+        if next_trial != BANK:
+            return {"gait": own[0]}
+        named = {f"gait-{number}": gait for number, gait in enumerate(own)}
+        run = {name: value for name, value in point.items() if name != "comparator"}
+        parameters = {**run, "shared": shared}
+        function = f"{recoveries.__name__}:run_trials"
+        return {"trials": Cell(function, _run_name(run), parameters, named, "trials")}
+
+    points = {
+        f"{_run_name(run)}-{_plain(comparator)}": {
+            **models[run["robot"]],
+            **run,
+            "comparator": comparator,
+        }
+        for run in runs
+        for comparator in comparators
+    }
+    function = "diagnose" if next_trial == BANK else "recover"
+    return Study("ablate", folder, f"{recoveries.__name__}:{function}", points, shared, needs)
+
+
+def suite(
+    folder: Path,
+    *,
+    bodies: Sequence[str],
+    cases: Sequence[int],
+    seeds: Sequence[int],
+    settings: Settings,
+    comparator: str,
+    controller: str = "network",
+    neurons: int | None = None,
+    kinds: str = PAPER_KIND_NAMES,
+    gap: float = 0.0,
+    score: str | None = None,
+    repair: str = plugins.PAPER,
+    search: str | None = None,
+    only: Share = ALL,
+) -> Study:
+    """Returns a study of recoveries of many bodies.
+
+    Args:
+        folder: Folder of the study.
+        bodies: Names of robots, and paths of MJCF or URDF files.
+        cases: Numbers of failures like those of Table I; a case that does not apply to a body or
+            to its controllers is omitted.
+        seeds: Seeds, one run each.
+        settings: Parameters of the recoveries.
+        comparator: Name of the comparator, ``package.module:object``, or ``auto``.
+        controller: Name of the controller design.
+        neurons: Number of hidden neurons; None for the design's default.
+        kinds: Fault kinds to search, as in ``--kinds``.
+        gap: Level of the reality gap.
+        score: Fitness of the repair, also reported per trial; None for that of the repair.
+        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
+        search: Name of its search; None for that of the repair.
+        only: Share of the bodies with their seeds.
+
+    Raises:
+        InputError: The definition is invalid.
+    """
+    comparator_choice(comparator)
+    plugins.kinds(kinds)
+    chosen = _checked_repair(repair, search, score)
+    _check_keys(bodies)
+    entries = {body: robot_entry(body) for body in bodies}
+    hidden = {}
+    for body, entry in entries.items():
+        hidden[body] = plugins.design(controller, entry.robot(), neurons).hidden
+        check_score(chosen["score"], entry)
+    _check_gaps([gap])
+    known = known_cases(bodies)
+    for case in cases:
+        if case not in known:
+            raise unknown_name("case of these bodies", str(case), map(str, known))
+    points, gaits = {}, {}
+    for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
+        model = recoveries.planned(body)
+        gaits[body, seed] = recoveries.gait_cell(
+            model, settings, seed, chosen, controller=controller, neurons=neurons
+        )
+        for case in cases:
+            truth = entries[body].cases.get(case)
+            anatomy = entries[body].robot().anatomy
+            # Controllers without hidden neurons have none that could fail.
+            if (
+                truth is None
+                or max(silent_neurons(parse(truth, anatomy)), default=-1) >= hidden[body]
+            ):
+                continue
+            point = {"case": case, "truth": truth, "gap": gap, "seed": seed}
+            name = f"{robot_key(body)}-case{case:02d}-seed{seed:03d}"
+            points[name] = {**model, **point, "comparator": comparator}
+    shared = {
+        **_shared(settings, kinds, chosen),
+        "controller": controller,
+        "neurons": neurons,
+        "comparator": comparator,
+        "gap": gap,
+    }
+    return Study(
+        "suite",
+        folder,
+        f"{recoveries.__name__}:recover",
+        points,
+        shared,
+        lambda point: {"gait": gaits[point["robot"], point["seed"]]},
+    )
+
+
+def paper(
+    folder: Path,
+    *,
+    robots: Sequence[str] = tuple(ROBOTS),
+    cases: Sequence[int] = tuple(TABLE_ONE),
+    seeds: Sequence[int] = range(1),
+    comparators: Sequence[str] = PAPER_COMPARATORS,
+    settings: Settings = Settings(),  # noqa: B008  # frozen
+) -> Study:
+    """Returns the paper's experiment: its failures, repair and fault kinds, and no reality gap.
+
+    A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
+    is exact, and is not calibrated.
+
+    Args:
+        folder: Folder of the study.
+        robots: Names of the paper's robots.
+        cases: Numbers of failures in Table I.
+        seeds: Seeds, one run of each case each.
+        comparators: Names of comparators, ``package.module:object``, or ``auto``.
+        settings: Parameters of the recoveries.
+
+    Raises:
+        InputError: The definition is invalid.
+    """
+    for robot in robots:
+        if robot not in ROBOTS:
+            raise unknown_name("robot of the paper", robot, ROBOTS)
+    for case in cases:
+        if case not in TABLE_ONE:
+            raise unknown_name("case of Table I", str(case), map(str, TABLE_ONE))
+    for comparator in comparators:
+        if comparator == ON_ROBOT:
+            raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
+        comparator_choice(comparator)
+    chosen = _checked_repair(plugins.PAPER, None, None)
+    models = {robot: recoveries.planned(robot) for robot in robots}
+    gaits = {
+        (robot, seed): recoveries.gait_cell(models[robot], settings, seed, chosen)
+        for seed, robot in itertools.product(seeds, robots)
+    }
+    points = {
+        f"{robot}-case{case:02d}-seed{seed:03d}-{_plain(way)}": {
+            **models[robot],
+            "case": case,
+            "truth": ROBOTS[robot].cases[case],
+            "gap": 0.0,
+            "seed": seed,
+            "comparator": way,
+        }
+        for seed, robot, case in itertools.product(seeds, robots, cases)
+        for way in (*comparators, ON_ROBOT)
+    }
+    return Study(
+        "paper",
+        folder,
+        f"{recoveries.__name__}:recover_or_evolve",
+        points,
+        {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False},
+        lambda point: {"gait": gaits[point["robot"], point["seed"]]},
+    )
+
+
+def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
+    """Returns the numbers of the cases that apply to at least one body."""
+    return tuple(sorted({case for body in bodies for case in robot_entry(body).cases}))
+
+
+def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ...]:
+    """Returns the unique names of the robots of domains and tasks.
+
+    Args:
+        domains: Names in ``DOMAINS``, or paths of MJCF or URDF files. The prefix of a domain of the
+            suite may be omitted unless another robot has the same name.
+        tasks: Names of tasks; a domain contributes the tasks that it has. None for the default
+            task of each domain.
+
+    Raises:
+        InputError: A domain is unknown or has none of the tasks, or no domain has a task.
+    """
+    found: list[str] = []
+    for given in domains:
+        if is_model(given):
+            found.append(given)
+            continue
+        domain = _domain(given)
+        every = DOMAINS[domain]
+        chosen = every[:1] if tasks is None else [task for task in every if task in tasks]
+        if not chosen:
+            raise InputError(
+                f"{domain} has none of the tasks {', '.join(tasks or ())}: it has "
+                f"{', '.join(every)}"
+            )
+        found += [domain] if domain in ROBOTS else [f"{domain}-{task}" for task in chosen]
+    known = tasks_of(domains)
+    for task in tasks or ():
+        if task not in known:
+            raise unknown_name("task of these domains", task, known)
+    return tuple(dict.fromkeys(found))
+
+
+def tasks_of(domains: Sequence[str]) -> tuple[str, ...]:
+    """Returns the names of the tasks of domains; see ``bodies_of``."""
+    own = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
+    return tuple(sorted({task for tasks in own for task in tasks}))
+
+
+def _domain(given: str) -> str:
+    domain = given if given in DOMAINS else f"{suite_bodies.PREFIX}{given}"
+    if domain not in DOMAINS:
+        raise unknown_name("domain", given, DOMAINS)
+    return domain
+
+
+def _shared(
+    settings: Settings,
+    kinds: str,
+    repair: Mapping[str, str],
+    next_trial: str = "repair",
+) -> dict[str, Any]:
+    """Returns the parameters of all points: those of a recovery, with their defaults."""
+    return {
+        "settings": dataclasses.asdict(settings),
+        "kinds": kinds,
+        **repair,
+        "next_trial": next_trial,
+        "controller": "network",
+        "neurons": None,
+        "calibrated": True,
+        "evolves": True,
+    }
+
+
+def _gait_numbers(seed: int, count: int) -> list[int]:
+    """Returns the numbers of the gaits of a run in the bank, one per trial."""
+    return [(seed + trial) % GAITS for trial in range(count)]
+
+
+def _run_name(run: Point) -> str:
+    case, truth = run["case"], run["truth"]
+    failure = f"case{case:02d}" if case is not None else quote(truth, safe="=")
+    return f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
+
+
+def _plain(name: str) -> str:
+    """Returns a comparator's part of a name; those of plug-ins have a colon."""
+    return quote(name, safe="=")
+
+
+def _failures(
+    robot: str, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
+) -> list[tuple[int | None, str]]:
+    """Returns the failures of a robot: the number in Table I, or None, and the notation."""
+    entry, searched = robot_entry(robot), plugins.kinds(kinds)
+    anatomy = entry.robot().anatomy
+    HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
+    for case in cases or ():
+        if case not in entry.cases:
+            raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
+    numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
+    named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
+    return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
+
+
+def _check_gaps(gaps: Iterable[float]) -> None:
+    for gap in gaps:
+        if not 0 <= gap <= MAX_GAP_LEVEL:
+            raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
+
+
+def _check_ablation(
+    lists: Mapping[str, Sequence[Any]],
+    cases: Sequence[int] | None,
+    damages: Sequence[str],
+    trials: int,
+    next_trial: str,
+) -> None:
+    for name, values in lists.items():
+        if not values:
+            raise InputError(f"expected at least one of the {name} of an ablation, got none")
+    if not (cases is None or cases or damages):
+        raise InputError("expected at least one case or one damage of an ablation, got neither")
+    _check_keys(lists["robots"])
+    _check_gaps(lists["gaps"])
+    for comparator in lists["comparators"]:
+        plugins.comparator(comparator)
+    if next_trial not in NEXT_TRIAL:
+        raise unknown_name("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial != BANK and trials < 2:
+        raise InputError(
+            f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
+            f"diagnosis chooses the second trial"
+        )
+    if next_trial == BANK and trials > GAITS and 0 in lists["gaps"]:
+        raise InputError(
+            f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
+            f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
+        )
+
+
+def _checked_repair(repair: str, search: str | None, score: str | None) -> dict[str, str]:
+    """Returns the names of a repair, its search and its score.
+
+    Raises:
+        InputError: A name is unknown, the paper's repair is to have another search, or the search
+            needs a repertoire, which a study does not have.
+    """
+    if search == plugins.REPERTOIRE:
+        raise InputError(
+            f"a repertoire is of one robot, and a study of many has none, got --search {search}: "
+            f"give --search {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
+            f"recover --repertoire FILE`"
+        )
+    plugins.repair(repair, search)
+    return recoveries.repair_parameters(repair, search, score)
+
+
+def _check_keys(robots: Iterable[str]) -> None:
+    """Checks that robots have different file names."""
+    taken: dict[str, str] = {}
+    for robot in robots:
+        other = taken.setdefault(robot_key(robot), robot)
+        if other != robot:
+            raise InputError(
+                f"{other} and {robot} would have the same file names: rename one of the files"
+            )

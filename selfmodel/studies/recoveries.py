@@ -1,0 +1,461 @@
+"""Functions of the studies of this package: gaits, physical trials, diagnoses and recoveries.
+
+Each is computed in a worker from JSON parameters: those of a point (``robot``, ``model``, ``case``,
+``truth``, ``gap``, ``seed``, ``comparator``), and ``shared``, which all points of a study have.
+"""
+
+import base64
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from selfmodel import plugins
+from selfmodel.arguments import comparator_choice, is_model, read_controller, robot_entry
+from selfmodel.controllers.controller import Controller, check_silent_neurons
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.errors import InputError
+from selfmodel.evolution import Generation
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.sensors import silent_neurons
+from selfmodel.files import read_file
+from selfmodel.logs.controllers import controller_bytes
+from selfmodel.logs.files import replace_file
+from selfmodel.logs.physical_trial import run_trial
+from selfmodel.logs.reader import read_log
+from selfmodel.logs.records import TrialHeader
+from selfmodel.recovery.events import Event, SearchBegins
+from selfmodel.recovery.falls import falls_of
+from selfmodel.recovery.random_streams import repair_stream
+from selfmodel.recovery.recover import diagnose_trials
+from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repertoire import model_digest
+from selfmodel.recovery.scores import DISPLACEMENT
+from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import calibrate
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.cells import Cell
+from selfmodel.studies.experiment import Experiment, draw_reality, is_correct, run
+from selfmodel.studies.scores import choose_score
+from selfmodel.studies.study import file_name
+from selfmodel.tasks import Entry
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
+
+GAIT, CALIBRATED = "gait.npz", "calibrated.xml"
+"""Files of a gait, and of the self-model that was fitted to the healthy trials of a run."""
+
+MAX_GAIT_BYTES = 2**24
+
+HEALTHY_TRIALS = 2
+"""Number of trials before the failure, in a run whose trials all comparators share."""
+
+ON_ROBOT = "evolution-on-robot"
+"""In place of a comparator: the paper's control, the repair EA on the damaged robot."""
+
+DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
+"""Names of the settings that do not affect a gait."""
+
+Parameters = Mapping[str, Any]
+Folders = Mapping[str, Path]
+Rows = dict[str, list[dict[str, Any]]]
+"""Rows by the name of their table."""
+
+
+def planned(robot: str) -> dict[str, str]:
+    """Returns the parameters of a cell that determine its robot, which its worker loads."""
+    return {"robot": robot, "model": model_digest(robot_entry(robot).robot())}
+
+
+def planned_entry(parameters: Parameters) -> Entry:
+    """Returns the robot of a cell with its cases and tasks.
+
+    Raises:
+        InputError: The model of that name is another one here.
+    """
+    entry = robot_entry(parameters["robot"])
+    if model_digest(entry.robot()) != parameters["model"]:
+        raise InputError(
+            f"{parameters['robot']} is another model than when the command began, or than on the "
+            f"machine of the command: restore the file, or run the command again"
+        )
+    return entry
+
+
+def robot_key(robot: str) -> str:
+    """Returns the robot's part of a file name: its name, or the name of its model file."""
+    return file_name(Path(robot).stem if is_model(robot) else robot)
+
+
+def repair_parameters(repair: str, search: str | None, score: str | None) -> dict[str, str]:
+    """Returns the names that determine a repair, with the defaults of the repair for None."""
+    return {
+        "repair": repair,
+        "search": plugins.search_name(repair, search, None),
+        "score": score or plugins.DEFAULT_SCORES[repair],
+    }
+
+
+def gait_cell(
+    robot: Parameters,
+    settings: Settings,
+    seed: int,
+    repair: Parameters,
+    *,
+    controller: str = "network",
+    neurons: int | None = None,
+) -> Cell:
+    """Returns the cell of the first gait of a recovery with the same seed.
+
+    Args:
+        robot: The robot, as planned.
+        settings: Parameters of the repair.
+        seed: Seed of all random numbers.
+        repair: The repair that evolves the gait; see ``repair_parameters``.
+        controller: Name of the controller design.
+        neurons: Number of hidden neurons; None for the design's default.
+    """
+    values = dataclasses.asdict(settings)
+    parameters = {
+        **robot,
+        "seed": seed,
+        "settings": {name: values[name] for name in values if name not in DIAGNOSIS_SETTINGS},
+        "controller": controller,
+        "neurons": neurons,
+        **repair,
+    }
+    name = f"{robot_key(robot['robot'])}-seed{seed:03d}"
+    return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits")
+
+
+def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> dict[str, Any]:
+    """Evolves a gait, writes it, and returns the number of evaluations."""
+    entry, settings = planned_entry(parameters), Settings(**parameters["settings"])
+    robot, seed = entry.robot(), parameters["seed"]
+    design = plugins.design(parameters["controller"], robot, parameters["neurons"])
+    chosen = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=seed)
+    if chosen.gait is not None:
+        write_gait(folder, chosen.gait)
+        return {"evaluations": 0}
+    make_repair = plugins.repair(parameters["repair"], parameters["search"])
+    repair = make_repair(Simulator(robot, threads=1), settings, design, chosen.score)
+    found = repair(
+        (INTACT,), partial(assumed_uncertainty, robot), (), repair_stream(seed, 0), lambda _: None
+    )
+    write_gait(folder, found[0].controller)
+    return {"evaluations": repair.evaluations}
+
+
+def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
+    """Returns the cell of a gait of a bank; its parameters contain the file.
+
+    Args:
+        bank: Folder with the file ``ROBOT-K.npz``, or the gaits of another study.
+        robot: The robot, as planned.
+        number: Number of the gait, from 0.
+
+    Raises:
+        InputError: The bank has no such gait, or the gait is for another robot.
+    """
+    name = robot["robot"]
+    bank_gait(bank, name, number)
+    data = read_file(_bank_file(bank, name, number), "a gait", MAX_GAIT_BYTES)
+    parameters = {**robot, "controller": base64.b64encode(data).decode()}
+    function = f"{__name__}:keep_gait"
+    return Cell(function, f"{robot_key(name)}-{number}", parameters, kind="gaits")
+
+
+def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> dict[str, Any]:
+    """Writes a given gait into the folder of its cell."""
+    replace_file(folder / GAIT, base64.b64decode(parameters["controller"]))
+    return {"evaluations": 0}
+
+
+def bank_gait(bank: Path, robot: str, number: int) -> Controller:
+    """Returns a gait of a bank; see ``given_gait_cell``."""
+    return read_controller(_bank_file(bank, robot, number), robot_entry(robot).robot())
+
+
+def _bank_file(bank: Path, robot: str, number: int) -> Path:
+    key = robot_key(robot)
+    evolved = sorted(bank.glob(f"{key}-seed{number:03d}-*/{GAIT}"))
+    own = bank / f"{key}-{number}.npz"
+    return evolved[0] if evolved and not own.exists() else own
+
+
+def write_gait(folder: Path, gait: Controller) -> None:
+    """Writes a gait into the folder of its cell."""
+    replace_file(folder / GAIT, controller_bytes(gait))
+
+
+def read_gait(folder: Path, robot: Robot) -> Controller:
+    """Returns the gait in the folder of its cell.
+
+    Raises:
+        InputError: The gait is for another robot.
+    """
+    return read_controller(folder / GAIT, robot)
+
+
+def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str]:
+    """Runs the trials of a run before and after the failure, and fits the self-model to the former.
+
+    Returns:
+        The names of the trials.
+    """
+    shared = parameters["shared"]
+    robot, settings = planned_entry(parameters).robot(), Settings(**shared["settings"])
+    gaits = [read_gait(needs[f"gait-{number}"], robot) for number in range(len(needs))]
+    stages: list[tuple[Stage, int]] = [("before", number) for number in range(HEALTHY_TRIALS)]
+    stages += [("after", number) for number in range(settings.trials)]
+    reality = draw_reality(robot, parameters["seed"], parameters["gap"])
+    trials = []
+    for number, (stage, gait) in enumerate(stages):
+        name = f"{number:02d}-{stage}"
+        plan = TrialPlan(name, stage, gaits[gait], settings.steps, parameters["seed"])
+        hidden = INTACT if stage == "before" else truth_of(parameters, robot)
+        # Noise differs between trials and is the same for every comparator.
+        physical = reality.robot(robot, hidden, stream=number)
+        header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
+        trials.append(run_trial(physical, plan, folder / f"{name}.mcap", robot, header))
+    fitted = calibrate(robot, trials[:HEALTHY_TRIALS], threads=1).robot
+    replace_file(folder / CALIBRATED, fitted.mjcf.encode())
+    return [trial.plan.name for trial in trials]
+
+
+def read_trials(folder: Path) -> tuple[list[Trial], list[Trial]]:
+    """Returns the trials before and those after the failure, from the folder of their cell."""
+    trials = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
+    return trials[:HEALTHY_TRIALS], trials[HEALTHY_TRIALS:]
+
+
+def truth_of(parameters: Parameters, robot: Robot) -> Hypothesis:
+    """Returns the failure of the physical robot of a point."""
+    kinds = plugins.kinds(parameters["shared"]["kinds"])
+    return HypothesisSpace(robot.anatomy, kinds).parse(parameters["truth"])
+
+
+def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
+    """Returns the diagnoses of the trials of a run, after the first and after the last of them.
+
+    Raises:
+        InputError: The comparator cannot compare the trials.
+    """
+    healthy, trials = read_trials(needs["trials"])
+    robot = planned_entry(parameters).robot()
+    mjcf = (needs["trials"] / CALIBRATED).read_text(encoding="utf-8")
+    calibrated = dataclasses.replace(robot, mjcf=mjcf)
+    return {"diagnoses": diagnoses_of(parameters, robot, calibrated, healthy, trials)}
+
+
+def diagnoses_of(
+    parameters: Parameters,
+    robot: Robot,
+    calibrated: Robot,
+    healthy: Sequence[Trial],
+    trials: Sequence[Trial],
+) -> list[dict[str, Any]]:
+    """Returns a row per diagnosis: after the first and after the last trial.
+
+    Args:
+        parameters: Those of the point.
+        robot: The nominal robot.
+        calibrated: The calibrated self-model.
+        healthy: Trials before the failure.
+        trials: Trials after the failure, at least one.
+
+    Raises:
+        InputError: The comparator cannot compare the trials.
+    """
+    shared, counts = parameters["shared"], []
+    search = DiagnosticSearch(
+        Simulator(calibrated, threads=1),
+        plugins.comparator(parameters["comparator"]),
+        Settings(**shared["settings"]),
+        plugins.kinds(shared["kinds"]),
+        healthy_trials=healthy,
+    )
+    watch = _DiagnosisWatch()
+
+    def on_event(event: Event) -> None:
+        watch(event)
+        if isinstance(event, Diagnosis):
+            counts.append(search.distinct_hypotheses)
+
+    diagnose_trials(trials, search, parameters["seed"], on_event, after={1, len(trials)})
+    truth = truth_of(parameters, robot)
+    rows = _diagnosis_rows(watch, shared, robot, truth, trials)
+    return [{**row, "distinct_hypotheses": count} for row, count in zip(rows, counts, strict=True)]
+
+
+def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
+    """Runs a recovery, and returns rows of its diagnoses, of its trials, and its own.
+
+    Raises:
+        InputError: The comparator cannot compare the trials.
+        WorkError: A trial could not be run or read.
+    """
+    shared, entry = parameters["shared"], planned_entry(parameters)
+    robot, settings = entry.robot(), Settings(**shared["settings"])
+    design = plugins.design(shared["controller"], robot, shared["neurons"])
+    truth, gait = truth_of(parameters, robot), read_gait(needs["gait"], robot)
+    check_silent_neurons(design, silent_neurons(truth))
+    steps, seed = settings.steps, parameters["seed"]
+    score = choose_score(shared["score"], entry, design, steps=steps, seed=seed, gait=gait).score
+    experiment = Experiment(
+        robot=robot,
+        case=parameters["case"],
+        truth=truth,
+        choose_comparator=comparator_choice(parameters["comparator"]),
+        kinds=plugins.kinds(shared["kinds"]),
+        calibrated=shared["calibrated"],
+        gap=parameters["gap"],
+        settings=settings,
+        seed=seed,
+        threads=1,
+        folder=folder / "recovery",
+        gait=gait,
+        design=design,
+        next_trial=shared["next_trial"],
+        score=score,
+        physical=entry.physical,
+        repair=shared["repair"],
+        search=shared["search"],
+    )
+    watch = _DiagnosisWatch()
+    outcome = run(experiment, watch)
+    recovery = outcome.recovery
+    before, after, *recoveries = [
+        score.of_trial(robot, truth if number else INTACT, trial)
+        for number, trial in enumerate(recovery.trials)
+    ]
+    best = recovery.trials[2 + recoveries.index(max(recoveries))].behaviour
+    diagnoses = _diagnosis_rows(watch, shared, robot, truth, recovery.trials[1:])
+    for row in diagnoses:
+        tried = recoveries[: row["trials"] - 1]
+        row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
+    diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
+    own = {
+        "robot": robot.name,
+        "compared_by": recovery.comparator.comparator.name,
+        "best": str(recovery.diagnosis.best),
+        "correct": outcome.correct,
+        "verdict": recovery.diagnosis.verdict,
+        "trials": len(recovery.trials) - 1,
+        "before": before,
+        "after": after,
+        "recovered": max(recoveries),
+        "upright": bool(falls_of(robot, truth, best) == best.steps),
+        "distinct_hypotheses": recovery.distinct_hypotheses,
+        "diverged": outcome.stats.diverged,
+        "seconds": outcome.seconds,
+        "repair": shared["repair"],
+        "search": shared["search"],
+    }
+    trials = [
+        {
+            "robot": robot.name,
+            "number": number,
+            "stage": trial.plan.stage,
+            "hypothesis": str(tried),
+            "displacement": trial.displacement,
+        }
+        for number, (trial, tried) in enumerate(zip(recovery.trials, recovery.tried, strict=True))
+    ]
+    return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
+
+
+def recover_or_evolve(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
+    """Runs a recovery, or, in place of one, the paper's control: the repair EA on the robot.
+
+    Without a reality gap, an evaluation on the robot is a simulation with the true failure. The
+    search begins from the gait before the failure and random controllers, as a repair does.
+    """
+    if parameters["comparator"] != ON_ROBOT:
+        return recover(parameters, needs, folder)
+    robot, settings = (
+        planned_entry(parameters).robot(),
+        Settings(**parameters["shared"]["settings"]),
+    )
+    simulator, gait = Simulator(robot, threads=1), read_gait(needs["gait"], robot)
+    walk = simulator.run([(INTACT, gait)], settings.steps, DISPLACEMENT.record).behaviour
+    before = float(DISPLACEMENT.of(robot, INTACT, walk)[0])
+    rows: list[dict[str, Any]] = []
+
+    def keep(generation: Generation) -> None:
+        if math.isfinite(generation.best):
+            best = {"evaluations": generation.evaluations, "best": float(generation.best)}
+            rows.append({"before": before, **best})
+
+    # A stream that no repair of the recovery draws from: the control is an independent search.
+    stream = repair_stream(parameters["seed"], settings.trials + 1)
+    truths, assumed = [truth_of(parameters, robot)], partial(assumed_uncertainty, robot)
+    RepairSearch(simulator, settings)(truths, assumed, [gait], stream, keep)
+    return {"evolution": rows}
+
+
+class _DiagnosisWatch:
+    """Keeps diagnoses with their cost so far, without the time between them.
+
+    Attributes:
+        found: Each diagnosis, with the hypotheses evaluated and the wall time, s, until its end.
+    """
+
+    def __init__(self) -> None:
+        self.found: list[tuple[Diagnosis, int, float]] = []
+        self._evaluations, self._seconds, self._start, self._diagnosing = 0, 0.0, 0.0, False
+
+    def __call__(self, event: Event) -> None:
+        match event:
+            case SearchBegins(kind):
+                self._diagnosing = kind == "diagnostic"
+                self._start = perf_counter()
+            case Generation() if self._diagnosing and event.number == event.total:
+                self._evaluations += event.evaluations
+            case Diagnosis():
+                self._seconds += perf_counter() - self._start
+                self.found.append((event, self._evaluations, self._seconds))
+
+
+def _diagnosis_rows(
+    watch: _DiagnosisWatch,
+    shared: Parameters,
+    robot: Robot,
+    truth: Hypothesis,
+    trials: Sequence[Trial],
+) -> list[dict[str, Any]]:
+    """Returns a row per diagnosis, without displacements and number of distinct hypotheses."""
+    simulator = Simulator(robot, threads=1)  # scoring is no cost of the diagnosis
+    rows = []
+    for diagnosis, evaluations, seconds in watch.found:
+        best = diagnosis.ranked[0]
+        explained = trials[: diagnosis.trials]
+        rows.append(
+            {
+                "next_trial": shared["next_trial"],
+                "trials": diagnosis.trials,
+                "best": str(best.hypothesis),
+                "correct": is_correct(best.hypothesis, truth, explained, simulator),
+                "distance": _finite(best.distance),
+                "intact_distance": _finite(diagnosis.intact_distance),
+                "verdict": diagnosis.verdict,
+                "rivals": len(diagnosis.indistinguishable),
+                "evaluations": evaluations,
+                "distinct_hypotheses": None,
+                "seconds": seconds,
+                **dict.fromkeys(("before", "after", "recovered")),
+                "repair": shared["repair"] if shared["evolves"] else None,
+                "search": shared["search"] if shared["evolves"] else None,
+            }
+        )
+    return rows
+
+
+def _finite(distance: float) -> float | None:
+    return float(distance) if math.isfinite(distance) else None

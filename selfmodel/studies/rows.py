@@ -1,0 +1,334 @@
+"""Rows of the kinds of studies, from their folder or file, and the outcomes that they compare."""
+
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean
+from types import MappingProxyType
+from typing import Any
+
+import pandas as pd
+
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.errors import InputError
+from selfmodel.files import read_file
+from selfmodel.studies import comparisons
+from selfmodel.studies.comparisons import OUTCOME
+from selfmodel.studies.study import Row, rows_in, study_in
+from selfmodel.tasks import ROBOTS
+
+INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
+"""Columns of whole numbers, of which some may be unknown."""
+
+MAX_BYTES = 2**30
+"""Largest size of a file of results that is read, bytes."""
+
+REFERENCE = FORWARD_DISPLACEMENT.name
+"""The comparator whose time is 1 in the scores of an ablation: the paper's."""
+
+AFTER = (1, 3, 20)
+"""Numbers of physical trials after which methods other than selfmodel's are compared."""
+
+ORACLE = "oracle"
+"""Name of the method that is a bound, and is not compared."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Rows of a kind of study.
+
+    Attributes:
+        table: Name of the rows in the result of a cell.
+        columns: Columns of the rows, in order.
+        optional: Columns that tables of earlier versions lack.
+        order: Sort key of a row.
+        outcomes: Function of the rows to the outcomes that are compared.
+    """
+
+    table: str
+    columns: tuple[str, ...]
+    optional: tuple[str, ...]
+    order: Callable[[Row], tuple[Any, ...]]
+    outcomes: Callable[[pd.DataFrame], list[tuple[Any, ...]]]
+
+
+def _of_ablation(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """Right (1) and wrong (0) diagnoses by comparator.
+
+    The tables are those of a robot and a number of trials: over all gaps, then each gap alone. A
+    pair has the robot, the failure, the gap, the seed and the way of the trials in common.
+    """
+    gaps = sorted(rows["gap"].unique())
+    return [
+        (
+            (row.robot, _counted(row.trials), *(() if gap is None else (f"gap {gap:g}",))),
+            row.comparator,
+            (f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial),
+            row.seed,
+            float(row.correct),
+            "share",
+        )
+        for gap in ([None, *gaps] if len(gaps) > 1 else [None])
+        for row in rows.itertuples()
+        if gap in (None, row.gap)
+    ]
+
+
+def _of_paper(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """Right (1) and wrong (0) diagnoses, and recovered displacements, by comparator."""
+    return [
+        ((row.robot, name), row.comparator, (f"{row.case:2d}",), row.seed, float(value), measure)
+        for row in rows.itertuples()
+        for name, value, measure in (
+            ("right", row.correct, "share"),
+            ("recovered, m", row.recovered, "number"),
+        )
+    ]
+
+
+def _of_methods(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """Displacements by method, m, and divided by the oracle's on the same physical robot.
+
+    The tables are those of a robot, a number of physical trials and a unit. There is none after
+    more trials than any method had on the robot.
+    """
+    found = []
+    runs = list(rows.itertuples())
+    oracles = {
+        (one.robot, one.case, one.gap, one.seed): method_value(one, 1)
+        for one in runs
+        if one.method == ORACLE
+    }
+    compared = [one for one in runs if one.method != ORACLE]
+    longest = {
+        one.robot: max(len(o.best) for o in compared if o.robot == one.robot) for one in compared
+    }
+    for trials in AFTER:
+        for one in compared:
+            if trials > longest[one.robot]:
+                continue
+            value = method_value(one, trials)
+            oracle = oracles.get((one.robot, one.case, one.gap, one.seed), 0.0)
+            run = one.method, (f"gap {one.gap:g}", f"{one.case:2d}"), one.seed
+            table = one.robot, f"after {_counted(trials)}"
+            found.append(((*table, "m"), *run, value, "number"))
+            if oracle > 0:
+                found.append(((*table, "÷ oracle"), *run, value / oracle, "number"))
+    return found
+
+
+def method_value(row: Any, trials: int) -> float:  # noqa: ANN401  # a row of a frame
+    """Returns the best displacement up to a fall after a number of trials, m.
+
+    The value of the oracle is the mean of all its trials.
+    """
+    if row.method == ORACLE:
+        return float(mean(row.upright))
+    return float(row.best[min(trials, len(row.best)) - 1])
+
+
+KINDS: Mapping[str, Kind] = MappingProxyType(
+    {
+        "ablate": Kind(
+            "diagnoses",
+            (
+                *("robot", "case", "truth", "gap", "seed", "next_trial", "comparator", "trials"),
+                *("best", "correct", "distance", "intact_distance", "verdict", "rivals"),
+                *("evaluations", "distinct_hypotheses", "seconds", "before", "after", "recovered"),
+                *("repair", "search"),
+            ),
+            ("repair", "search"),
+            lambda row: tuple(
+                row[name] for name in ("robot", "truth", "gap", "seed", "comparator", "trials")
+            ),
+            _of_ablation,
+        ),
+        "rivals": Kind(
+            "recoveries",
+            (
+                *("method", "robot", "case", "truth", "gap", "seed", "best", "upright"),
+                *("displacement", "fallen", "steps", "simulated_steps", "seconds"),
+            ),
+            (),
+            lambda row: tuple(row[name] for name in ("robot", "case", "gap", "seed", "method")),
+            _of_methods,
+        ),
+        "paper": Kind(
+            "recoveries",
+            (
+                *("robot", "case", "truth", "seed", "comparator", "compared_by", "best", "correct"),
+                *("before", "after", "recovered", "distinct_hypotheses", "diverged", "seconds"),
+            ),
+            (),
+            lambda row: (list(ROBOTS).index(row["robot"]), row["case"], row["seed"]),
+            _of_paper,
+        ),
+        "suite": Kind(
+            "recoveries",
+            (
+                *("robot", "case", "truth", "seed", "best", "correct", "verdict", "trials"),
+                *("before", "after", "recovered", "diverged", "seconds", "upright"),
+                *("repair", "search"),
+            ),
+            ("upright", "repair", "search"),
+            lambda row: (row["robot"], row["case"], row["seed"]),
+            lambda _rows: [],  # its bodies are recovered with one comparator, and are no pairs
+        ),
+    }
+)
+"""Kinds of studies by their name; the columns of a row determine it."""
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """Rows of a study with their statistics.
+
+    Attributes:
+        kind: Name of the study: ``ablate``, ``paper``, ``suite`` or ``rivals``.
+        path: Folder or file that the rows are from.
+        rows: A row per diagnosis or recovery.
+        outcomes: What the rows compare, for ``comparisons.compare``; empty for a study with one
+            method.
+    """
+
+    kind: str
+    path: Path
+    rows: pd.DataFrame
+    outcomes: pd.DataFrame
+
+    def comparisons(self) -> pd.DataFrame:
+        """Returns the paired comparisons of all methods; see ``comparisons.compare``."""
+        return comparisons.compare(self.outcomes)
+
+    def marginal_means(self) -> pd.DataFrame:
+        """Returns the means of all methods over the cells that they share."""
+        return comparisons.marginal_means(self.outcomes)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Returns a sentence per kind of imbalance in the tables over all conditions."""
+        return comparisons.balance_warnings(whole(self.outcomes))
+
+
+def load(path: str | Path) -> LoadedStudy:
+    """Returns the rows of a study and their statistics.
+
+    Example::
+
+        study = selfmodel.studies.load("runs/ablation")
+        study.rows.groupby("comparator")["correct"].mean()
+
+    Args:
+        path: Folder of ``selfmodel ablate``, ``paper`` or ``suite run``, finished or not; its
+            ``results.csv``; or the ``results.jsonl`` of other methods.
+
+    Raises:
+        InputError: There is no study, it has no finished run, or a file is damaged.
+    """
+    place = Path(path)
+    if place.is_dir():
+        name = study_in(place) or "none"
+        if name not in KINDS:
+            raise InputError(
+                f"{place}: expected the folder of a study ({', '.join(KINDS)}) with a finished "
+                f"run, got none in {place / 'runs'}: run the study first"
+            )
+        return _loaded(name, place, frame_of(study_rows(name, place), KINDS[name].columns))
+    data = read_file(
+        place, "the folder of a study, its results.csv or its results.jsonl", MAX_BYTES
+    )
+    try:
+        text = data.decode("utf-8-sig")
+        if place.suffix == ".jsonl":
+            rows = frame_of([json.loads(line) for line in text.splitlines()])
+        else:
+            texts = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+            rows = _typed(texts.apply(_parsed))
+    except (ValueError, RecursionError) as error:  # pandas' own errors are ValueErrors
+        reason = " ".join(str(error).split())
+        raise InputError(f"{place}: expected the rows of a study, got {reason}") from error
+    for name, kind in KINDS.items():
+        if set(kind.columns) - set(kind.optional) <= set(rows.columns) <= set(kind.columns):
+            return _loaded(name, place, rows)
+    raise InputError(
+        f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
+        f"{', '.join(map(str, rows.columns))[:300]}"
+    )
+
+
+def _loaded(name: str, path: Path, rows: pd.DataFrame) -> LoadedStudy:
+    if not len(rows):
+        raise InputError(f"{path}: expected the rows of a study, got none: run the study first")
+    for column, kinds in (("correct", "b"), ("gap", "fi"), ("seed", "iu"), ("case", "iu")):
+        if column in rows and rows[column].dtype.kind not in kinds:
+            odd = rows[column].dropna().astype(str).iloc[0]
+            raise InputError(
+                f"{path}: expected {'true or false' if kinds == 'b' else 'numbers'} in the column "
+                f"{column}, got values such as {odd!r}"
+            )
+    try:
+        outcomes = outcomes_of(name, rows)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: expected the rows of a study by {name}, got {error}") from error
+    return LoadedStudy(name, path, rows, outcomes)
+
+
+def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
+    """Returns what the rows of a kind of study compare, with the columns ``OUTCOME``."""
+    frame = rows if isinstance(rows, pd.DataFrame) else frame_of(rows, KINDS[name].columns)
+    return pd.DataFrame(KINDS[name].outcomes(frame), columns=list(OUTCOME))
+
+
+def study_rows(name: str, folder: Path, table: str | None = None) -> list[dict[str, Any]]:
+    """Returns the rows of all finished runs in the folder of a study, in order.
+
+    Args:
+        name: Name of the study, one of ``KINDS``.
+        folder: The folder.
+        table: Name of the table; None for that with the columns of the kind.
+    """
+    kind = KINDS[name]
+    found = rows_in(folder, table or kind.table)
+    if table is None:
+        found = [{column: row[column] for column in kind.columns} for row in found]
+    # Stable: of a run, the rows of the paper's comparator are the first.
+    found.sort(key=lambda row: row.get("comparator") != REFERENCE)
+    return sorted(map(dict, found), key=kind.order)
+
+
+def frame_of(rows: Sequence[Row], columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """Returns rows as a frame; whole numbers remain whole where some are unknown."""
+    return _typed(pd.DataFrame(rows, columns=None if columns is None else list(columns)))
+
+
+def _parsed(texts: pd.Series) -> pd.Series:
+    """Returns a column of a CSV file as flags or numbers, if all of its texts are; exact."""
+    known = texts[texts != ""]
+    flags = known.str.lower()
+    if len(known) and flags.isin(["true", "false"]).all():
+        return (flags == "true").reindex(texts.index)
+    try:
+        return known.map(float).reindex(texts.index)
+    except ValueError:
+        return known.reindex(texts.index)
+
+
+def _typed(frame: pd.DataFrame) -> pd.DataFrame:
+    whole_numbers = [name for name in INTEGERS if name in frame and len(frame)]
+    return frame.astype(dict.fromkeys(whole_numbers, "Int64"))
+
+
+def whole(found: pd.DataFrame) -> pd.DataFrame:
+    """Returns what is of the tables over all conditions: those with the fewest names."""
+    lengths = [len(table) for table in found["table"]] if len(found) else []
+    return found[[length == min(lengths) for length in lengths]] if lengths else found
+
+
+def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number, or pandas' NA
+    """Returns the name of a failure: its number in Table I, or its notation."""
+    return truth if pd.isna(case) else f"{case:2d}"
+
+
+def _counted(trials: int) -> str:
+    return f"{trials} {'trial' if trials == 1 else 'trials'}"

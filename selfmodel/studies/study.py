@@ -1,0 +1,177 @@
+"""A study: a function at the points of a grid, with rows in one table."""
+
+import itertools
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from selfmodel.errors import InputError
+from selfmodel.studies.cells import Cell, FinishedCell, finished, made_with
+from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
+
+RUNS = "runs"
+"""Kind of the cells at the points of a study; those that they need have kinds of their own."""
+
+SHARED = "shared"
+"""Parameter of each cell with what all points of a study share."""
+
+MAX_CLAUSE = 300
+"""Maximum characters of a difference in a message: values in a file may have megabytes."""
+
+Point = Mapping[str, Any]
+"""A point of the grid: a value of each axis by its name, as JSON, the seed among them."""
+
+Row = dict[str, Any]
+"""Row of a table: the values of the axes, and what the function found there."""
+
+
+def points_of(**axes: Iterable[Any]) -> dict[str, Point]:
+    """Returns all combinations of the values of axes by a name for readers, the last axis fastest.
+
+    Args:
+        **axes: Values by the name of the axis, as JSON.
+    """
+    found = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
+    return {
+        "-".join(f"{axis}={quote(str(value), safe='')}" for axis, value in point.items()): point
+        for point in found
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A function at the points of a grid, in a folder from which it is continued.
+
+    Attributes:
+        name: Name of the study, such as that of its command.
+        folder: Folder of the cells and results.
+        function: The ``Work`` that is computed at each point, as ``package.module:function``; its
+            parameters are those of the point, and ``shared``. Its result is a row, a list of rows,
+            or lists of rows by the name of a table.
+        points: The points by name, in the order in which they are computed.
+        shared: Parameters of all points, as JSON: a folder has one set of them.
+        needs: Function of a point to the cells whose files it reads, by name.
+    """
+
+    name: str
+    folder: Path
+    function: str
+    points: Mapping[str, Point]
+    shared: Mapping[str, Any] = field(default_factory=dict)
+    needs: Callable[[Point], Mapping[str, Cell]] = lambda _point: {}
+
+    def cells(self) -> list[Cell]:
+        """Returns the cell of each point, with those that it needs.
+
+        Raises:
+            InputError: The folder contains another study, or a run of a point with other inputs.
+        """
+        shared = {"study": self.name, **self.shared}
+        found = [
+            Cell(self.function, name, {**point, SHARED: shared}, self.needs(point), RUNS)
+            for name, point in self.points.items()
+        ]
+        if found:
+            self._check(found)
+        return found
+
+    def run(
+        self,
+        *,
+        executor: Executor | None = None,
+        workers: int = 1,
+        on_progress: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
+    ) -> tuple[CellEnds, ...]:
+        """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
+        return run_grid(
+            self.folder, self.cells(), executor=executor, workers=workers, on_progress=on_progress
+        )
+
+    def rows(self, table: str | None = None) -> list[Row]:
+        """Returns the rows of all finished runs in the folder; see ``rows_in``."""
+        return rows_in(self.folder, table)
+
+    def _check(self, cells: Sequence[Cell]) -> None:
+        """Checks that the runs in the folder and the cells to compute make one table."""
+        places = {cell.name: cell.place for cell in cells}
+        models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
+        for run in finished(self.folder / RUNS):
+            there = run.parameters
+            model = models.get(there.get("robot"), there.get("model"))
+            where = _difference(there.get(SHARED), cells[0].parameters[SHARED]) or _difference(
+                there.get("model"), model, f"the model of {there.get('robot')}"
+            )
+            if where:
+                raise InputError(
+                    f"{self.folder} contains a study with other settings ({where}): choose another "
+                    f"folder"
+                )
+            place = f"{RUNS}/{run.path.parent.name}"
+            own = run.made_with == made_with(self.function)
+            if own and places.get(run.name, place) != place:
+                raise InputError(
+                    f"{self.folder} contains {run.name}, made with other inputs, such as another "
+                    f"gait: choose another folder, or delete {run.path.parent}"
+                )
+
+
+def rows_in(folder: Path, table: str | None = None) -> list[Row]:
+    """Returns the rows of all finished runs in the folder of a study.
+
+    Args:
+        folder: The folder.
+        table: Name of the table, where the function has several; None for the only one.
+
+    Raises:
+        InputError: A cell is damaged, or has no rows.
+    """
+    return [row for cell in finished(folder / RUNS) for row in _rows_of(cell, table)]
+
+
+def study_in(folder: Path) -> str | None:
+    """Returns the name of the study whose runs are in a folder; None without a finished run."""
+    first = next(finished(folder / RUNS), None)
+    return None if first is None else str(first.parameters.get(SHARED, {}).get("study"))
+
+
+def file_name(text: str) -> str:
+    """Returns a text as a part of a file name."""
+    return re.sub(r"[^\w.-]", "_", text, flags=re.ASCII).lstrip(".-") or "_"
+
+
+def _rows_of(cell: FinishedCell, table: str | None) -> list[Row]:
+    hidden = {SHARED, "model"}
+    axes = {name: value for name, value in cell.parameters.items() if name not in hidden}
+    found = cell.result.get(table, []) if table and isinstance(cell.result, dict) else cell.result
+    rows = found if isinstance(found, list) else [found]
+    if not all(isinstance(row, dict) for row in rows):
+        raise InputError(
+            f"{cell.path}: expected rows of a study, got {json.dumps(found)[:80]}; delete its "
+            f"folder, and the same command computes its cell again"
+        )
+    return [{**axes, **row} for row in rows]
+
+
+_ABSENT = object()
+"""Value of a key that only the other object has; null is a value."""
+
+
+def _difference(there: Any, requested: Any, name: str = "") -> str | None:  # noqa: ANN401  # JSON
+    """Returns the first difference of two JSON values as a clause; None if they are equal."""
+    if isinstance(there, dict) and isinstance(requested, dict):
+        for key in sorted(there.keys() | requested.keys()):
+            values = there.get(key, _ABSENT), requested.get(key, _ABSENT)
+            inner = _difference(*values, f"{name}.{key}".lstrip("."))
+            if inner:
+                return inner
+        return None
+    if there == requested:
+        return None
+    found = "absent" if there is _ABSENT else json.dumps(there)[:MAX_CLAUSE]
+    wanted = "none" if requested is _ABSENT else repr(requested)[:MAX_CLAUSE]
+    return f"{name[:MAX_CLAUSE]} is {found} there, requested is {wanted}"

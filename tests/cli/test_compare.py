@@ -1,0 +1,90 @@
+"""``selfmodel compare``: paired comparisons of a study, as text, tables and figures."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from selfmodel.studies.rows import KINDS, frame_of
+from selfmodel.studies.tables import csv_bytes
+from tests.helpers.command import selfmodel
+from tests.helpers.study_rows import body, diagnosis
+
+ROWS = [
+    diagnosis(name, case=case, truth=str(case), seed=seed, correct=name == "a")
+    for name in "ab"
+    for case in (1, 2, 3)
+    for seed in range(4)
+]
+
+
+def write(folder: Path, rows: list[dict], name: str = "ablate") -> Path:
+    (folder / "rows.csv").write_bytes(csv_bytes(frame_of(rows, KINDS[name].columns)))
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the rows of two comparators: the first right in 12 runs, the second in none."""
+    return write(tmp_path, ROWS)
+
+
+def test_pairs_are_printed_with_difference_interval_n_and_p(folder: Path):
+    told = selfmodel("compare", "rows.csv", "-o", "out", cwd=folder)
+
+    assert told.returncode == 0, told.stderr
+    assert "quadruped, 1 trial:" in told.stdout
+    assert "  a better than b: 1.000 (0.587 to 1.000), n 12, p 0.00049" in told.stdout
+    assert told.stderr == ""
+    assert {path.name for path in (folder / "out").iterdir()} == {
+        *("rows.csv", "marginal-means.csv", "comparisons.csv"),
+        *(f"differences-quadruped.{suffix}" for suffix in ("png", "pdf", "svg")),
+    }
+    (row,) = csv.DictReader((folder / "out" / "comparisons.csv").read_text().splitlines())
+    assert (row["first"], row["n"], row["only_first"], row["better"]) == ("a", "12", "12", "a")
+    assert row["table"] == "quadruped, 1 trial"
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [("latex", "comparisons.tex"), ("markdown", "marginal-means.md"), ("parquet", "rows.parquet")],
+)
+def test_tables_are_written_in_the_format_of_choice(folder: Path, name: str, file: str):
+    told = selfmodel("compare", "rows.csv", "-o", "out", "--table", name, cwd=folder)
+
+    assert told.returncode == 0, told.stderr
+    assert (folder / "out" / file).stat().st_size > 100
+
+
+def test_unbalanced_cells_are_a_warning_with_their_numbers(tmp_path: Path):
+    write(tmp_path, [row for row in ROWS if row["comparator"] == "a" or row["seed"] < 2])
+    told = selfmodel("compare", "rows.csv", "-o", "out", "--json", cwd=tmp_path)
+    found = json.loads(told.stdout)
+
+    (warning,) = found["warnings"]
+    assert warning.startswith("quadruped, 1 trial: the cells are unbalanced (runs: a 12, b 6)")
+    assert found["comparisons"][0]["n"] == 6
+    assert [mean["n"] for mean in found["marginal_means"]] == [12, 6]
+
+
+def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):
+    told = selfmodel("compare", "rows.csv", "-o", "out", cwd=write(tmp_path, [body()], "suite"))
+
+    assert told.returncode == 0, told.stderr
+    assert "rows.csv: 1 rows of one method: nothing to compare" in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("rows.csv",), "rows.csv is no folder of a study: give the folder of the tables, -o DIR"),
+        (("rows.csv", "-o", "out", "--table", "xls"), "unknown table format 'xls'"),
+        (("missing", "-o", "out"), "missing: expected the folder of a study"),
+    ],
+)
+def test_a_wrong_request_is_an_error(folder: Path, arguments: tuple[str, ...], message: str):
+    told = selfmodel("compare", *arguments, cwd=folder)
+
+    assert told.returncode == 2
+    assert message in told.stderr

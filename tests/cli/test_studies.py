@@ -1,0 +1,215 @@
+"""``selfmodel ablate``, ``suite`` and ``paper``: studies that continue where they stopped."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from selfmodel.logs import load_controller
+from selfmodel.studies import figures
+from tests.helpers.command import SMALL, selfmodel
+
+ROOT = Path(__file__).parents[2]
+TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1", "--out", "out")
+PAPER = ("paper", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
+ABLATE = ("ablate", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
+SUITE = ("suite", "run", "--domains", "walker,biped.xml", "--cases", "1,5", *TINY)
+
+THEIRS = """
+from dataclasses import dataclass
+from selfmodel.comparators.forward_displacement import ForwardDisplacement
+from selfmodel.errors import InputError
+
+@dataclass(frozen=True)
+class Picky(ForwardDisplacement):
+    def prepare(self, trial):
+        raise InputError("this trial does not please")
+
+PICKY = Picky(name="picky")
+"""
+
+BIPED = """
+<mujoco>
+  <worldbody>
+    <body name="trunk" pos="0 0 0.5">
+      <freejoint/>
+      <geom size="0.1" mass="2"/>
+      <body name="left" pos="0 0.1 0">
+        <joint name="left_hip" axis="0 1 0" range="-40 40" damping="0.1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="0.5"/>
+      </body>
+      <body name="right" pos="0 -0.1 0">
+        <joint name="right_hip" axis="0 1 0" range="-40 40" damping="0.1"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="0.5"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="left_hip" ctrlrange="-1 1"/>
+    <motor joint="right_hip" ctrlrange="-1 1"/>
+  </actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder with a study of two bodies, and what it printed."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "biped.xml").write_text(BIPED)
+    done = selfmodel(*SUITE, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+@pytest.mark.process
+@pytest.mark.search
+@pytest.mark.bodies
+def test_bodies_of_the_suite_and_of_the_user_fail_and_recover(suite: tuple[Path, dict]):
+    folder, told = suite
+    rows = told["rows"]
+
+    # A limb of one joint has no part that could be lost alone: the biped has no case 1.
+    assert [(row["robot"], row["case"]) for row in rows] == [
+        *(("biped", 5), ("suite-walker-walk", 1), ("suite-walker-walk", 5)),
+    ]
+    assert all(row["trials"] == 2 and row["seconds"] > 0 for row in rows)
+    assert rows[1]["before"] == rows[2]["before"], "one gait for all cases of a body and seed"
+    kept = json.loads((folder / "out" / "results.json").read_text())
+    assert kept == {key: told[key] for key in ("rows", "summaries")}
+    with (folder / "out" / "results.csv").open() as file:
+        assert [row["truth"] for row in csv.DictReader(file)] == [row["truth"] for row in rows]
+
+
+@pytest.mark.process
+@pytest.mark.search
+@pytest.mark.bodies
+def test_the_same_command_runs_nothing_again_and_other_settings_are_refused(
+    suite: tuple[Path, dict],
+):
+    folder, told = suite
+    logs = {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")}
+    again = selfmodel(*SUITE, "--json", "--table", "csv", cwd=folder)
+    other = selfmodel(*SUITE, "--controller", "cpg", cwd=folder)
+
+    assert again.returncode == 0, again.stderr
+    files = [*told["files"], "out/tables/summaries.csv"]
+    assert json.loads(again.stdout) == {**told, "files": files}
+    with (folder / files[-1]).open() as file:
+        shares = [float(row["correct_high"]) for row in csv.DictReader(file)]
+    assert shares == [row["correct"]["high"] for row in told["summaries"]]
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.mcap")} == logs
+    assert other.returncode == 2
+    assert "contains a study with other settings (controller is" in other.stderr
+
+
+@pytest.mark.process
+@pytest.mark.search
+def test_a_failure_ends_with_status_one_and_one_json_object(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "theirs.py").write_text(THEIRS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+    both = "forward-displacement,theirs:PICKY"
+    told = selfmodel(*ABLATE, "--comparator", both, "--case", "3", "--json", cwd=tmp_path)
+
+    assert told.returncode == 1, told.stderr
+    found = json.loads(told.stdout)
+    assert [row["comparator"] for row in found["rows"]] == ["forward-displacement"]
+    (failure,) = found["failures"]
+    assert failure["run"] == "quadruped-case03-gap0.0-seed000-theirs%3APICKY"
+    assert "this trial does not please" in failure["error"]
+    assert "1 failed, the first of them quadruped-case03" in told.stderr
+    drawn = {"out/figures/gap.png", "out/figures/cases-quadruped-1.svg"}
+    assert drawn < set(found["files"])
+    assert "Traceback" not in told.stderr
+
+
+@pytest.mark.process
+@pytest.mark.search
+def test_the_papers_experiment_ends_with_tables_and_figures_and_is_continued(tmp_path: Path):
+    first = selfmodel(*PAPER, "--case", "1", "--json", "--table", "csv", cwd=tmp_path)
+    second = selfmodel(*PAPER, "--case", "7,1", "--table", "markdown", cwd=tmp_path, COLUMNS="120")
+
+    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    found = json.loads(first.stdout)
+    assert [row["case"] for row in found["table_2"]] == [1]
+    assert found["failures"] == []
+    assert {"out/paper.md", "out/tables/costs.csv"} < set(found["files"])
+    assert "3 of 5 were done before" in second.stderr  # gait, recovery and control
+    assert "not restored" in second.stdout
+    for name in ("paper.md", "figure-1.png", "figure-5.pdf", "figure-6.svg", "tables/table-2.md"):
+        assert f"out/{name}" in second.stdout
+        assert (tmp_path / "out" / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ((*PAPER, "--robots", "quadrped"), "did you mean quadruped?"),
+        ((*PAPER, "--case", "11"), "unknown case of Table I '11'"),
+        ((*PAPER, "--case", "one"), "--case needs whole numbers"),
+        ((*PAPER, "--comparator", "nope"), "unknown comparator 'nope'"),
+        ((*PAPER, "--table", "xls"), "unknown table format 'xls'"),
+        ((*ABLATE, "--executor", "slurm"), "unknown executor 'slurm'"),
+        ((*ABLATE, "--executor", "dask"), "expected --scheduler ADDRESS with --executor dask"),
+        ((*ABLATE, "--scheduler", "host:1"), "expected --scheduler ADDRESS with --executor dask"),
+        ((*ABLATE, "--only", "3/2"), "--only needs i/n"),
+        ((*SUITE, "--domains", "walkr"), "unknown domain 'walkr': did you mean suite-walker"),
+    ],
+)
+def test_wrong_input_is_refused_before_anything_is_written(
+    tmp_path: Path, command: tuple[str, ...], message: str
+):
+    done = selfmodel(*command, cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_planted_link_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(figures, "of_ablation", lambda *_: {})
+    monkeypatch.setattr("selfmodel.cli.studies.run_shown", lambda *_, **__: ())
+    (tmp_path / "precious").write_text("mine")
+    (tmp_path / "out").mkdir()
+    for name in ("results.csv", "results.csv.part", "results.json.part"):
+        (tmp_path / "out" / name).symlink_to(tmp_path / "precious")
+    done = selfmodel(*ABLATE, cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert not (tmp_path / "out" / "results.csv").is_symlink()
+
+
+@pytest.mark.bodies
+def test_every_domain_is_listed_with_its_parts_and_cases(tmp_path: Path):
+    done = selfmodel("suite", "list", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = {one["domain"]: one for one in json.loads(done.stdout)["domains"]}
+
+    assert list(told)[:3] == ["quadruped", "hexapod", "suite-quadruped"]
+    walker = told["suite-walker"]
+    assert (walker["joints"], walker["motors"], walker["sensors"]) == (6, 6, 8)
+    assert walker["robots"] == [f"suite-walker-{task}" for task in ("walk", "run", "stand")]
+    assert walker["control_timestep"] == 0.025
+    assert walker["cases"]["2"] == "break:right_hip"
+    assert "8" not in walker["cases"]
+
+
+@pytest.mark.process
+@pytest.mark.search
+@pytest.mark.bodies
+def test_a_study_has_a_gap_a_size_of_network_and_the_rewards_of_a_task(tmp_path: Path):
+    command = ("suite", "run", "--domains", "suite-walker", "--tasks", "stand", "--case", "3")
+    options = ("--score", "return", "--neurons", "5", "--gap", "0.05", "--kinds", "break,sensor")
+    done = selfmodel(*command, *TINY, *options, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)["rows"]
+
+    assert row["robot"] == "suite-walker-stand"
+    assert 0 < row["before"] < 60  # of 59 rewards none is above 1
+    (gait,) = (tmp_path / "out" / "gaits").rglob("*.npz")
+    assert load_controller(gait).design.hidden == 5

@@ -1,0 +1,114 @@
+"""Rows of studies, made up."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from selfmodel.studies.rows import KINDS
+
+Row = dict[str, Any]
+
+
+def diagnosis(comparator: str = "a", **changes: object) -> Row:
+    """A right diagnosis of case 1 of the quadruped."""
+    usual = {
+        "robot": "quadruped",
+        "case": 1,
+        "truth": "break:front_left_knee",
+        "gap": 0.05,
+        "seed": 0,
+        "next_trial": "bank",
+        "trials": 1,
+        "best": "intact",
+        "correct": True,
+        "verdict": "explained",
+        "rivals": 0,
+        "seconds": 1.0,
+        "repair": "paper",
+        "search": "ea",
+    }
+    row = dict.fromkeys(KINDS["ablate"].columns) | usual | {"comparator": comparator}
+    return row | changes
+
+
+def body(seed: int = 0, **changes: object) -> Row:
+    """A right recovery of a study of bodies."""
+    usual = {
+        "robot": "a",
+        "case": 1,
+        "truth": "break:x",
+        "seed": seed,
+        "best": "break:x",
+        "correct": True,
+        "verdict": "explained",
+        "trials": 2,
+        "before": 2.0,
+        "after": 0.0,
+        "recovered": 1.0,
+        "diverged": 0,
+        "seconds": 3.0,
+        "upright": True,
+        "repair": "paper",
+        "search": "ea",
+    }
+    return usual | changes
+
+
+def recovery(**changes: object) -> Row:
+    """A recovery of the paper's experiment; wrong ones are diagnosed as intact."""
+    usual = {
+        "robot": "quadruped",
+        "case": 1,
+        "truth": "break:front_left_knee",
+        "seed": 0,
+        "comparator": "a",
+        "compared_by": "a",
+        "correct": True,
+        "before": 2.0,
+        "after": 0.5,
+        "recovered": 2.0,
+        "distinct_hypotheses": 50,
+        "diverged": 0,
+        "seconds": 3.0,
+    }
+    row = usual | changes
+    return {**row, "best": row["truth"] if row["correct"] else "intact"}
+
+
+def trials(displacements: Sequence[float], **changes: object) -> list[Row]:
+    """The trials of one recovery: before, after, then those of the recovery."""
+    stages = ["before", "after", *["recovery"] * (len(displacements) - 2)]
+    run = {"robot": "quadruped", "case": 1, "seed": 0, "comparator": "a", "hypothesis": "intact"}
+    return [
+        {**run, "number": number, "stage": stage, "displacement": displacement, **changes}
+        for number, (stage, displacement) in enumerate(zip(stages, displacements, strict=True))
+    ]
+
+
+def evolution(bests: Sequence[float], **changes: object) -> list[Row]:
+    """An evolution on the robot, 10 evaluations a generation; 2 m before the failure."""
+    run = {"robot": "quadruped", "case": 1, "seed": 0, "before": 2.0}
+    return [
+        {**run, "evaluations": 10 * number, "best": best, **changes}
+        for number, best in enumerate(bests, start=1)
+    ]
+
+
+def rival(method: str, upright: Sequence[float], **changes: object) -> Row:
+    """A method on a damaged physical robot."""
+    best = [max(upright[: count + 1]) for count in range(len(upright))]
+    usual = {
+        "method": method,
+        "robot": "quadruped",
+        "case": 1,
+        "truth": "x",
+        "gap": 0.1,
+        "seed": 0,
+        "best": best,
+        "upright": list(upright),
+        "displacement": list(upright),
+        "fallen": [False] * len(upright),
+        "steps": [10] * len(upright),
+        "simulated_steps": 0,
+        "seconds": 1.0,
+    }
+    return usual | changes

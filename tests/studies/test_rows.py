@@ -1,0 +1,149 @@
+"""Rows of studies from their files and folders, and what they compare."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from selfmodel.errors import InputError
+from selfmodel.studies.comparisons import compare
+from selfmodel.studies.rows import KINDS, frame_of, load, outcomes_of, whole
+from selfmodel.studies.tables import csv_bytes
+from tests.helpers.study_rows import body, diagnosis, recovery, rival
+
+ROOT = Path(__file__).parents[2]
+TABLES = {
+    "ablate": [diagnosis("a"), diagnosis("b", correct=False, case=None, distance=0.1)],
+    "suite": [body(), body(1, upright=None)],
+    "paper": [recovery(), recovery(comparator="b")],
+}
+
+
+def written(folder: Path, name: str, rows: list[dict]) -> Path:
+    path = folder / "results.csv"
+    path.write_bytes(csv_bytes(frame_of(rows, KINDS[name].columns)))
+    return path
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_rows_of_a_file_are_those_that_were_written(name: str, tmp_path: Path):
+    found = load(written(tmp_path, name, TABLES[name]))
+
+    assert found.kind == name
+    assert list(found.rows.columns) == list(KINDS[name].columns)
+    for row, values in zip(found.rows.to_dict("records"), TABLES[name], strict=True):
+        for column, value in values.items():
+            assert row[column] == value if value is not None else pd.isna(row[column]), column
+
+
+@pytest.mark.parametrize("name", ["ablate", "suite"])
+def test_a_table_without_the_optional_columns_is_read(name: str, tmp_path: Path):
+    path = written(tmp_path, name, TABLES[name])
+    frame_without = pd.read_csv(path).drop(columns=list(KINDS[name].optional))
+    frame_without.to_csv(path, index=False)
+
+    assert load(path).kind == name
+
+
+def test_a_file_with_a_byte_order_mark_is_read(tmp_path: Path):
+    path = written(tmp_path, "ablate", TABLES["ablate"])
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+
+    assert len(load(path).rows) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("true", "perhaps", "true or false in the column correct"),
+        (",0.05,", ",wide,", "numbers in the column gap.*wide"),
+        ("robot,case", "robot,casus", "got the columns robot, casus"),
+        ("quadruped,1", 'quadruped,"1', "expected the rows of a study"),
+    ],
+)
+def test_a_file_that_is_no_table_of_a_study_is_refused(
+    old: str, new: str, words: str, tmp_path: Path
+):
+    path = written(tmp_path, "ablate", [diagnosis("a"), diagnosis("b")])
+    path.write_text(path.read_text().replace(old, new, 1))
+
+    with pytest.raises(InputError, match=f"{path}: .*{words}"):
+        load(path)
+
+
+def test_a_place_without_a_study_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="with a finished run, got none"):
+        load(tmp_path)
+    with pytest.raises(InputError, match=r"the folder of a study, its results\.csv"):
+        load(tmp_path / "none.csv")
+    path = written(tmp_path, "ablate", [])
+    with pytest.raises(InputError, match="got none: run the study first"):
+        load(path)
+
+
+def test_comparators_are_compared_over_all_gaps_and_at_each():
+    rows = [diagnosis(name, gap=gap, correct=name == "a") for name in "ab" for gap in (0.0, 0.05)]
+    found = compare(outcomes_of("ablate", rows))
+
+    assert [table[2:] for table in found["table"]] == [(), ("gap 0",), ("gap 0.05",)]
+    assert found["n"].tolist() == [2, 1, 1]
+    assert set(found["first"]) == {"a"}
+    assert [table[1] for table in whole(found)["table"]] == ["1 trial"]
+    alone = outcomes_of("ablate", [diagnosis("a"), diagnosis("b")])
+    assert len(set(alone["table"])) == 1, "a study at one gap is compared once"
+
+
+def test_the_papers_comparators_are_compared_by_diagnosis_and_by_recovery():
+    rows = [recovery(recovered=1.5), recovery(comparator="b", correct=False, recovered=1.0)]
+    found = compare(outcomes_of("paper", rows))
+
+    assert [table[1] for table in found["table"]] == ["right", "recovered, m"]
+    assert found["difference"].tolist() == [1, pytest.approx(0.5)]
+
+
+def values(rows: list[dict], method: str = "random-search") -> dict[tuple, float]:
+    found = outcomes_of("rivals", rows)
+    found = found[found["method"] == method]
+    return {(one.table[1:], one.seed): one.value for one in found.itertuples()}
+
+
+def test_methods_are_compared_in_metres_and_by_the_oracle_of_the_same_physical_robot():
+    rows = [rival("oracle", [2.0, 2.0]), rival("oracle", [4.0, 4.0], seed=1)]
+    rows += [rival("random-search", [1.0, 2.0, 0.0], seed=seed) for seed in (0, 1, 2)]
+    found = values(rows)
+
+    assert found[("after 1 trial", "÷ oracle"), 0] == 0.5
+    assert found[("after 3 trials", "÷ oracle"), 1] == 0.5
+    assert (("after 3 trials", "÷ oracle"), 2) not in found  # no oracle
+    assert found[("after 3 trials", "m"), 2] == 2
+
+
+def test_there_is_no_table_after_more_trials_than_any_method_had_nor_of_the_oracle():
+    few, many = rival("random-search", [1.0, 2.0]), rival("trial-and-error", [1.0] * 20)
+    bound = rival("oracle", [1.0] * 50)
+
+    assert {table[0] for table, _ in values([few])} == {"after 1 trial"}
+    assert {table[0] for table, _ in values([few, many, bound])} == {
+        *("after 1 trial", "after 3 trials", "after 20 trials")
+    }
+    assert not len(outcomes_of("rivals", [bound]))
+
+
+def test_rows_of_other_methods_are_read_from_their_lines(tmp_path: Path):
+    path = tmp_path / "results.jsonl"
+    rows = [rival("oracle", [2.0]), rival("random-search", [1.0, 0.5])]
+    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
+
+    found = load(path)
+    assert (found.kind, len(found.rows)) == ("rivals", 2)
+    path.write_text("{")
+    with pytest.raises(InputError, match=f"{path}: expected the rows of a study"):
+        load(path)
+
+
+@pytest.mark.parametrize("name", ["degrees", "verdicts"])
+def test_published_tables_are_read(name: str):
+    (path,) = (ROOT / "docs").rglob(f"{name}.csv")
+
+    assert load(path).kind == "ablate"
