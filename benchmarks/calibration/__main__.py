@@ -25,10 +25,10 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.random_streams import gap_stream, repair_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.uncertainty import assumed_uncertainty
-from selfmodel.robot.parameters import Parameters, with_model, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate, prediction_error
+from selfmodel.simulation.model_factors import Parameters, with_model, with_parameters
 from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.recoveries import bank_gait

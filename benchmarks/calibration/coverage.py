@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.robots import commands_of, drawn, logged
-from selfmodel.robot.parameters import factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import calibrate, prediction_error
+from selfmodel.simulation.model_factors import factor_names, nominal, with_parameters
 from selfmodel.tasks import ROBOTS
 
 RESULTS = Path(__file__).with_suffix(".json")

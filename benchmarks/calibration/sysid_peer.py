@@ -16,12 +16,18 @@ import numpy as np
 from absl import logging
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.parameters import Parameters, factor_names, from_factors, model_with_parameters
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields, state_writer
-from selfmodel.simulation.calibration_segments import HORIZON, MAX_SEGMENTS
-from selfmodel.simulation.floating.fit import CANDIDATE_DELAYS, MAX_LOG_FACTOR
+from selfmodel.simulation.fit import MAX_LOG_FACTOR
+from selfmodel.simulation.model_factors import (
+    Parameters,
+    factor_names,
+    from_factors,
+    model_with_parameters,
+)
 from selfmodel.simulation.requests import LEAD
+from selfmodel.simulation.segments import HORIZON, MAX_SEGMENTS
 from selfmodel.trials.estimation import STATE, estimated_states
 from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trial import Trial
@@ -56,7 +62,7 @@ def sysid_parameters(robot: Robot, trials: Sequence[Trial]) -> Parameters:
         residuals, _, _ = residual_at(delay)(np.zeros(len(names)), parameters)
         return float(np.sum(np.square(np.concatenate(residuals))))
 
-    delay = min(CANDIDATE_DELAYS, key=cost)
+    delay = min(range(MAX_CONTROL_DELAY + 1), key=cost)
     progress = io.StringIO()  # it has no option to be silent
     found, _ = sysid.optimize(parameters, residual_at(delay), verbose=False, output=progress)
     return from_factors(np.exp(found.as_vector()), delay)

@@ -1,5 +1,6 @@
 """Stages of the study: fits, errors, verdicts and injected faults; each returns JSON values."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -20,15 +21,10 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import BROKEN, JAMMED, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.faults.sensors import FAILED_SENSOR
-from selfmodel.robot.joint_parameters import (
-    QUANTITIES,
-    JointParameters,
-    model_with_joint_parameters,
-)
-from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
+from selfmodel.simulation.model_factors import with_model
 from selfmodel.simulation.simulator import Simulator
 
 FITTED, ALL = 10 * RATE, 15 * RATE
@@ -50,11 +46,17 @@ def fit_to(robot: Robot, first: int, last: int, threads: int) -> dict[str, Any]:
 
 def robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
     """Returns the robot with the parameters and the delay of a fit."""
-    values = {
-        quantity: np.array([r["value"] for r in fit["parameters"] if r["quantity"] == quantity])
-        for quantity in QUANTITIES
-    }
-    model = model_with_joint_parameters(robot, JointParameters(values))
+    model = copy.copy(robot.model)
+    fields = {"damping": "dof_damping", "dry friction": "dof_frictionloss"}
+    fields["armature"] = "dof_armature"
+    for row in fit["parameters"]:
+        if row["quantity"] == "gain":
+            motor = model.actuator(row["name"]).id
+            model.actuator_gainprm[motor] *= row["value"]
+            model.actuator_biasprm[motor] *= row["value"]
+        else:
+            dof = model.joint(row["name"]).dofadr[0]
+            getattr(model, fields[row["quantity"]])[dof] = row["value"]
     return with_model(robot, model, fit["delay"])
 
 

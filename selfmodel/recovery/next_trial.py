@@ -21,8 +21,8 @@ from selfmodel.recovery.falls import first_falls
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
 from selfmodel.recovery.repair import mutants
 from selfmodel.settings import Settings
+from selfmodel.simulation.batch import SimulationResult
 from selfmodel.simulation.cache import Cache
-from selfmodel.simulation.outcome import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, difference

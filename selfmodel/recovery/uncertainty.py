@@ -19,11 +19,11 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch_memory import batch_bytes
+from selfmodel.simulation.batch import batch_bytes
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
 from selfmodel.simulation.initial_pose import StartSpread, start_spread
-from selfmodel.simulation.model_distribution import LogNormal, Weighted, exact
+from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import encoder_noise

@@ -25,10 +25,10 @@ from selfmodel.logs.results import (
     read_as,
 )
 from selfmodel.recovery.repertoire import self_model_digest
-from selfmodel.robot.parameters import Parameters, factor_names, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.floating.fit import NOMINAL
+from selfmodel.simulation.fit import NOMINAL
+from selfmodel.simulation.model_factors import Parameters, factor_names, with_parameters
 from selfmodel.trials.trial import Trial
 
 

@@ -1,5 +1,5 @@
+from .batch import SimulationResult as SimulationResult, SimulationStats as SimulationStats
 from .calibration import Calibration as Calibration, calibrate as calibrate
-from .outcome import SimulationResult as SimulationResult, SimulationStats as SimulationStats
 from .requests import (
     ClosedLoop as ClosedLoop,
     Ensemble as Ensemble,

@@ -1,16 +1,10 @@
 """Calibration of the self-model: fits its continuous parameters to trials of the healthy robot.
 
-The fit is a box-constrained nonlinear least squares over short predictions from logged states
-(``mujoco.minimize``), with a Gaussian prior for parameters that the trials do not determine. The
-control delay, an integer, and the stiffness and damping of contacts are found by exhaustive search.
-Each is kept only if it predicts segments that were left out of the fit significantly better; see
-``floating.fit``.
-
-The joints of a robot with a fixed base are fitted one by one; see ``joints.calibration``.
+See ``fit`` for the sets of parameters, their fit and its test.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -18,30 +12,28 @@ from threadpoolctl import threadpool_limits
 
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
-from selfmodel.robot.parameters import Parameters, factor_names, nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import trial_with_known_base
-from selfmodel.simulation.calibration_segments import calibration_segments_of
-from selfmodel.simulation.floating.fit import (
-    FACTORS,
+from selfmodel.simulation.batch import SimulationStats
+from selfmodel.simulation.fit import (
+    JOINT_PRIOR_DEVIATIONS,
     NOMINAL,
     Fit,
-    chosen_fit,
+    is_determined,
+    nested_fits,
     prior_deviations,
-    simulated_models,
 )
-from selfmodel.simulation.floating.log_check import Suspicion, suspicion
-from selfmodel.simulation.floating.predictions import Predictions
-from selfmodel.simulation.floating.uncertainty import determined
-from selfmodel.simulation.joints.calibration import (
-    JointCalibration,
-    calibrated_joints,
-    nominal_error,
-    simulated_joint_steps,
+from selfmodel.simulation.log_check import Suspicion, suspicion
+from selfmodel.simulation.model_factors import (
+    JOINT_QUANTITIES,
+    SHARED,
+    Parameters,
+    factor_names,
+    joint_values,
+    nominal,
+    with_parameters,
 )
-from selfmodel.simulation.joints.segments import JointSegments, joint_segments_of
-from selfmodel.simulation.losses import root_mean_square
-from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.segment_errors import SegmentErrors, root_mean_square
+from selfmodel.simulation.segments import observed_segments
 from selfmodel.trials.trial import Trial
 
 EXACT_ERROR = 0.01
@@ -50,6 +42,43 @@ exact."""
 
 UNDETERMINED = "not determined by these trials"
 """Mark of a factor whose deviation is not clearly below that of its prior."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointCalibration:
+    """Fit of the joints of a robot with a fixed base: their values, and the errors of the sets.
+
+    Attributes:
+        rows: Name, quantity, value in the model, fitted value, standard deviation of its logarithm,
+            and whether the trials determine it, of the gain of each motor and the damping, dry
+            friction and armature of each hinge, each in its unit (N m s/rad, N m, kg m^2).
+        chosen: The set of parameters.
+        delay: Control delay, in control steps.
+        errors: Root mean square error of the nominal and of the chosen set.
+        held_out_errors: The same in segments that were left out of the fit.
+        worst_joint: Name of the hinge with the largest error after the fit, and the error, rad.
+    """
+
+    rows: tuple[dict[str, Any], ...]
+    chosen: str
+    delay: float
+    errors: tuple[float, float]
+    held_out_errors: tuple[float, float]
+    worst_joint: tuple[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the JSON values."""
+        return {
+            "set": self.chosen,
+            "delay": self.delay,
+            "error_before": self.errors[0],
+            "error": self.errors[1],
+            "held_out_error_before": self.held_out_errors[0],
+            "held_out_error": self.held_out_errors[1],
+            "worst_joint": self.worst_joint[0],
+            "worst_joint_error": self.worst_joint[1],
+            "parameters": list(self.rows),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +96,8 @@ class Calibration:
         error: Root mean square error with the fitted parameters, in the same units.
         joints: Fit of the joints of a robot with a fixed base; None for other robots.
         chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
-            ``factors``; of a robot with a fixed base, the name of its set.
+            ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
+            or ``joints``.
         determined: Whether the trials determine each factor; empty if none was fitted.
         held_out_gain: Relative reduction of the loss in segments that were left out of the fit.
         suspicion: Probable error in the recording of the trials; None without one.
@@ -79,7 +109,7 @@ class Calibration:
     error_before: float
     error: float
     joints: JointCalibration | None = None
-    chosen: str = FACTORS
+    chosen: str = NOMINAL
     determined: tuple[bool, ...] = ()
     held_out_gain: float = 0.0
     suspicion: Suspicion | None = None
@@ -101,8 +131,10 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
+        parts = (*JOINT_QUANTITIES, "body_mass", "body_inertia")
+        factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
         return ({} if self.joints is None else {"joints": self.joints.to_dict()}) | {
-            **asdict(self.parameters),
+            **factors,
             "deviations": [float(deviation) for deviation in self.deviations],
             "error_before": self.error_before,
             "error": self.error,
@@ -156,18 +188,16 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
     The result does not depend on the number of threads, of MuJoCo or of the linear algebra, which
-    rounds sums over many errors differently with several threads. The factors, and the delay, are
-    kept only if they predict segments that were left out of the fit significantly better. A model
-    that neither improves, or that predicts the trials exactly, is returned unchanged, to the bit.
+    rounds sums over many errors differently with several threads. A set of parameters is kept only
+    if it predicts segments that were left out of the fit significantly better. A model that none
+    improves, or that predicts the trials exactly, is returned unchanged, to the bit.
 
     If the base's position and linear velocity were rarely observed together in a trial, the trial
     is assumed to begin in the model's initial pose, and the state of the base is predicted from
     there on. After a late step, an unknown command, or an unknown state at the beginning of a
     segment (every tenth step), the rest of such a trial is not used.
 
-    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions, and
-    the model remains as it is, to the bit, unless the fit predicts segments that were left out of
-    it significantly better; see ``joint_calibration``.
+    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions.
 
     Args:
         robot: The robot as its model describes it.
@@ -182,29 +212,41 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
     with threadpool_limits(1, "blas"):
-        if robot.has_fixed_base:
-            return _with_fitted_joints(robot, trials, threads)
-        return _with_fitted_parameters(robot, trials, threads)
-
-
-def simulated_steps(robot: Robot, trials: Sequence[Trial]) -> int:
-    """Returns the number of control steps that ``calibrate`` simulates at most, but for retries.
-
-    A suspicious log takes up to as many again, to find its probable error. A model that predicts
-    the trials exactly takes one prediction of each.
-
-    Args:
-        robot: The robot as its model describes it.
-        trials: The trials, as for ``calibrate``.
-
-    Raises:
-        InputError: Too little of a trial was observed.
-    """
-    if robot.has_fixed_base:
-        return simulated_joint_steps(robot, _joint_segments(robot, trials))
-    cut = [calibration_segments_of(trial).segments for trial in trials]
-    steps = sum(len(segments.commands) * segments.horizon for segments in cut)
-    return simulated_models(len(factor_names(robot))) * steps
+        segments, stats = _segment_errors(robot, trials, threads), SimulationStats()
+        before = segments.of([nominal(robot)], stats)[:, 0]
+        prior = prior_deviations(robot)
+        fits = [Fit(NOMINAL, nominal(robot), prior, before, before)]
+        is_exact = root_mean_square(before) < EXACT_ERROR
+        if not is_exact:
+            fits = nested_fits(segments, before, stats)
+        if stats.diverged == stats.runs:
+            raise InputError(
+                f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
+                f"remained finite, before and after the fit: check the model and the units of the "
+                f"log"
+            )
+        best = fits[-1]
+        deviations, known = (
+            np.concatenate([own[quantity] for quantity in (*SHARED, "motor_gains")])
+            for own in (best.deviations, prior)
+        )
+        held_out, held_out_before = (
+            float(segments.losses(own.held_out).mean()) for own in (best, fits[0])
+        )
+        return Calibration(
+            robot=robot if best.name == NOMINAL else with_parameters(robot, best.parameters),
+            parameters=best.parameters,
+            deviations=deviations,
+            error_before=root_mean_square(before),
+            error=root_mean_square(best.errors),
+            joints=_joints(segments, fits) if robot.has_fixed_base else None,
+            chosen=best.name,
+            determined=tuple(is_determined(deviations, known).tolist()) if best.is_fitted else (),
+            held_out_gain=0.0 if is_exact else 1 - held_out / held_out_before,
+            suspicion=None
+            if is_exact or robot.has_fixed_base
+            else suspicion(segments, best.parameters, best.errors),
+        )
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
@@ -216,73 +258,53 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
         threads: Threads of MuJoCo's steps.
 
     Returns:
-        The root mean square error over all columns after all judged steps, in units of
+        The root mean square error over all columns after all valid steps, in units of
         ``CALIBRATION_ERROR_SCALES``.
 
     Raises:
         InputError: Too little of a trial was observed.
     """
-    if robot.has_fixed_base:
-        return nominal_error(robot, _joint_segments(robot, trials), threads)
-    predictions = _predictions(robot, trials, threads)
-    return root_mean_square(predictions.errors([nominal(robot)]))
+    return root_mean_square(_segment_errors(robot, trials, threads).of([nominal(robot)]))
 
 
-def _predictions(robot: Robot, trials: Sequence[Trial], threads: int) -> Predictions:
-    known = [trial_with_known_base(robot, trial) for trial in trials]
-    return Predictions(robot, [calibration_segments_of(trial) for trial in known], threads)
+def _segment_errors(robot: Robot, trials: Sequence[Trial], threads: int) -> SegmentErrors:
+    return SegmentErrors(robot, [observed_segments(robot, trial) for trial in trials], threads)
 
 
-def _with_fitted_parameters(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
-    predictions = _predictions(robot, trials, threads)
-    stats = SimulationStats()
-    before = predictions.errors([nominal(robot)], stats)[:, 0]
-    error_before = root_mean_square(before)
-    if error_before < EXACT_ERROR:
-        deviations = prior_deviations(len(factor_names(robot)))
-        return Calibration(
-            robot, nominal(robot), deviations, error_before, error_before, chosen=NOMINAL
-        )
-    fit = chosen_fit(predictions, before, stats)
-    if stats.diverged == stats.runs:
-        raise InputError(
-            f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
-            f"remained finite, before and after the fit: check the model and the units of the log"
-        )
-    return Calibration(
-        robot=robot if fit.name == NOMINAL else with_parameters(robot, fit.parameters),
-        parameters=fit.parameters,
-        deviations=fit.deviations,
-        error_before=error_before,
-        error=root_mean_square(fit.errors),
-        chosen=fit.name,
-        determined=_determined(fit),
-        held_out_gain=1 - fit.held_out_loss / fit.held_out_loss_before,
-        suspicion=suspicion(predictions, fit.parameters, fit.errors),
+def _joints(segments: SegmentErrors, fits: Sequence[Fit]) -> JointCalibration:
+    robot, first, best = segments.robot, fits[0], fits[-1]
+    rows = []
+    for quantity, prior in JOINT_PRIOR_DEVIATIONS.items():
+        if quantity == "motor_gains":
+            names, before = robot.anatomy.motors, np.ones(robot.model.nu)
+            values = np.array(best.parameters.motor_gains)
+        else:
+            names, before = robot.anatomy.hinges, joint_values(robot, first.parameters, quantity)
+            values = joint_values(robot, best.parameters, quantity)
+        known = best.is_fitted & is_determined(best.deviations[quantity], np.array(prior))
+        rows += [
+            {
+                "name": name,
+                "quantity": _QUANTITY_NAMES[quantity],
+                "before": float(before[k]),
+                "value": float(values[k]),
+                "deviation": float(best.deviations[quantity][k]),
+                "determined": bool(known[k]),
+            }
+            for k, name in enumerate(names)
+        ]
+    sizes = np.sqrt((segments.joint_errors(best.errors) ** 2).mean(axis=0))
+    worst = int(np.argmax(sizes))
+    return JointCalibration(
+        rows=tuple(rows),
+        chosen=best.name,
+        delay=best.parameters.delay,
+        errors=(root_mean_square(first.errors), root_mean_square(best.errors)),
+        held_out_errors=(root_mean_square(first.held_out), root_mean_square(best.held_out)),
+        worst_joint=(robot.anatomy.hinges[worst], float(sizes[worst])),
     )
 
 
-def _determined(fit: Fit) -> tuple[bool, ...]:
-    if fit.name != FACTORS:
-        return ()
-    return determined(fit.deviations, prior_deviations(len(fit.deviations)))
-
-
-def _with_fitted_joints(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
-    fit = calibrated_joints(robot, _joint_segments(robot, trials), threads)
-    gains = tuple(map(float, fit.parameters.values["gain"]))
-    known = [row["determined"] for row in fit.rows() if row["quantity"] == "gain"]
-    return Calibration(
-        robot=fit.robot,
-        parameters=replace(nominal(robot), motor_gains=gains, delay=fit.best.delay),
-        deviations=np.append(prior_deviations(4), fit.best.deviations["gain"]),
-        error_before=fit.nominal.error,
-        error=fit.best.error,
-        joints=fit,
-        chosen=fit.best.name,
-        determined=(False,) * 4 + tuple(known),
-    )
-
-
-def _joint_segments(robot: Robot, trials: Sequence[Trial]) -> list[JointSegments]:
-    return [joint_segments_of(trial_with_known_base(robot, trial)) for trial in trials]
+_QUANTITY_NAMES = {"motor_gains": "gain", "joint_damping": "damping"}
+_QUANTITY_NAMES |= {"dry_friction": "dry friction", "armature": "armature"}
+"""Names of quantities in JSON."""

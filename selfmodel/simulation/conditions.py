@@ -19,7 +19,11 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.initial_pose import StartSpread, randomize_initial_pose
-from selfmodel.simulation.model_distribution import ModelDistribution, ModelDraw
+from selfmodel.simulation.model_factors import (
+    ModelDistribution,
+    Parameters,
+    model_with_parameters,
+)
 
 _SEEDS = 2**63
 
@@ -67,13 +71,13 @@ class Condition:
     """
 
     hypothesis: Hypothesis
-    model: ModelDraw
+    model: Parameters
     delay: int
     seed: int | None
 
     def embodiment(self, robot: Robot) -> Embodiment:
         """Returns the model and sensor parameters of a robot, given its self-model."""
-        perturb = partial(self.model.applied_to, robot)
+        perturb = partial(model_with_parameters, robot, self.model)
         embodiment = build(robot, self.hypothesis, self.seed or 0, perturb=perturb)
         embodiment.added_delay[0] += self.delay
         return embodiment

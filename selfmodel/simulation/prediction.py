@@ -1,6 +1,6 @@
 """Short predictions from logged states under logged commands."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from time import perf_counter
 
 import mujoco
@@ -15,8 +15,13 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import state_writer
 from selfmodel.simulation.activations import initial_activations
-from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
-from selfmodel.simulation.outcome import SimulationResult, SimulationStats
+from selfmodel.simulation.batch import (
+    LiveBatch,
+    SimulationResult,
+    SimulationStats,
+    live_signals,
+    new_batch,
+)
 from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
 
@@ -68,53 +73,52 @@ def predict(
         return_inverse=True,
     )
     moving = [embodiments[i] for i in simulated]
-    added = [added_steps(lag, float(embodiment.added_delay[0])) for embodiment in moving]
-    longest = lag + max(added)
-    if segments.lead < longest:
-        raise InputError(
-            f"the robot's commands take effect {longest} steps late, and segments have a lead "
-            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
-        )
+    added = _added_steps(moving, segments, lag)
     stages: list[IndexArray] = np.split(np.arange(count), 1 if segments.independent else count)
     together = len(stages[0])
     bodies = _repeated(moving, together)
     batch = new_batch(robot.model, bodies, threads)
-    qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
+    current = _CurrentFields(batch)
+    qpos, sensordata = current.bind("qpos"), current.bind("sensordata")
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
     reader = SensorReader(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
-    live = live_signals(robot, batch, bodies, segments.record)
+    live = live_signals(robot, current.bind, bodies, segments.record)
     kept = {
-        signal: np.empty(
-            (n, count, horizon + 1, robot.anatomy.names.width(signal)), dtype=np.float64
-        )
+        signal: np.empty((n, count, horizon + 1, robot.anatomy.names.width(signal)))
         for signal in segments.record
     }
-    delays = delay_steps + np.array(added, dtype=np.intp)
-    inputs = _BatchInputs(robot, batch, moving, segments, delays)
+    inputs = _BatchInputs(robot, batch, moving, segments, delay_steps + added)
+    # After all bindings: a field that is bound later remains zero until the next step.
     alive = LiveBatch(batch)
-    alive.reset(mujoco.mjtStage.mjSTAGE_NONE)
+    alive.reset(mujoco.mjtStage.mjSTAGE_POS)
+
+    def keep(stage: IndexArray, k: int) -> None:
+        if "sensors" in kept:
+            reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
+            kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
+        for signal, read in live.items():
+            kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
+
+    chunk = max(1, CHUNK_BYTES // (substeps * current.bytes))
     for stage in stages:
         inputs.write_states(stage)
         clock = perf_counter()
         alive.forward()
         stats.physics_seconds += perf_counter() - clock
-        for k in range(horizon + 1):
-            if "sensors" in kept:
-                reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
-                kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
-            for signal, read in live.items():
-                kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
-            if k < horizon:
-                clock = perf_counter()
-                if part:
-                    inputs.write_commands(stage, k - 1)
-                    alive.step(part)
-                inputs.write_commands(stage, k)
-                alive.step(substeps - part)
-                stats.physics_seconds += perf_counter() - clock
+        current.read()
+        keep(stage, 0)
+        for first in range(0, horizon, chunk):
+            steps = range(first, min(first + chunk, horizon))
+            commands = inputs.commands(stage, steps, part, substeps)
+            clock = perf_counter()
+            recorded = alive.rollout(commands, current.names)
+            stats.physics_seconds += perf_counter() - clock
+            for number, k in enumerate(steps, 1):
+                current.set({name: own[:, number * substeps - 1] for name, own in recorded.items()})
+                keep(stage, k + 1)
     diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n
     stats.steps += len(moving) * count * horizon
@@ -127,6 +131,63 @@ def predict(
         robot.anatomy.names, time, kept, welded=np.array(welded), detached=np.array(detached)
     )
     return SimulationResult(predicted, diverged)
+
+
+def _added_steps(moving: Sequence[Embodiment], segments: Segments, lag: float) -> IndexArray:
+    """Returns the control delay that the faults of each embodiment add, control steps.
+
+    Raises:
+        InputError: The segments do not include all commands that are in the delay line.
+    """
+    added = [added_steps(lag, float(embodiment.added_delay[0])) for embodiment in moving]
+    longest = lag + max(added)
+    if segments.lead < longest:
+        raise InputError(
+            f"the robot's commands take effect {longest} steps late, and segments have a lead "
+            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
+        )
+    return np.array(added, dtype=np.intp)
+
+
+CHUNK_BYTES = 2**25
+"""Memory of the fields that are recorded in every physics step before they are read, bytes."""
+
+
+class _CurrentFields:
+    """Values of some fields of a batch at one step, ``(simulations, width)`` each.
+
+    Args:
+        batch: The batch.
+    """
+
+    def __init__(self, batch: mujoco.batch.Batch) -> None:
+        self._batch = batch
+        self._live: dict[str, FloatArray] = {}
+        self._values: dict[str, FloatArray] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the fields."""
+        return list(self._values)
+
+    @property
+    def bytes(self) -> int:
+        """Size of the values."""
+        return sum(values.nbytes for values in self._values.values())
+
+    def bind(self, name: str) -> FloatArray:
+        """Returns the array of the values of a field."""
+        self._live[name] = self._batch.bind(name)
+        return self._values.setdefault(name, np.zeros_like(self._live[name]))
+
+    def read(self) -> None:
+        """Sets all values to those of the batch."""
+        self.set(self._live)
+
+    def set(self, values: Mapping[str, FloatArray]) -> None:
+        """Sets all values, by name."""
+        for name, own in values.items():
+            self._values[name][:] = own
 
 
 def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]:
@@ -161,7 +222,6 @@ class _BatchInputs:
         self._n = len(embodiments)
         models = [own.model for own in embodiments for _ in range(batch.nsim // len(embodiments))]
         self._write = state_writer(robot, batch.bind, *models)
-        self._ctrl = batch.bind("ctrl")
         self._act = batch.bind("act")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._offsets = np.array([own.encoder_offset for own in embodiments])
@@ -185,10 +245,25 @@ class _BatchInputs:
             self._qpos[rows, position] = angle
             self._qvel[rows, velocity] = 0.0
 
-    def write_commands(self, stage: IndexArray, step: int) -> None:
-        """Writes the commands that arrive at one step of some segments, given by their indices."""
-        arriving = self._segments.commands[stage, (self._first + step)[:, np.newaxis]]
-        self._ctrl[:] = arriving.reshape(self._ctrl.shape)
+    def commands(self, stage: IndexArray, steps: range, part: int, substeps: int) -> FloatArray:
+        """Returns the commands of each physics step, ``(simulations, physics steps, motors)``.
+
+        Args:
+            stage: Indices of the segments.
+            steps: Control steps of the segments.
+            part: Physics steps of a control step at which the command before it still holds.
+            substeps: Physics steps of a control step.
+        """
+        arriving = [
+            self._segments.commands[stage, (self._first + k)[:, np.newaxis]].reshape(
+                len(self._qpos), -1
+            )
+            for k in range(steps.start - 1, steps.stop)
+        ]
+        rows = np.stack(arriving, axis=1)[:, :, np.newaxis]
+        before = np.repeat(rows[:, :-1], part, axis=2)
+        after = np.repeat(rows[:, 1:], substeps - part, axis=2)
+        return np.concatenate([before, after], axis=2).reshape(len(rows), -1, rows.shape[-1])
 
     def _for_all(self, values: FloatArray) -> FloatArray:
         return np.tile(values, (self._n, 1))

@@ -16,8 +16,7 @@ from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.simulation.batch import LiveBatch, live_signals, new_batch
-from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.batch import LiveBatch, SimulationStats, live_signals, new_batch
 from selfmodel.trials.signals import Signal
 
 
@@ -76,7 +75,7 @@ class Rollout:
         delays = whole + bool(self._part) + np.array(added, dtype=np.intp)
         self._motors = _DelayLine(batch.bind("ctrl"), delays)
         self.live: dict[Signal, Callable[[], FloatArray]] = {
-            **live_signals(robot, batch, embodiments, record),
+            **live_signals(robot, batch.bind, embodiments, record),
             "sensors": lambda: self._controllers.readings,
             # Those of the controllers, before the control delay.
             "commands": lambda: self._motors.inlet,

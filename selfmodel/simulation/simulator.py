@@ -13,7 +13,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.batch_memory import batch_bytes
+from selfmodel.simulation.batch import SimulationResult, SimulationStats, batch_bytes
 from selfmodel.simulation.conditions import (
     Condition,
     ReadingNoise,
@@ -21,7 +21,6 @@ from selfmodel.simulation.conditions import (
     initial_positions,
 )
 from selfmodel.simulation.ground_contacts import ground_contact_points
-from selfmodel.simulation.outcome import SimulationResult, SimulationStats
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments

@@ -27,10 +27,10 @@ from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, Score
-from selfmodel.robot.parameters import with_model
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.batch import SimulationStats
+from selfmodel.simulation.model_factors import with_model
 from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS

@@ -12,9 +12,9 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal

@@ -10,8 +10,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.control_delay import added_steps
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour

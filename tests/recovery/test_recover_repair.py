@@ -22,10 +22,10 @@ from selfmodel.recovery.repair import CandidateController, RepairSearch
 from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.designs import DESIGNS
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial

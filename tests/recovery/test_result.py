@@ -16,9 +16,9 @@ from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.result import Recovery
-from selfmodel.robot.parameters import nominal
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.model_factors import nominal
 from selfmodel.simulation.trial_replay import Replay
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial

@@ -25,11 +25,10 @@ from selfmodel.recovery.uncertainty import (
     log_likelihood,
     noise_of_gap,
 )
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration, calibrate
-from selfmodel.simulation.model_distribution import LogNormal, Weighted
+from selfmodel.simulation.model_factors import LogNormal, Weighted, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers

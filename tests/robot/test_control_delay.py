@@ -14,9 +14,9 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay

@@ -8,11 +8,10 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.conditions import Uncertainty, draw_conditions
 from selfmodel.simulation.initial_pose import StartSpread
-from selfmodel.simulation.model_distribution import LogNormal, exact
+from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
 

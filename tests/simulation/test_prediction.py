@@ -16,9 +16,9 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.batch import SimulationStats
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import END, Segments
 from selfmodel.simulation.simulator import Simulator

@@ -166,7 +166,7 @@ def test_a_trial_of_arrays_is_diagnosed_calibrated_and_logged_as_its_log(tmp_pat
 def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
     one = Trial.from_arrays(biped, **arrays(biped))
     signals = dict(one.behaviour.signals)
-    signals["base_position"] = signals["base_position"] + 5.0
+    signals["joint_positions"] = signals["joint_positions"] + 5.0
     moved = dataclasses.replace(one.behaviour, signals=signals)
     later = dataclasses.replace(one.behaviour, time=one.behaviour.time + 1)
     silent = dataclasses.replace(

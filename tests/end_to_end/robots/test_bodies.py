@@ -24,10 +24,10 @@ from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.anatomy import Joint
-from selfmodel.robot.parameters import nominal, with_parameters
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import Past, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking

@@ -1,4 +1,4 @@
-"""Tests of parameters: the MJCF of a robot contains them, in whatever way it defines its masses."""
+"""Promises of model factors: the model and the MJCF have them; their distributions."""
 
 import dataclasses
 
@@ -8,15 +8,23 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
-from selfmodel.robot.parameters import (
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.model_factors import (
+    JOINT_QUANTITIES,
+    LogNormal,
     Parameters,
+    Weighted,
+    exact,
     factor_names,
     from_factors,
+    joint_of_motor,
+    joint_values,
+    kinds_of_joints,
     model_with_parameters,
     nominal,
     with_parameters,
 )
-from selfmodel.robot.robot import Robot
+from tests.helpers.robots.arms import arm
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
@@ -188,3 +196,119 @@ def test_fitted_contacts_are_marked_once_and_remain_marked(quadruped: Robot):
     assert fitted.has_fitted_contacts
     assert again.has_fitted_contacts
     assert again.mjcf.count(FITTED_CONTACTS) == 1
+
+
+def joints_scaled(robot: Robot, factor: float) -> Parameters:
+    parts = dict.fromkeys(JOINT_QUANTITIES, (factor,) * len(robot.anatomy.hinges))
+    return dataclasses.replace(nominal(robot), **parts)
+
+
+def test_factors_of_one_of_joints_change_nothing_to_the_bit():
+    same = model_with_parameters(arm(), joints_scaled(arm(), 1.0))
+
+    for field in ("dof_damping", "dof_frictionloss", "dof_armature"):
+        assert getattr(same, field).tobytes() == getattr(arm().model, field).tobytes()
+
+
+def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
+    twice, less = joints_scaled(arm(), 2.0), joints_scaled(arm(), 0.5)
+    before = joint_values(arm(), nominal(arm()), "joint_damping")
+
+    np.testing.assert_allclose(joint_values(arm(), twice, "joint_damping"), 2 * before)
+    assert not arm().model.dof_frictionloss.any()
+    assert (joint_values(arm(), twice, "dry_friction") > 0).all()
+    assert not joint_values(arm(), less, "dry_friction").any()
+
+
+def test_the_mjcf_contains_the_quantities_of_joints_and_a_delay_of_a_part_of_a_step():
+    delay = 1 + 1 / arm().substeps
+    parameters = dataclasses.replace(joints_scaled(arm(), 1.35), delay=delay)
+    said, model = with_parameters(arm(), parameters), model_with_parameters(arm(), parameters)
+
+    assert said.control_delay == delay
+    for field in ("dof_damping", "dof_frictionloss", "dof_armature"):
+        np.testing.assert_allclose(getattr(said.model, field), getattr(model, field), rtol=1e-5)
+
+
+def test_legs_of_one_shape_have_the_same_kinds_of_joints(quadruped: Robot):
+    kinds = kinds_of_joints(quadruped)
+
+    assert len(set(kinds.tolist())) < len(kinds)
+    assert sorted(joint_of_motor(quadruped).tolist()) == list(range(8))
+    assert len(set(kinds_of_joints(arm()).tolist())) == 6
+
+
+def test_known_contacts_take_no_random_numbers(quadruped: Robot):
+    factors, bodies = np.full(4 + quadruped.model.nu, 0.1), np.full(quadruped.model.nbody, 0.1)
+    known = LogNormal(factors, bodies).draw(np.random.default_rng(0))
+    unknown = LogNormal(factors, bodies, 0.5).draw(np.random.default_rng(0))
+
+    assert not known.has_other_contacts
+    assert unknown.has_other_contacts
+    same = {"contact_stiffness": 1.0, "contact_damping": 1.0}
+    assert dataclasses.replace(unknown, **same) == known
+
+
+def test_draws_have_a_median_of_one_and_the_given_deviations(quadruped: Robot):
+    bodies = np.full(quadruped.model.nbody, 0.2)
+    distribution = LogNormal(np.full(4 + quadruped.model.nu, 0.1), bodies, 0.5)
+    rng = np.random.default_rng(0)
+    drawn = [distribution.draw(rng) for _ in range(400)]
+
+    assert not distribution.is_exact
+    assert all(own.differs for own in drawn)
+    for values, deviation in (
+        ([own.factors for own in drawn], 0.1),
+        ([own.body_mass for own in drawn], 0.2),
+        ([own.body_inertia for own in drawn], 0.2),
+        ([(own.contact_stiffness, own.contact_damping) for own in drawn], 0.5),
+    ):
+        logarithms = np.log(values)
+        np.testing.assert_allclose(logarithms.mean(axis=0), 0, atol=deviation / 4)
+        np.testing.assert_allclose(logarithms.std(axis=0), deviation, rtol=0.2)
+
+
+def test_a_draw_scales_the_model_of_the_robot(quadruped: Robot):
+    masses, inertias = np.ones((2, quadruped.model.nbody))
+    masses[2], inertias[3] = 1.2, 0.5
+    parameters = dataclasses.replace(
+        nominal(quadruped),
+        friction=1.5,
+        motor_gains=(0.8, *nominal(quadruped).motor_gains[1:]),
+        body_mass=tuple(masses.tolist()),
+        body_inertia=tuple(inertias.tolist()),
+        contact_stiffness=0.5,
+    )
+    scaled, own = model_with_parameters(quadruped, parameters), quadruped.model
+
+    np.testing.assert_allclose(scaled.geom_friction[:, 0], 1.5 * own.geom_friction[:, 0])
+    np.testing.assert_allclose(scaled.actuator_gainprm[0], 0.8 * own.actuator_gainprm[0])
+    np.testing.assert_allclose(scaled.body_mass[2], 1.2 * own.body_mass[2])
+    np.testing.assert_allclose(scaled.body_inertia[3], 0.5 * own.body_inertia[3])
+    np.testing.assert_allclose(scaled.geom("torso").solref, own.geom("torso").solref * [0.5, 1])
+    # The constants that follow from the masses are those of the scaled model.
+    assert scaled.body_subtreemass[1] > own.body_subtreemass[1]
+    assert parameters.differs
+
+
+def test_the_exact_model_is_drawn_to_the_bit(quadruped: Robot):
+    drawn = exact(quadruped).draw(np.random.default_rng(0))
+    assert not drawn.differs
+    assert exact(quadruped).is_exact
+    size = mujoco.mj_sizeModel(quadruped.model)
+    buffers = [np.empty(size, np.uint8) for _ in range(2)]
+    models = quadruped.model, model_with_parameters(quadruped, drawn)
+    for model, buffer in zip(models, buffers, strict=True):
+        mujoco.mj_saveModel(model, None, buffer)
+    assert buffers[0].tobytes() == buffers[1].tobytes()
+
+
+def test_a_weighted_sample_draws_its_models_as_often_as_they_are_probable(quadruped: Robot):
+    models = [dataclasses.replace(nominal(quadruped), friction=own) for own in (0.9, 1.0, 1.1)]
+    sample, rng = Weighted(models, np.array([0.5, 0.25, 0.25])), np.random.default_rng(0)
+    drawn = [sample.draw(rng).friction for _ in range(400)]
+
+    assert not sample.is_exact
+    assert Weighted(models[1:2], np.ones(1)).is_exact
+    for model, weight in zip(models, sample.weights, strict=True):
+        assert drawn.count(model.friction) / 400 == pytest.approx(weight, abs=0.08)

@@ -1,4 +1,10 @@
-"""Segments of a trial for calibration, with the observed states that they are compared with."""
+"""Segments of a trial of the healthy robot, with the observed states they are compared with.
+
+A robot that walks is predicted over a tenth of a second: contacts make longer simulations chaotic.
+The joints of a fixed base are simulated for about a second without losing the trial: position
+servos hold them to the commands, and in a second the commands move the joints there and back, which
+shows gains, friction and inertia.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,6 +13,8 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import with_known_base
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import (
@@ -15,6 +23,8 @@ from selfmodel.trials.estimation import (
     STATE,
     estimated_states,
     known_steps,
+    lacks_joint_velocities,
+    with_joint_velocities,
 )
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, check_magnitudes
@@ -32,15 +42,25 @@ MIN_COMPLETE_SHARE = 0.25
 """Smallest share of the known steps at which every hinge is known, for other steps to be left out.
 """
 
+SEGMENT_SECONDS = 1.0
+"""Length of a segment of a robot with a fixed base, s, in a trial that is long enough."""
+
+MIN_SEGMENTS = 12
+"""Smallest number of segments of a fixed base: a short trial has shorter segments."""
+
+MIN_HORIZON = 5
+"""Smallest length of a segment of a fixed base, control steps."""
+
 
 @dataclass(frozen=True, eq=False)
-class CalibrationSegments:
-    """A trial cut into segments for calibration.
+class ObservedSegments:
+    """Segments of a trial, and what was observed in them.
 
     Attributes:
         segments: Initial states and commands.
-        observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal.
-        judged: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
+        observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal
+            that is compared.
+        valid: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
             after the step is known, and so are the commands that led there. Single hinges may be
             unknown; see ``compared``.
         steps: Number of different steps of the trial in all segments, which may overlap.
@@ -48,7 +68,7 @@ class CalibrationSegments:
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
-    judged: BoolArray
+    valid: BoolArray
     steps: int
 
     def compared(self, signal: Signal) -> BoolArray:
@@ -58,10 +78,10 @@ class CalibrationSegments:
         """
         values = self.observed[signal]
         known = np.isfinite(values) if signal in JOINTS else np.ones((*values.shape[:2], 3), bool)
-        return np.asarray(known & self.judged[..., np.newaxis])
+        return np.asarray(known & self.valid[..., np.newaxis])
 
 
-def calibration_segments_of(trial: Trial) -> CalibrationSegments:
+def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     """Returns segments of a trial in which the state and the commands are known.
 
     The segments are spread over the trial and known completely. If the base's position and linear
@@ -70,23 +90,35 @@ def calibration_segments_of(trial: Trial) -> CalibrationSegments:
     pose: each begins with the base in the predicted state at the end of the segment before. Of a
     trial in which a hinge is unknown most of the time, the other hinges are used in the same way.
 
+    With a fixed base, segments of up to a second follow each other, and joint positions are
+    compared, and joint velocities if they were measured.
+
+    Args:
+        robot: The robot of the trial.
+        trial: A trial of the healthy robot.
+
     Raises:
         InputError: Too few states and commands are known for any segments, or a value is infinite
             or absurdly large.
     """
-    if trial.behaviour.steps <= LEAD + HORIZON:
-        raise _unusable(trial, f"the trial has {trial.behaviour.steps}")
-    segments = _spread(trial.behaviour) or _sequential(trial.behaviour)
-    if segments is None:
-        never = _never_known(trial.behaviour)
-        raise _unusable(
-            trial, f"the log never has {never}" if never else "the log has no such segment"
-        )
-    check_magnitudes(trial, (*segments.observed, "commands"))
-    return segments
+    behaviour = with_known_base(robot, trial.behaviour)
+    if robot.has_fixed_base:
+        found = _consecutive(trial, behaviour)
+    else:
+        if behaviour.steps <= LEAD + HORIZON:
+            raise _unusable(trial, f"the trial has {behaviour.steps}")
+        some = _spread(behaviour) or _sequential(behaviour)
+        if some is None:
+            never = _never_known(behaviour)
+            raise _unusable(
+                trial, f"the log never has {never}" if never else "the log has no such segment"
+            )
+        found = some
+    check_magnitudes(trial, (*found.observed, "commands"))
+    return found
 
 
-def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
+def _spread(behaviour: Behaviour) -> ObservedSegments | None:
     """Returns segments of the whole state; None if there are too few.
 
     They are independent and spread over the trial. With unknown hinges, which continue from the
@@ -105,22 +137,63 @@ def _spread(behaviour: Behaviour) -> CalibrationSegments | None:
         whole = _all_known(known, begins)
         if not whole.any():
             return None
-    return _with_observed(behaviour, states, begins[whole])
+    return _cut(behaviour, states, begins[whole], HORIZON, STATE)
 
 
-def _sequential(behaviour: Behaviour) -> CalibrationSegments | None:
-    """Returns consecutive segments of the onboard state; None if too few steps can be judged.
+def _sequential(behaviour: Behaviour) -> ObservedSegments | None:
+    """Returns consecutive segments of the onboard state; None if too few steps are valid.
 
     Every segment with a known initial state and known commands is simulated, because later segments
-    continue from its end. A step is judged if its state was observed and no command before it, in
+    continue from its end. A step is valid if its state was observed and no command before it, in
     the segment or in its lead, was held for other than a control time step.
     """
     begins = np.arange(0, behaviour.steps - HORIZON, HORIZON)
     states = estimated_states(behaviour, ONBOARD)
     commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
     starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
-    segments = _with_observed(behaviour, states, starts)
-    return segments if segments.judged.sum() >= HORIZON else None
+    segments = _cut(behaviour, states, starts, HORIZON, ONBOARD)
+    return segments if segments.valid.sum() >= HORIZON else None
+
+
+def _consecutive(trial: Trial, measured: Behaviour) -> ObservedSegments:
+    """Returns segments of the joints of a fixed base that begin in a known state.
+
+    Joint velocities that were not measured are estimated, as the initial velocity of a segment.
+    """
+    behaviour, steps = with_joint_velocities(measured), measured.steps
+    compared = JOINTS[:1] if lacks_joint_velocities(measured) else JOINTS
+    timestep = float(behaviour.time[1] - behaviour.time[0]) if steps > 1 else 1.0
+    horizon = min(round(SEGMENT_SECONDS / timestep), (steps - 1 - LEAD) // MIN_SEGMENTS)
+    if horizon < MIN_HORIZON:
+        raise _unusable(trial, f"the trial has {steps} steps", fixed=True)
+    states = estimated_states(behaviour, STATE)
+    starts = np.arange(LEAD, steps - horizon, horizon)
+    commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
+    usable = _known(states)[starts] & commanded[command_steps(starts, horizon)].all(axis=1)
+    starts = starts[usable]
+    starts = starts[_cut(behaviour, states, starts, horizon, compared).valid.any(axis=1)]
+    if len(starts) < MIN_SEGMENTS // 2:
+        raise _unusable(trial, f"the log has {len(starts)} such segments", fixed=True)
+    return _cut(behaviour, states, starts, horizon, compared)
+
+
+def _cut(
+    behaviour: Behaviour,
+    states: Mapping[Signal, FloatArray],
+    starts: IndexArray,
+    horizon: int,
+    compared: tuple[Signal, ...],
+) -> ObservedSegments:
+    before = np.maximum(command_steps(starts, horizon), 0)
+    after = starts[:, np.newaxis] + np.arange(1, horizon + 1)
+    steady = np.logical_and.accumulate(_steady(behaviour)[before], axis=1)
+    observed = {signal: states[signal] for signal in compared}
+    return ObservedSegments(
+        segments=cut_segments(behaviour, states, starts, horizon, record=compared),
+        observed={signal: values[after] for signal, values in observed.items()},
+        valid=steady[:, LEAD:] & _known(observed)[after],
+        steps=len(np.unique(after)),
+    )
 
 
 def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
@@ -143,20 +216,6 @@ def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _with_observed(
-    behaviour: Behaviour, states: Mapping[Signal, FloatArray], starts: IndexArray
-) -> CalibrationSegments:
-    before = np.maximum(command_steps(starts, HORIZON), 0)
-    after = starts[:, np.newaxis] + np.arange(1, HORIZON + 1)
-    steady = np.logical_and.accumulate(_steady(behaviour)[before], axis=1)
-    return CalibrationSegments(
-        segments=cut_segments(behaviour, states, starts, HORIZON, record=tuple(states)),
-        observed={signal: values[after] for signal, values in states.items()},
-        judged=steady[:, LEAD:] & _known(states)[after],
-        steps=len(np.unique(after)),
-    )
-
-
 def _never_known(behaviour: Behaviour) -> str:
     """Returns the required signals that were never observed, with columns if only some are.
 
@@ -173,8 +232,12 @@ def _never_known(behaviour: Behaviour) -> str:
     return ", ".join(never)
 
 
-def _unusable(trial: Trial, reason: str) -> InputError:
-    return InputError(
-        f"{trial.path}: calibration needs segments of {LEAD + HORIZON + 1} steps or more, without "
-        f"late steps, with {', '.join(ONBOARD)} and the commands, and {reason}: leave this log out"
+def _unusable(trial: Trial, reason: str, *, fixed: bool = False) -> InputError:
+    needs = (
+        f"calibration of a robot with a fixed base needs {MIN_SEGMENTS} segments of {MIN_HORIZON} "
+        f"steps or more with joint positions and commands"
+        if fixed
+        else f"calibration needs segments of {LEAD + HORIZON + 1} steps or more, without late "
+        f"steps, with {', '.join(ONBOARD)} and the commands"
     )
+    return InputError(f"{trial.path}: {needs}, and {reason}: leave this log out")

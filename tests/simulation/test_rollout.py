@@ -1,8 +1,10 @@
+"""Promises of batches: their memory."""
+
 import pytest
 
 from selfmodel.isolation import available_memory
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.batch_memory import batch_bytes, hypothesis_bytes, largest_batch
+from selfmodel.simulation.batch import batch_bytes, hypothesis_bytes, largest_batch
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 
 RECORD = ("base_position", "sensors")

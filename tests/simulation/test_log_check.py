@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.parameters import nominal
-from selfmodel.simulation.calibration_segments import calibration_segments_of
-from selfmodel.simulation.floating.log_check import Suspicion, suspicion
-from selfmodel.simulation.floating.predictions import Predictions
+from selfmodel.simulation.log_check import Suspicion, suspicion
+from selfmodel.simulation.model_factors import nominal
+from selfmodel.simulation.segment_errors import SegmentErrors
+from selfmodel.simulation.segments import observed_segments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial
@@ -23,9 +23,9 @@ OTHER = QUADRUPED.anatomy.hinges.index("back_right_shoulder")
 
 def found(tried: Trial) -> Suspicion | None:
     """The suspicion of the nominal model about a trial."""
-    predictions = Predictions(QUADRUPED, [calibration_segments_of(tried)], 1)
+    segments = SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, tried)], 1)
     parameters = nominal(QUADRUPED)
-    return suspicion(predictions, parameters, predictions.errors([parameters])[:, 0])
+    return suspicion(segments, parameters, segments.of([parameters])[:, 0])
 
 
 def changed(**signals: np.ndarray) -> Trial:
@@ -73,10 +73,10 @@ def test_a_joint_with_an_offset_is_named():
 
 
 def test_a_delay_at_the_limit_of_the_fit_is_reported():
-    predictions = Predictions(QUADRUPED, [calibration_segments_of(HEALTHY)], 1)
+    segments = SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, HEALTHY)], 1)
     parameters = nominal(QUADRUPED)
-    errors = predictions.errors([parameters])[:, 0]
-    suspect = suspicion(predictions, replace(parameters, delay=5), errors)
+    errors = segments.of([parameters])[:, 0]
+    suspect = suspicion(segments, replace(parameters, delay=5), errors)
 
     assert suspect is not None
     assert suspect.to_dict()["joint"] is None

@@ -1,23 +1,21 @@
-"""Predictions of the segments of healthy trials with models of one robot, and their errors."""
+"""Errors of short predictions with models of one robot, and the losses that compare them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import takewhile
+from itertools import groupby, takewhile
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.parameters import Parameters, model_with_parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.batch_memory import batch_bytes, hypothesis_bytes
-from selfmodel.simulation.calibration_segments import CalibrationSegments
-from selfmodel.simulation.losses import damped
-from selfmodel.simulation.outcome import SimulationStats
+from selfmodel.simulation.batch import SimulationStats, largest_batch
+from selfmodel.simulation.model_factors import Parameters, model_with_parameters
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import Segments
+from selfmodel.simulation.segments import ObservedSegments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import BASE, JOINTS
 from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
@@ -29,9 +27,32 @@ simulation that is no longer finite. The solver does not end on numbers that are
 _JOINTS: Signal = "joint_positions"
 
 
+def is_better(one: FloatArray, other: FloatArray, min_z: float) -> bool:
+    """Returns whether the losses of segments are significantly lower, paired over the segments.
+
+    Args:
+        one: Losses of the segments, ``(segments,)``.
+        other: Losses of the same segments, to be undercut.
+        min_z: Smallest mean difference, in standard errors.
+    """
+    gains = other - one
+    error = float(gains.std(ddof=1)) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return bool(gains.mean() > min_z * error and gains.mean() > 0)
+
+
+def root_mean_square(errors: FloatArray) -> float:
+    """Returns the root mean square of errors."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def pseudo_huber(errors: FloatArray) -> FloatArray:
+    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
+    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))
+
+
 @dataclass(frozen=True, eq=False)
-class Predictions:
-    """Predictions of segments with models of a robot.
+class SegmentErrors:
+    """Errors of predictions of segments with models of a robot.
 
     Attributes:
         robot: The robot as its model describes it.
@@ -40,7 +61,7 @@ class Predictions:
     """
 
     robot: Robot
-    data: Sequence[CalibrationSegments]
+    data: Sequence[ObservedSegments]
     threads: int
 
     @cached_property
@@ -49,39 +70,37 @@ class Predictions:
         first, numbers = 0, []
         for own in self.data:
             numbers += [
-                first + np.nonzero(own.compared(signal))[0]
-                for signal in CALIBRATION_ERROR_SCALES
-                if signal in own.observed
+                first + np.nonzero(own.compared(signal))[0] for signal in _compared_signals(own)
             ]
-            first += len(own.judged)
+            first += len(own.valid)
         return np.concatenate(numbers)
 
     @property
     def segments(self) -> int:
         """Number of segments of all trials."""
-        return sum(len(own.judged) for own in self.data)
+        return sum(len(own.valid) for own in self.data)
 
     @property
     def overlap(self) -> float:
         """Number of segments that contain a step, on average over the steps; at least 1."""
-        return sum(own.judged.size for own in self.data) / sum(own.steps for own in self.data)
+        return sum(own.valid.size for own in self.data) / sum(own.steps for own in self.data)
 
     def folds(self, count: int) -> IndexArray:
         """Returns the part of each segment, ``(segments,)``: each trial cut in time."""
-        parts = [np.arange(len(own.judged)) * count // len(own.judged) for own in self.data]
+        parts = [np.arange(len(own.valid)) * count // len(own.valid) for own in self.data]
         return np.concatenate(parts)
 
     def losses(self, errors: FloatArray) -> FloatArray:
         """Returns the mean loss of each segment, ``(segments,)``, from errors, ``(errors,)``.
 
-        A segment without a judged step has a loss of 0.
+        A segment without a valid step has a loss of 0.
         """
         number = self.segment_of_error
-        sums = np.bincount(number, damped(errors) ** 2, self.segments)
+        sums = np.bincount(number, pseudo_huber(errors) ** 2, self.segments)
         return np.asarray(sums / np.maximum(np.bincount(number, minlength=self.segments), 1))
 
     def joint_errors(self, errors: FloatArray) -> FloatArray:
-        """Returns the errors of joint positions, ``(judged steps, hinges)``, rad.
+        """Returns the errors of joint positions, ``(valid steps, hinges)``, rad.
 
         The error of an unknown hinge is 0.
 
@@ -90,44 +109,41 @@ class Predictions:
         """
         first, found = 0, []
         for own in self.data:
-            counts = {
-                signal: int(own.compared(signal).sum())
-                for signal in CALIBRATION_ERROR_SCALES
-                if signal in own.observed
-            }
+            counts = {signal: int(own.compared(signal).sum()) for signal in _compared_signals(own)}
             begin = first + sum(counts[signal] for signal in takewhile(_JOINTS.__ne__, counts))
-            known = own.compared(_JOINTS)[own.judged]
+            known = own.compared(_JOINTS)[own.valid]
             rows = np.zeros(known.shape)
             rows[known] = errors[begin : begin + counts[_JOINTS]]
             found.append(rows)
             first += sum(counts.values())
         return np.concatenate(found) * CALIBRATION_ERROR_SCALES[_JOINTS]
 
-    def errors(
-        self, models: Sequence[Parameters], stats: SimulationStats | None = None
-    ) -> FloatArray:
+    def of(self, models: Sequence[Parameters], stats: SimulationStats | None = None) -> FloatArray:
         """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
 
         The models are predicted in batches, so that their memory is bounded.
 
         Args:
-            models: Parameters with one control delay.
+            models: At least one model; adjacent ones with one control delay share batches.
             stats: Statistics that are updated.
         """
         stats = SimulationStats() if stats is None else stats
-        needed = max(hypothesis_bytes(self.robot, own.segments, steps=0) for own in self.data)
-        size = max(1, batch_bytes() // needed)
-        batches = [models[first : first + size] for first in range(0, len(models), size)]
-        return np.concatenate([self._batch_errors(batch, stats) for batch in batches], axis=1)
+        size = min(largest_batch(self.robot, own.segments, steps=0) for own in self.data)
+        batches = [
+            same[first : first + size]
+            for same in (list(group) for _, group in groupby(models, lambda own: own.delay))
+            for first in range(0, len(same), size)
+        ]
+        return np.concatenate([self._of_batch(batch, stats) for batch in batches], axis=1)
 
-    def with_estimated_states(self, parameters: Parameters) -> "Predictions":
-        """Returns predictions of independent segments.
+    def with_estimated_states(self, parameters: Parameters) -> "SegmentErrors":
+        """Returns the errors of independent segments.
 
         An unknown state begins as the parameters predict it.
         """
         predict_with = self._predictor([parameters], SimulationStats())
 
-        def independent(own: CalibrationSegments) -> CalibrationSegments:
+        def independent(own: ObservedSegments) -> ObservedSegments:
             segments = own.segments
             if segments.independent:
                 return own
@@ -141,18 +157,16 @@ class Predictions:
 
         return replace(self, data=[independent(own) for own in self.data])
 
-    def _batch_errors(self, models: Sequence[Parameters], stats: SimulationStats) -> FloatArray:
+    def _of_batch(self, models: Sequence[Parameters], stats: SimulationStats) -> FloatArray:
         predict_with = self._predictor(models, stats)
         rows = []
         for own in self.data:
             predicted = predict_with(own.segments)
-            for signal, scale in CALIBRATION_ERROR_SCALES.items():
-                if signal in own.observed:
-                    with np.errstate(over="ignore", invalid="ignore"):  # bounded below
-                        error = difference(
-                            signal, predicted[signal][:, :, 1:], own.observed[signal]
-                        )
-                        rows.append((error / scale)[:, own.compared(signal)])
+            for signal in _compared_signals(own):
+                with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                    error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                    error = error / CALIBRATION_ERROR_SCALES[signal]
+                rows.append(error[:, own.compared(signal)])
         errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
         return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 
@@ -175,3 +189,7 @@ class Predictions:
             ).behaviour
 
         return predict_with
+
+
+def _compared_signals(own: ObservedSegments) -> list[Signal]:
+    return [signal for signal in CALIBRATION_ERROR_SCALES if signal in own.observed]

@@ -13,12 +13,10 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
-from selfmodel.robot.joint_parameters import joint_of_motor
-from selfmodel.robot.parameters import Parameters
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration_segments import CalibrationSegments
-from selfmodel.simulation.floating.predictions import Predictions
-from selfmodel.simulation.losses import is_better
+from selfmodel.simulation.model_factors import Parameters, joint_of_motor
+from selfmodel.simulation.segment_errors import SegmentErrors, is_better
+from selfmodel.simulation.segments import ObservedSegments
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import Signal
 
@@ -63,24 +61,24 @@ class Suspicion:
 
 
 def suspicion(
-    predictions: Predictions, parameters: Parameters, errors: FloatArray
+    segments: SegmentErrors, parameters: Parameters, errors: FloatArray
 ) -> Suspicion | None:
     """Returns the probable error in the recording of healthy trials; None if there is none.
 
     Args:
-        predictions: Predictions of the healthy trials.
+        segments: Errors of segments of the healthy trials.
         parameters: The calibrated parameters.
         errors: Errors of their predictions, ``(errors,)``.
     """
-    hinges = predictions.robot.anatomy.hinges
-    predicted = predictions.joint_errors(errors)
+    hinges = segments.robot.anatomy.hinges
+    predicted = segments.joint_errors(errors)
     sizes = _root_mean_square(predicted)
-    ratios = sizes / np.maximum(_root_mean_square(_motion(predictions.data)), 1e-9)
+    ratios = sizes / np.maximum(_root_mean_square(_motion(segments.data)), 1e-9)
     ratios[sizes < MIN_ERROR] = 0.0
     biases = predicted.mean(axis=0)
     worst, leaning = int(np.argmax(ratios)), int(np.argmax(np.abs(biases)))
     if ratios[worst] > MAX_RATIO or abs(biases[leaning]) > MAX_BIAS:
-        corrected = _best_correction(predictions, parameters, errors, np.argsort(-ratios)[:WORST])
+        corrected = _best_correction(segments, parameters, errors, np.argsort(-ratios)[:WORST])
         if corrected is not None:
             return corrected
     if ratios[worst] > MAX_RATIO and abs(biases[worst]) <= MAX_BIAS:
@@ -90,7 +88,7 @@ def suspicion(
         return Suspicion(
             hinges[leaning], f"its mean error is {biases[leaning]:.2f} rad: an offset?"
         )
-    if parameters.delay >= MAX_CONTROL_DELAY > predictions.robot.control_delay:
+    if parameters.delay >= MAX_CONTROL_DELAY > segments.robot.control_delay:
         limit = f"the control delay is {parameters.delay} steps, the largest that is fitted"
         return Suspicion(None, limit)
     return None
@@ -100,14 +98,14 @@ def _root_mean_square(errors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((errors**2).mean(axis=0)))
 
 
-def _motion(data: Sequence[CalibrationSegments]) -> FloatArray:
+def _motion(data: Sequence[ObservedSegments]) -> FloatArray:
     """Returns the motion of the joints since the start of the segment, ``(steps, hinges)``, rad.
 
     The motion of an unknown hinge is 0.
     """
     name: Signal = "joint_positions"
     motion = [
-        (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.judged] for own in data
+        (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.valid] for own in data
     ]
     return np.asarray(np.nan_to_num(np.concatenate(motion)))
 
@@ -132,7 +130,7 @@ class _Correction:
     motor_order: IndexArray
     motor_signs: FloatArray
 
-    def of(self, own: CalibrationSegments) -> CalibrationSegments:
+    def of(self, own: ObservedSegments) -> ObservedSegments:
         """Returns segments with the change."""
         segments = own.segments
 
@@ -157,14 +155,14 @@ class _Correction:
 
 
 def _best_correction(
-    predictions: Predictions, parameters: Parameters, errors: FloatArray, worst: IndexArray
+    segments: SegmentErrors, parameters: Parameters, errors: FloatArray, worst: IndexArray
 ) -> Suspicion | None:
     """Returns the correction with the lowest loss; None if none is significantly better."""
-    losses = predictions.losses(errors)
+    losses = segments.losses(errors)
     best, least = None, losses
-    for each in _corrections(predictions.robot, worst):
-        changed = replace(predictions, data=[each.of(own) for own in predictions.data])
-        own = changed.losses(changed.errors([parameters])[:, 0])
+    for each in _corrections(segments.robot, worst):
+        changed = replace(segments, data=[each.of(own) for own in segments.data])
+        own = changed.losses(changed.of([parameters])[:, 0])
         if own.mean() < least.mean() and is_better(own, losses, MIN_Z):
             best, least = each, own
     return None if best is None else Suspicion(best.joint, best.cause)

@@ -9,14 +9,15 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.simulation.calibration_segments import (
+from selfmodel.simulation.requests import LEAD
+from selfmodel.simulation.segment_errors import SegmentErrors
+from selfmodel.simulation.segments import (
     HORIZON,
     MAX_SEGMENTS,
     MIN_BASE_SHARE,
-    CalibrationSegments,
-    calibration_segments_of,
+    ObservedSegments,
+    observed_segments,
 )
-from selfmodel.simulation.requests import LEAD
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import BASE, ONBOARD, STATE, estimated_states
@@ -54,14 +55,14 @@ def lost_and_late(whole: Trial) -> Trial:
     return replace(whole, behaviour=run)
 
 
-def starts(found: CalibrationSegments) -> np.ndarray:
+def starts(found: ObservedSegments) -> np.ndarray:
     past = found.segments.past
     assert past is not None
     return past.starts
 
 
 def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_state(whole: Trial):
-    found = calibration_segments_of(whole)
+    found = observed_segments(QUADRUPED, whole)
 
     assert len(starts(found)) == MAX_SEGMENTS
     assert (starts(found)[0], starts(found)[-1]) == (LEAD, STEPS - 1 - HORIZON)
@@ -72,7 +73,7 @@ def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_
 def test_where_it_was_not_they_follow_each_other_from_the_start_on(
     whole: Trial, lost: tuple[Signal, ...]
 ):
-    found = calibration_segments_of(lacking(whole, lost))
+    found = observed_segments(QUADRUPED, lacking(whole, lost))
 
     np.testing.assert_array_equal(starts(found), np.arange(0, STEPS - HORIZON, HORIZON))
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
@@ -80,7 +81,7 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(
 
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal, ...]):
-    run, found = whole.behaviour, calibration_segments_of(lacking(whole, lost))
+    run, found = whole.behaviour, observed_segments(QUADRUPED, lacking(whole, lost))
 
     for number, k in enumerate(starts(found)):
         for signal, values in found.observed.items():
@@ -98,7 +99,7 @@ def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal
 def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_before(
     whole: Trial, lost: tuple[Signal, ...]
 ):
-    segments = calibration_segments_of(lacking(whole, lost)).segments
+    segments = observed_segments(QUADRUPED, lacking(whole, lost)).segments
 
     assert set(segments.record) == set(segments.states)
     assert segments.lead == LEAD
@@ -109,7 +110,7 @@ def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_befo
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
     run = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), lost)
-    found = calibration_segments_of(run)
+    found = observed_segments(QUADRUPED, run)
     estimated = estimated_states(run.behaviour, tuple(found.segments.states))
 
     for signal, values in found.segments.states.items():
@@ -122,7 +123,7 @@ def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
 def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_came_late(
     whole: Trial,
 ):
-    found = starts(calibration_segments_of(lost_and_late(whole)))
+    found = starts(observed_segments(QUADRUPED, lost_and_late(whole)))
 
     for first, last in ((60, 79), (149, 149)):
         assert np.all((found + HORIZON < first) | (found - LEAD > last))
@@ -131,7 +132,7 @@ def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_cam
 
 
 def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(whole: Trial):
-    found = calibration_segments_of(lost_and_late(lacking(whole, BASE)))
+    found = observed_segments(QUADRUPED, lost_and_late(lacking(whole, BASE)))
     begins = starts(found)
     rows = begins[:, np.newaxis] + np.arange(1, HORIZON + 1)
 
@@ -139,7 +140,7 @@ def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(w
     assert begins.tolist() == [k for k in range(0, STEPS - HORIZON, HORIZON) if k not in (60, 70)]
     late = (rows > 149) & (begins[:, np.newaxis] - LEAD <= 149)
     missing = (rows >= 60) & (rows < 80)
-    np.testing.assert_array_equal(found.judged, ~late & ~missing)
+    np.testing.assert_array_equal(found.valid, ~late & ~missing)
 
 
 @pytest.mark.parametrize(("lost", "fewest"), [((), 33), (BASE, 17)], ids=["seen", "unseen"])
@@ -147,7 +148,7 @@ def test_none_is_predicted_under_commands_that_are_not_known(
     whole: Trial, lost: tuple[Signal, ...], fewest: int
 ):
     found = starts(
-        calibration_segments_of(lacking(lacking(whole, lost), ("commands",), slice(60, 62)))
+        observed_segments(QUADRUPED, lacking(lacking(whole, lost), ("commands",), slice(60, 62)))
     )
 
     assert np.all((found + HORIZON < 60) | (found - LEAD > 61))
@@ -159,30 +160,30 @@ def test_a_log_that_is_late_every_twentieth_step_serves():
     for phase in range(20):
         late = np.arange(STEPS) % 20 == phase
         late[0] = False
-        judged = calibration_segments_of(
-            replace(noisy, behaviour=replace(noisy.behaviour, late=late))
-        ).judged
+        valid = observed_segments(
+            QUADRUPED, replace(noisy, behaviour=replace(noisy.behaviour, late=late))
+        ).valid
 
-        assert judged.sum() >= STEPS // 10
+        assert valid.sum() >= STEPS // 10
 
 
 def test_a_base_that_was_seen_is_looked_at_however_much_else_is_missing(whole: Trial):
-    found = calibration_segments_of(lacking(whole, ("joint_velocities",), slice(25, 190)))
+    found = observed_segments(QUADRUPED, lacking(whole, ("joint_velocities",), slice(25, 190)))
 
     assert set(found.observed) == set(STATE)
     assert len(starts(found)) < MIN_BASE_SHARE * MAX_SEGMENTS
 
 
 def test_a_base_that_was_seen_for_a_while_is_looked_at_then(whole: Trial):
-    found = calibration_segments_of(lacking(whole, BASE, slice(100, None)))
+    found = observed_segments(QUADRUPED, lacking(whole, BASE, slice(100, None)))
 
     assert set(found.observed) == set(STATE)
     assert starts(found).max() + HORIZON < 100
 
 
 def test_a_base_that_was_seen_for_a_moment_is_not_looked_at(whole: Trial):
-    found = calibration_segments_of(
-        lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None))
+    found = observed_segments(
+        QUADRUPED, lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None))
     )
 
     assert set(found.observed) == set(ONBOARD)
@@ -192,22 +193,24 @@ def test_a_base_that_was_seen_for_a_moment_is_not_looked_at(whole: Trial):
 def test_a_short_trial_has_each_segment_once(steps: int):
     whole = trial(SimulatedRobot(QUADRUPED), steps)
 
-    assert starts(calibration_segments_of(whole)).tolist() == list(range(LEAD, steps - HORIZON))
-    assert starts(calibration_segments_of(lacking(whole, BASE))).tolist() == list(
+    assert starts(observed_segments(QUADRUPED, whole)).tolist() == list(
+        range(LEAD, steps - HORIZON)
+    )
+    assert starts(observed_segments(QUADRUPED, lacking(whole, BASE))).tolist() == list(
         range(0, steps - HORIZON, HORIZON)
     )
 
 
 def test_a_trial_that_is_too_short_is_refused():
     with pytest.raises(InputError, match=r"16 steps or more.* and the trial has 15: leave"):
-        calibration_segments_of(trial(SimulatedRobot(QUADRUPED), 15))
+        observed_segments(QUADRUPED, trial(SimulatedRobot(QUADRUPED), 15))
 
 
 def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
     run = replace(whole.behaviour, late=np.arange(STEPS) > 0)
 
     with pytest.raises(InputError, match=r"without late steps, .* the log has no such segment"):
-        calibration_segments_of(replace(whole, behaviour=run))
+        observed_segments(QUADRUPED, replace(whole, behaviour=run))
 
 
 def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
@@ -215,7 +218,7 @@ def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
     blinking = lacking(whole, (*BASE, "base_orientation"), slice(6, None))
 
     with pytest.raises(InputError, match=r"the log has no such segment: leave"):
-        calibration_segments_of(blinking)
+        observed_segments(QUADRUPED, blinking)
 
 
 def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(whole: Trial):
@@ -226,7 +229,7 @@ def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(
     name = run.names.motors[3]
 
     with pytest.raises(InputError, match=f"never has base_angular_velocity, commands of {name}"):
-        calibration_segments_of(replace(whole, behaviour=broken))
+        observed_segments(QUADRUPED, replace(whole, behaviour=broken))
 
 
 @pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
@@ -234,19 +237,28 @@ def test_a_hinge_without_an_encoder_is_unknown_and_the_others_are_used(
     whole: Trial, lost: tuple[Signal, ...]
 ):
     run = lacking(whole, lost)
-    found = calibration_segments_of(without_encoders(run, [3]))
-    complete = calibration_segments_of(run)
+    found = observed_segments(QUADRUPED, without_encoders(run, [3]))
+    complete = observed_segments(QUADRUPED, run)
 
     assert np.isnan(found.segments.states["joint_positions"][:, 3]).all()
     assert set(np.diff(starts(found))) == {HORIZON}
-    assert found.judged.all()
+    assert found.valid.all()
     assert set(found.observed) == set(complete.observed)
     for signal in ("joint_positions", "joint_velocities"):
         assert found.compared(signal).all(axis=(0, 1)).tolist() == [k != 3 for k in range(8)]
 
 
 def test_an_encoder_that_was_lost_late_costs_only_the_segments_after(whole: Trial):
-    found = calibration_segments_of(without_encoders(whole, [3], slice(100, None)))
+    found = observed_segments(QUADRUPED, without_encoders(whole, [3], slice(100, None)))
 
     assert starts(found).max() + HORIZON < 100
     assert all(np.isfinite(values).all() for values in found.segments.states.values())
+
+
+@pytest.mark.parametrize(("steps", "least", "most"), [(1000, 1.0, 1.0), (60, 5.0, 10.0)])
+def test_segments_of_a_long_trial_share_no_step_and_those_of_a_short_one_do(
+    steps: int, least: float, most: float
+):
+    found = observed_segments(QUADRUPED, trial(SimulatedRobot(QUADRUPED), steps))
+
+    assert least <= SegmentErrors(QUADRUPED, [found], 1).overlap <= most

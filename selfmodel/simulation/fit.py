@@ -1,0 +1,515 @@
+"""Fit of nested sets of parameters to trials of the healthy robot, and its held-out test.
+
+The sets grow: none; the control delay; the stiffness and damping of contacts; factors. A set is
+chosen only if it predicts segments that were left out of its fit significantly better than the set
+chosen before. Delay and contacts are found by exhaustive search; factors by a box-constrained
+nonlinear least squares (``mujoco.minimize``) with a Gaussian prior for those that the trials do not
+determine.
+
+A robot with a floating base has one set of factors. With a fixed base, which determines neither
+masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
+friction and armature of all joints together, of each kind of joint, and of each joint.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import mujoco.minimize
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, as_delay
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.batch import SimulationStats
+from selfmodel.simulation.model_factors import (
+    JOINT_QUANTITIES,
+    SHARED,
+    Parameters,
+    joint_of_motor,
+    kinds_of_joints,
+    nominal,
+)
+from selfmodel.simulation.segment_errors import (
+    SegmentErrors,
+    is_better,
+    pseudo_huber,
+    root_mean_square,
+)
+
+NOMINAL, DELAY, CONTACTS, FACTORS = "nominal", "delay", "contacts", "factors"
+"""Names of the nested sets of parameters of a robot with a floating base."""
+
+JOINT_SETS = ("shared", "kinds", "joints")
+"""Names of the nested sets of factors of a robot with a fixed base: one per quantity, one per
+quantity and kind of joint, one per quantity and joint."""
+
+PRIOR_DEVIATIONS = {"root_mass": 0.15, "limb_mass": 0.15, "motor_gains": 0.15}
+PRIOR_DEVIATIONS |= {"friction": 0.3, "damping": 0.3}
+"""Standard deviation of the prior on the logarithm of a factor. That of friction and of damping is
+larger: models often contain guesses of them."""
+
+JOINT_PRIOR_DEVIATIONS = {"motor_gains": 0.3, "joint_damping": 0.5}
+JOINT_PRIOR_DEVIATIONS |= {"dry_friction": 1.0, "armature": 1.0}
+"""As ``PRIOR_DEVIATIONS``, of a robot with a fixed base. Data sheets state gains; models often
+contain guesses of friction and armature. The gains include the unknown masses."""
+
+MAX_LOG_FACTOR, MAX_JOINT_LOG_FACTOR = 1.2, 3.0
+"""Bound on the absolute logarithm of a factor, 0.3 to 3.3; and of damping, dry friction and
+armature of a joint, 0.05 to 20."""
+
+CANDIDATE_STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
+CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
+"""Factors of the stiffness and the damping of contacts in the exhaustive search. Slopes are
+dominated by noise, because both change the times of contacts."""
+
+FOLDS = 4
+"""Consecutive parts of each trial that are left out in turn."""
+
+MIN_Z = 1.645
+"""Standard errors by which a larger set must predict segments better that it was not fitted to: a
+one-sided level of 5 %."""
+
+CONTACTS_MIN_Z = 3.0
+"""As ``MIN_Z``, for the contacts: the best of 25 candidates gains by chance, too.
+Times the square root of the overlap: segments of a short trial share steps."""
+
+INDEPENDENT_ERRORS = 100
+"""Independent errors of one unit that all errors together count as in the posterior deviations:
+fewer than in the fit, because no model has a factor for each limb and contact. With 100, the
+intervals of the robots with seeds 0 to 63 of ``benchmarks.calibration.robots`` contained the truth
+at about their rates; with 400, those of determined factors contained it too rarely."""
+
+UNDETERMINED_SHARE = 0.7
+"""Deviation of a parameter, relative to that of its prior, from which on the trials count as not
+having determined it: they halve the variance of a parameter that they determine."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """Numbers of a fit, which depend on whether the base makes contacts.
+
+    Attributes:
+        prior_weight: Weight of the prior relative to the data. All errors together count as
+            1 / prior_weight**2 independent errors, whatever their number: errors of neighbouring
+            steps and columns are strongly correlated.
+        step: Step of the finite differences of a logarithm, relative to the prior's deviation;
+            None for ``CONTACT_STEP``.
+        iterations: Largest number of iterations of the least-squares solver.
+        delay_iterations: As ``iterations``, for each neighbouring delay; 0 to keep the delay.
+        regularizers: Smallest and largest regularizer of the solver, and the factor from one to the
+            next; each that is tried takes a simulation.
+    """
+
+    prior_weight: float
+    step: float | None
+    iterations: int
+    delay_iterations: int
+    regularizers: Mapping[str, float]
+
+
+CONTACT_STEP = 0.1
+"""Step of the central differences of a logarithm where there are contacts. Smaller steps are
+dominated by noise: a parameter changes the time at which a foot makes contact."""
+
+FLOATING = Method(0.05, None, 3, 0, {})
+FIXED = Method(0.01, 0.05, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
+"""Long simulations without contacts have errors far below their unit, so their prior weighs less
+than that of short predictions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Fit of one set of parameters to trials.
+
+    Attributes:
+        name: Name of the set.
+        parameters: The parameters.
+        deviations: Posterior standard deviation of the logarithm of each factor, by the name of
+            its quantity in ``Parameters``; that of the prior for a factor that was not fitted.
+        errors: Errors of its predictions, ``(errors,)``.
+        held_out: Errors in segments that were each left out of the fit, ``(errors,)``.
+        is_fitted: Whether the set contains factors.
+    """
+
+    name: str
+    parameters: Parameters
+    deviations: Mapping[str, FloatArray]
+    errors: FloatArray
+    held_out: FloatArray
+    is_fitted: bool = False
+
+
+def prior_deviations(robot: Robot) -> dict[str, FloatArray]:
+    """Returns the standard deviation of the prior of each factor's logarithm, by quantity."""
+    sizes = {"motor_gains": robot.model.nu}
+    sizes |= dict.fromkeys(JOINT_QUANTITIES, len(robot.anatomy.hinges))
+    own = PRIOR_DEVIATIONS | (JOINT_PRIOR_DEVIATIONS if robot.has_fixed_base else {})
+    return {name: np.full(sizes.get(name, 1), deviation) for name, deviation in own.items()}
+
+
+def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
+    """Returns whether trials determine parameters, given both standard deviations."""
+    return np.asarray(deviation < UNDETERMINED_SHARE * prior)
+
+
+def nested_fits(segments: SegmentErrors, before: FloatArray, stats: SimulationStats) -> list[Fit]:
+    """Fits the nested sets of parameters.
+
+    Args:
+        segments: Segments of the healthy trials.
+        before: Errors of the nominal model, ``(errors,)``.
+        stats: Statistics that are updated by the predictions of fitted factors.
+
+    Returns:
+        The nominal set, then each set that was chosen; the last is the best.
+    """
+    robot, folds = segments.robot, segments.folds(FOLDS)
+    start, prior = nominal(robot), prior_deviations(robot)
+    chosen = [Fit(NOMINAL, start, prior, before, before)]
+
+    def is_chosen(fit: Fit, min_z: float) -> bool:
+        own, other = (segments.losses(one.held_out) for one in (fit, chosen[-1]))
+        better = is_better(own, other, min_z)
+        if better:
+            chosen.append(fit)
+        return better
+
+    best = start
+    if not robot.has_fixed_base:
+        delays = {own: segments.of([own])[:, 0] for own in _with_delays(start) if own != start}
+        delays[start] = before
+        best, held_out = _best(segments, delays, folds)
+        is_chosen(Fit(DELAY, best, prior, delays[best], held_out), MIN_Z)
+        contacts = _contacts(segments, best, delays[best])
+        found, held_out = _best(segments, contacts, folds)
+        contact_fit = Fit(CONTACTS, found, prior, contacts[found], held_out)
+        if is_chosen(contact_fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
+            best = found
+    for number, (name, basis) in enumerate(bases(robot)):
+        fitter = _Fitter(segments, basis, FIXED if robot.has_fixed_base else FLOATING)
+        if robot.has_fixed_base and not number:
+            best, x = fitter.solved(fitter.with_best_delay(best))
+        else:
+            best, x = fitter.with_near_delay(*fitter.solved(best))
+        point = best
+        errors = segments.of([point], stats)[:, 0]
+        if root_mean_square(pseudo_huber(errors)) >= root_mean_square(
+            pseudo_huber(chosen[-1].errors)
+        ):
+            continue
+        # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
+        slopes = fitter.slopes(point, x, errors)
+        parts = folds[segments.segment_of_error]
+        left_out = [slopes.without(parts == part) for part in range(FOLDS)]
+        every = segments.of([basis.applied(point, logarithms) for logarithms in left_out])
+        held_out = every[np.arange(len(parts)), parts]
+        deviations = prior | basis.by_quantity(
+            slopes.deviations_of_segments(segments.segment_of_error)
+            if robot.has_fixed_base
+            else slopes.deviations()
+        )
+        is_chosen(Fit(name, point, deviations, errors, held_out, is_fitted=True), MIN_Z)
+    return chosen
+
+
+def _with_delays(start: Parameters) -> list[Parameters]:
+    return [replace(start, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
+
+
+def _cost(errors: FloatArray) -> float:
+    return float(np.sum(pseudo_huber(errors) ** 2))
+
+
+def _contacts(
+    segments: SegmentErrors, start: Parameters, errors: FloatArray
+) -> dict[Parameters, FloatArray]:
+    """Returns the errors with each candidate of stiffness and damping, given those of the start."""
+    candidates = [
+        replace(start, contact_stiffness=stiffness, contact_damping=damping)
+        for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
+    ]
+    new = [candidate for candidate in candidates if candidate != start]
+    return {start: errors, **dict(zip(new, segments.of(new).T, strict=True))}
+
+
+def _best(
+    segments: SegmentErrors, candidates: Mapping[Parameters, FloatArray], folds: IndexArray
+) -> tuple[Parameters, FloatArray]:
+    """Returns the best candidate, and the errors of each part by the best one without it."""
+    losses = {own: segments.losses(errors) for own, errors in candidates.items()}
+    best = min(candidates, key=lambda own: _cost(candidates[own]))
+    parts = folds[segments.segment_of_error]
+    held_out = np.empty(len(parts))
+    for part in range(FOLDS):
+        kept = folds != part
+        without = min(losses, key=lambda own: float(losses[own][kept].sum()))
+        held_out[parts == part] = candidates[without][parts == part]
+    return best, held_out
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Coordinates of a set of factors: each is shared by a group of motors or hinges.
+
+    Attributes:
+        groups: For each quantity the coordinate of each of its factors.
+        prior: Standard deviation of the prior of each coordinate, ``(coordinates,)``.
+        bounds: Bound on the absolute value of each coordinate, ``(coordinates,)``.
+    """
+
+    groups: dict[str, IndexArray]
+    prior: FloatArray
+    bounds: FloatArray
+
+    def by_quantity(self, coordinates: FloatArray) -> dict[str, FloatArray]:
+        """Returns the value of each factor by quantity, given that of each coordinate."""
+        return {quantity: coordinates[groups] for quantity, groups in self.groups.items()}
+
+    def applied(self, start: Parameters, logarithms: FloatArray) -> Parameters:
+        """Returns parameters with the factors of some logarithms; all else is the start's."""
+        factors: dict[str, Any] = {
+            quantity: tuple(values.tolist()) if quantity not in SHARED else float(values[0])
+            for quantity, values in self.by_quantity(np.exp(logarithms)).items()
+        }
+        return replace(start, **factors)
+
+    def coordinates(self, parameters: Parameters) -> FloatArray:
+        """Returns the mean logarithm of each group, ``(coordinates,)``."""
+        sums, counts = np.zeros((2, len(self.prior)))
+        for quantity, groups in self.groups.items():
+            factors = getattr(parameters, quantity) or (1.0,) * len(groups)
+            np.add.at(sums, groups, np.log(factors))
+            np.add.at(counts, groups, 1.0)
+        return np.asarray(sums / counts)
+
+
+def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
+    """Yields the name and the coordinates of each set of factors of a robot."""
+    prior = prior_deviations(robot)
+    if not robot.has_fixed_base:
+        quantities = (*SHARED, "motor_gains")
+        deviations = np.concatenate([prior[quantity] for quantity in quantities])
+        ends = np.cumsum([len(prior[quantity]) for quantity in quantities])
+        groups = np.split(np.arange(len(deviations)), ends[:-1])
+        names = dict(zip(quantities, groups, strict=True))
+        yield FACTORS, Basis(names, deviations, np.full(len(deviations), MAX_LOG_FACTOR))
+        return
+    hinges, last = np.arange(len(robot.anatomy.hinges)), 0
+    for name, kinds in zip(
+        JOINT_SETS, (np.zeros_like(hinges), kinds_of_joints(robot), hinges), strict=True
+    ):
+        names, deviations, bounds = {}, np.empty(0), np.empty(0)
+        for quantity in JOINT_PRIOR_DEVIATIONS:
+            joints = joint_of_motor(robot) if quantity == "motor_gains" else hinges
+            _, own = np.unique(kinds[joints], return_inverse=True)
+            names[quantity] = len(deviations) + own
+            size = int(own.max(initial=-1)) + 1
+            bound = MAX_LOG_FACTOR if quantity == "motor_gains" else MAX_JOINT_LOG_FACTOR
+            deviations = np.append(deviations, np.full(size, JOINT_PRIOR_DEVIATIONS[quantity]))
+            bounds = np.append(bounds, np.full(size, bound))
+        if len(deviations) > last:  # joints may all be of one kind, or each of its own
+            last = len(deviations)
+            yield name, Basis(names, deviations, bounds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitter:
+    """Least-squares fits of one set of factors.
+
+    Attributes:
+        segments: Segments of the healthy trials.
+        basis: Coordinates of the set.
+        method: Numbers of the fit.
+    """
+
+    segments: SegmentErrors
+    basis: Basis
+    method: Method
+
+    @property
+    def steps(self) -> FloatArray:
+        """Steps of the finite differences, ``(coordinates, coordinates)``: a diagonal."""
+        prior = self.basis.prior
+        step = self.method.step
+        return np.diag(np.full(len(prior), CONTACT_STEP) if step is None else step * prior)
+
+    def solved(
+        self, start: Parameters, iterations: int | None = None
+    ) -> tuple[Parameters, FloatArray]:
+        """Returns the fit of the factors, from those of the start, and its coordinates.
+
+        Delay and contacts are the start's.
+        """
+        basis, steps = self.basis, self.steps
+        width = np.diag(steps)
+
+        def residual(logarithms: FloatArray) -> FloatArray:
+            """Returns the residuals of the data, then those of the prior."""
+            rows = np.reshape(logarithms, (len(logarithms), -1))
+            errors = self.segments.of([basis.applied(start, row) for row in rows.T])
+            weight = np.sqrt(len(errors)) * self.method.prior_weight / basis.prior
+            return np.concatenate([pseudo_huber(errors), weight[:, np.newaxis] * rows])
+
+        def jacobian(x: FloatArray, at: FloatArray) -> FloatArray:
+            if self.method.step is None:
+                return np.asarray((residual(x + steps) - residual(x - steps)) / (2 * width))
+            return np.asarray((residual(x + steps) - at) / width)
+
+        bounds = basis.bounds[:, np.newaxis]
+        fitted, _ = mujoco.minimize.least_squares(
+            basis.coordinates(start)[:, np.newaxis],
+            residual,
+            bounds=[-bounds, bounds],
+            jacobian=jacobian,
+            max_iter=iterations or self.method.iterations,
+            xtol=1e-3,
+            verbose=mujoco.minimize.Verbosity.SILENT,
+            **self.method.regularizers,
+        )
+        x = np.asarray(fitted.ravel())
+        return basis.applied(start, x), x
+
+    def with_best_delay(self, start: Parameters) -> Parameters:
+        """Returns the fit with the best delay: of whole control steps, then of parts of one.
+
+        A wrong gain or damping looks like a wrong delay, so each is tried with a short fit.
+        """
+        parts, solved = self._delay_parts, dict[int, tuple[float, Parameters]]()
+
+        def cost(delay: int) -> float:
+            if delay not in solved:
+                moved = replace(start, delay=as_delay(delay, parts))
+                point, _ = self.solved(moved, self.method.delay_iterations)
+                solved[delay] = _cost(self.segments.of([point])), point
+            return solved[delay][0]
+
+        best = min(range(0, MAX_CONTROL_DELAY * parts + 1, parts), key=cost)
+        step = parts // 2
+        while step:
+            near = (best + move for move in (-step, 0, step))
+            best = min((own for own in near if 0 <= own <= MAX_CONTROL_DELAY * parts), key=cost)
+            step //= 2
+        return solved[best][1]
+
+    @property
+    def _delay_parts(self) -> int:
+        """Parts of a control step of which a delay is a multiple."""
+        robot = self.segments.robot
+        return 1 if robot.model.na else robot.substeps
+
+    def with_near_delay(self, start: Parameters, x: FloatArray) -> tuple[Parameters, FloatArray]:
+        """Returns the fit with the best delay around that of a fit, and its coordinates.
+
+        The delay moves by a physics step at a time, as long as the fit improves.
+        """
+        iterations, parts = self.method.delay_iterations, self._delay_parts
+        if not iterations:
+            return start, x
+        best, least = (start, x), _cost(self.segments.of([start]))
+        for direction in (-1, 1):
+            while True:
+                delay = round(best[0].delay * parts) + direction
+                if not 0 <= delay <= MAX_CONTROL_DELAY * parts:
+                    break
+                moved = self.solved(replace(best[0], delay=as_delay(delay, parts)), iterations)
+                cost = _cost(self.segments.of(moved[:1]))
+                if not cost < least:
+                    break
+                best, least = moved, cost
+        return best
+
+    def slopes(self, point: Parameters, x: FloatArray, errors: FloatArray) -> "_Slopes":
+        """Returns the residuals around a fit, given its coordinates and its errors."""
+        independent = self.segments.with_estimated_states(point)
+        steps = self.steps
+        moved = [self.basis.applied(point, own) for own in np.concatenate([x + steps, x - steps])]
+        residuals = pseudo_huber(errors)
+        change = pseudo_huber(independent.of(moved)) - residuals[:, np.newaxis]
+        ahead, behind = np.split(change / np.tile(np.diag(steps), 2), 2, axis=1)
+        return _Slopes(self.basis, self.method, x, residuals, ahead, -behind)
+
+
+@dataclass(frozen=True, eq=False)
+class _Slopes:
+    """The residuals of the data around a fit, without those of the prior.
+
+    Attributes:
+        basis: Coordinates of the fit.
+        method: Numbers of the fit.
+        x: Fitted coordinates, ``(coordinates,)``.
+        residuals: Residuals of the fit, ``(residuals,)``.
+        ahead: Forward differences of the residuals, ``(residuals, coordinates)``.
+        behind: Backward differences.
+    """
+
+    basis: Basis
+    method: Method
+    x: FloatArray
+    residuals: FloatArray
+    ahead: FloatArray
+    behind: FloatArray
+
+    def without(self, left_out: BoolArray) -> FloatArray:
+        """Returns the coordinates of the fit without some residuals, by one Gauss-Newton step.
+
+        The step of the whole fit, which the solver left, is subtracted.
+
+        Args:
+            left_out: Mask of the residuals, ``(residuals,)``.
+        """
+        step = self._step(~left_out) - self._step(np.ones_like(left_out))
+        return np.asarray(np.clip(self.x + step, -self.basis.bounds, self.basis.bounds))
+
+    def _step(self, used: BoolArray) -> FloatArray:
+        slopes, residuals = (self.ahead + self.behind)[used] / 2, self.residuals[used]
+        weight = 1 / (max(len(residuals), 1) * self.method.prior_weight**2)
+        prior = self.basis.prior**-2
+        gradient = slopes.T @ residuals * weight + prior * self.x
+        return np.asarray(-np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient))
+
+    def deviations(self) -> FloatArray:
+        """Returns the posterior standard deviation of each coordinate where there are contacts."""
+        weight = INDEPENDENT_ERRORS / len(self.residuals)
+        information = consistent_information(self.ahead, self.behind) * weight
+        return np.asarray(
+            np.sqrt(np.diag(np.linalg.inv(np.diag(self.basis.prior**-2) + information)))
+        )
+
+    def deviations_of_segments(self, segment: IndexArray) -> FloatArray:
+        """Returns the posterior standard deviation of each coordinate without contacts.
+
+        The variance of the data is that of the segments' gradients (Huber 1967, White 1980), which
+        includes model error and the correlation of neighbouring steps; that of the prior is added.
+
+        Args:
+            segment: Number of the segment of each residual, ``(residuals,)``.
+        """
+        slopes, prior = (self.ahead + self.behind) / 2, self.basis.prior
+        used = np.unique(segment)
+        scores = slopes * self.residuals[:, np.newaxis]
+        gradients = np.array([scores[segment == number].sum(axis=0) for number in used])
+        spread = len(used) / max(len(used) - 1, 1) * gradients.T @ gradients
+        weight = len(self.residuals) * self.method.prior_weight**2
+        inverse = np.linalg.inv(slopes.T @ slopes + np.diag(weight * prior**-2))
+        variance = np.diag(inverse @ (spread + np.diag(weight**2 * prior**-2)) @ inverse)
+        return np.asarray(np.minimum(np.sqrt(variance), prior))
+
+
+def consistent_information(ahead: FloatArray, behind: FloatArray) -> FloatArray:
+    """Returns the Fisher information on parameters, ``(parameters, parameters)``.
+
+    A small change of a parameter changes the times of contacts, and with them the residuals at
+    random. The square of one finite difference includes the square of this noise, which is no
+    information: a parameter without influence would appear to be known. The noise of the forward
+    and of the backward difference is independent, so their product does not include it. Negative
+    eigenvalues are set to 0.
+
+    Args:
+        ahead: Forward differences of the residuals, ``(residuals, parameters)``.
+        behind: Backward differences.
+    """
+    product = ahead.T @ behind
+    values, vectors = np.linalg.eigh((product + product.T) / 2)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

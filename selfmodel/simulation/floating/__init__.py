@@ -1,1 +1,0 @@
-"""Calibration of robots with a floating base."""

@@ -1,1 +1,0 @@
-"""Calibration of the joints of a robot with a fixed base."""
