@@ -21,7 +21,7 @@ from selfmodel.cli.arguments.options import (
     SelfModel,
     Threads,
 )
-from selfmodel.cli.diagnosed_logs import diagnose_logs
+from selfmodel.cli.diagnose import diagnose_logs
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind

@@ -63,13 +63,6 @@ def test_an_unknown_reading_contradicts_nothing(quadruped: Robot, gait: Controll
     assert not contradiction_losses([failed], run, PIECES).any()
 
 
-def test_two_contradicted_faults_cost_twice(quadruped: Robot, gait: Controller):
-    run = behaviour_of(quadruped, gait, "intact")
-    angles = parse("sensor:front_left_angle+sensor:back_left_angle", quadruped.anatomy)
-
-    assert (contradiction_losses([angles], run, PIECES) == 2 * CONTRADICTION).all()
-
-
 @pytest.mark.parametrize(
     ("fault", "contradicted"),
     [("gain0.2", [True, True, True, False]), ("bias0.3", [True, True, True, True])],

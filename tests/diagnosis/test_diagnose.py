@@ -1,7 +1,6 @@
 """The diagnostic search: rank of the truth, of diverged models and of ties, and refusals."""
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -80,35 +79,16 @@ def test_a_diverging_hypothesis_is_infinitely_far_and_a_diverging_gait_is_worst(
     assert simulator.stats.diverged == 2
 
 
-def test_the_distance_to_several_trials_is_the_sum_of_the_distances(quadruped: Robot):
-    trials = [
-        logged(quadruped, "break:front_left_knee", controller)
-        for controller in random_controllers(quadruped, 3)
-    ]
-    trials = [dataclasses.replace(t, path=str(i)) for i, t in enumerate(trials)]
-    hypotheses = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
-    diagnose = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, SMALL)
-    alone = [diagnose.losses.distances(hypotheses, [trial]) for trial in trials]
-
-    assert np.all(np.array(alone) > 0)
-    np.testing.assert_allclose(
-        diagnose.losses.distances(hypotheses, trials), sum(alone), rtol=1e-12
-    )
-
-
 class Indifferent:
-    """A comparator to which every hypothesis is as good as any other, or that breaks the rules."""
+    """A comparator to which every hypothesis is as good as any other."""
 
     name = "indifferent"
-
-    def __init__(self, distances: Callable[[int], object] = np.zeros) -> None:
-        self._distances = distances
 
     def prepare(self, _trial: Trial) -> Prepared:
         """Prepares nothing of the trial."""
         return Prepared(
             ClosedLoop(record=("base_position",)),
-            lambda simulated: self._distances(len(simulated["base_position"])),
+            lambda simulated: np.zeros(len(simulated["base_position"])),
         )
 
 
@@ -123,27 +103,6 @@ def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_firs
 
     assert faults == sorted(faults)
     assert faults[0] < faults[-1]
-
-
-@pytest.mark.parametrize(
-    ("distances", "said"),
-    [
-        (lambda _: 0.0, r"returned losses \(1,\) for 2 simulations"),
-        (lambda n: np.zeros((n, 1)), r"returned losses \(2, 1, 1\) for 2"),
-        (lambda n: np.full(n, -1.0), "returned a distance that is not a number of at least 0"),
-        (lambda n: np.full(n, np.nan), "returned a distance that is not a number of at least 0"),
-    ],
-)
-def test_a_comparator_that_breaks_its_contract_is_named(
-    distances: Callable[[int], object], said: str, quadruped: Robot
-):
-    (controller,) = random_controllers(quadruped, 1)
-    trial = logged(quadruped, "intact", controller)
-    diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(distances), SMALL)
-    both = [INTACT, parse("jam:back_left_knee", quadruped.anatomy)]
-
-    with pytest.raises(InputError, match=f"the comparator 'indifferent' {said}"):
-        diagnose.losses.distances(both, [trial])
 
 
 @pytest.mark.parametrize(

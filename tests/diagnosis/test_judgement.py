@@ -90,6 +90,18 @@ def test_the_ranking_has_each_set_of_faults_once_with_its_best_severities(
     assert distances == sorted(distances)
 
 
+def test_the_verdict_does_not_depend_on_what_the_search_compared(quadruped: Robot):
+    problem = problem_of(quadruped, trial(quadruped, LAME, "lame.mcap"))
+    best = parse(LAME, quadruped.anatomy)
+    compared = ([best, INTACT], [INTACT, *(one for some in parsed(quadruped) for one in some)])
+
+    first, second = (judged(best, some, problem) for some in compared)
+
+    assert first.ranked != second.ranked
+    alike = dataclasses.replace(second, ranked=first.ranked)
+    assert alike == first
+
+
 def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
     quadruped: Robot,
 ):

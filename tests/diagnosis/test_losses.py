@@ -251,20 +251,6 @@ def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_consi
     assert search.distinct_hypotheses <= len(considered) < len(simulated)
 
 
-def test_what_is_remembered_is_what_was_simulated_whatever_was_asked_for_in_between(
-    quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
-):
-    alone = [
-        LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION).losses([one], trials)[0]
-        for one in three
-    ]
-    evidence = LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
-    evidence.losses(three[1:], trials[1:])
-    evidence.losses(three[:2], trials)
-
-    assert np.array_equal(evidence.losses(three, trials), alone)
-
-
 def test_a_trial_is_known_by_its_content_and_not_by_its_path(
     quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
 ):
@@ -296,13 +282,6 @@ def test_a_hypothesis_that_diverges_is_infinitely_far_and_harms_no_other(
     assert np.all(np.isinf(losses[0]))
     assert np.array_equal(losses[1:], alone)
     assert evidence.distances([bad], trials) == np.inf
-
-
-def test_only_a_comparator_with_losses_allows_a_paired_test(quadruped: Robot, trials: list[Trial]):
-    simulator = Simulator(quadruped, 1)
-
-    assert LossTable(simulator, SEGMENT_PREDICTION).is_piecewise(trials)
-    assert not LossTable(simulator, FORWARD_DISPLACEMENT).is_piecewise(trials)
 
 
 def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: list[Trial]):
