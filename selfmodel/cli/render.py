@@ -31,7 +31,6 @@ from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.logs.results import best_hypothesis
 
@@ -147,10 +146,7 @@ def render(
         data = strip(film, kind[1:])
     else:
         data = (gif if kind == ".gif" else mp4)(_shown(frames, len(film.time)))
-    try:
-        replace_file(out, data)
-    except LogWriteError as error:
-        raise WorkError(f"{out}: it could not be written: {error.reason}") from error
+    replace_file(out, data)
     drawn_by = "matplotlib" if library is None else "mujoco"
     if as_json:
         told = {"log": str(file), "robot": given.robot.name, "model": model, **facts}

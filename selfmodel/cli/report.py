@@ -25,7 +25,6 @@ from selfmodel.cli.diagnose import diagnose_logs
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
-from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, write_new
 from selfmodel.report.campaign import is_campaign, report_of_campaign
 from selfmodel.report.charts import Report
@@ -131,10 +130,7 @@ def report(
             )
         )
     data = html_of(made)
-    try:
-        kept = write_new(out, data)
-    except LogWriteError as error:
-        raise WorkError(f"the report was not written: {error}") from error
+    kept = write_new(out, data)
     if kept != out:
         raise WorkError(
             f"{out} was created meanwhile, and is not overwritten; the finished report is {kept}"

@@ -29,7 +29,6 @@ from selfmodel.cli.film import Film, film_of
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.replayed_log import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.errors import LogWriteError
 from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.robot.motion import (
     Shape,
@@ -147,7 +146,7 @@ def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
 
     Raises:
         InputError: Rerun is not installed.
-        WorkError: The file could not be written.
+        LogWriteError: The disk is full, or failed.
     """
     recording = import_rerun().RecordingStream(APPLICATION)
     with tempfile.TemporaryDirectory() as folder:
@@ -156,10 +155,7 @@ def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
         fill_recording(recording, given, found)
         recording.disconnect()  # the file is complete
         data = part.read_bytes()
-    try:
-        replace_file(out, data)
-    except LogWriteError as error:
-        raise WorkError(f"{out}: it could not be written: {error.reason}") from error
+    replace_file(out, data)
     return len(data)
 
 

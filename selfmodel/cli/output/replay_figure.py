@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 from selfmodel.cli.arguments.inputs import check_folder
 from selfmodel.cli.output.plain import figure_text
-from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.errors import LogWriteError
+from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing, replace_file
 from selfmodel.logs.reader import TrialLog
 from selfmodel.simulation.trial_replay import Replay
@@ -48,7 +47,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
         hypothesis: Notation of the simulated hypothesis.
 
     Raises:
-        WorkError: The file could not be written.
+        LogWriteError: The disk is full, or failed.
     """
     logged = log.trial.behaviour
     figure = Figure(figsize=(8, 6), layout="constrained")
@@ -79,10 +78,7 @@ def draw(path: Path, log: TrialLog, found: Replay, hypothesis: str) -> None:
     path_axes.set_title(_title(log, found))
     data = io.BytesIO()
     figure.savefig(data, format=path.suffix.lower().removeprefix("."), dpi=150)
-    try:
-        replace_file(path, data.getvalue())
-    except LogWriteError as error:
-        raise WorkError(f"{path}: the figure could not be written: {error.reason}") from error
+    replace_file(path, data.getvalue())
 
 
 def _title(log: TrialLog, found: Replay) -> str:
