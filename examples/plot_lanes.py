@@ -2,8 +2,8 @@
 
 Usage: MUJOCO_GL=osmesa python examples/plot_lanes.py RUN_FOLDER FIGURE.png
 
-Each lane shows the robot at several moments of one trial. A detached limb is not drawn. The picture
-needs EGL or OSMesa, as ``selfmodel render`` does.
+Each lane shows the robot at several moments of one trial, and a line each 5 m. A detached limb is
+not drawn. The picture needs EGL or OSMesa, as ``selfmodel render`` does.
 """
 
 import json
@@ -20,11 +20,20 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import TrialLog, read_log
 from selfmodel.logs.robots import common_robot
 
-WIDTH, HEIGHT = 1280, 560
-LANE = 1.15
+WIDTH, HEIGHT = 1280, 400
+LANE = 1.6
 """Distance between two lanes, m."""
 
-MOMENTS = 6
+MOMENTS = 11
+RULE = 5.0
+"""Distance between two lines across the lanes, m."""
+
+MARGIN = 2.0
+"""Ground that is seen beyond both ends of the longest lane, m."""
+
+FIELD_OF_VIEW = 14.0
+"""Vertical angle of the camera, degrees."""
+
 COLOURS = {
     "before": (0.13, 0.30, 0.47),
     "after": (0.77, 0.25, 0.18),
@@ -58,17 +67,25 @@ def _rendered(
 ) -> np.ndarray:
     """The picture of all lanes in one scene, ``(height, width, 3)``."""
     robot = common_robot([log for log, _ in lanes])
+    longest = max(log.trial.displacement for log, _ in lanes)
+    rules = "".join(
+        f'<geom type="box" size=".02 {1.6 * LANE} .002" pos="{x} 0 0" rgba=".8 .8 .78 1"/>'
+        for x in np.arange(0, longest + MARGIN, RULE)
+    )
     floor = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><visual><global offwidth="{WIDTH}" offheight="{HEIGHT}" fovy="14"/>
+        f"""<mujoco><visual><global offwidth="{WIDTH}" offheight="{HEIGHT}"
+        fovy="{FIELD_OF_VIEW}"/>
         <headlight ambient=".45 .45 .45" diffuse=".35 .35 .35" specular="0 0 0"/></visual>
         <worldbody><light directional="true" pos="0 0 6" dir=".15 .35 -1" diffuse=".45 .45 .45"/>
-        <geom type="plane" size="40 40 .1" rgba=".97 .97 .95 1"/></worldbody></mujoco>"""
+        <geom type="plane" size="90 90 .1" rgba=".97 .97 .95 1"/>{rules}</worldbody></mujoco>"""
     )
     data = mujoco.MjData(floor)
     mujoco.mj_forward(floor, data)
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = (3.1, 0.0, 0.1)
-    camera.azimuth, camera.elevation, camera.distance = 90, -30, 15.5
+    camera.lookat[:] = (longest / 2, 0.0, 0.1)
+    camera.azimuth, camera.elevation = 90, -30
+    seen = 2 * np.tan(np.radians(FIELD_OF_VIEW / 2)) * WIDTH / HEIGHT
+    camera.distance = (longest + 2 * MARGIN) / seen
     with mujoco.Renderer(floor, HEIGHT, WIDTH) as renderer:
         renderer.update_scene(data, camera)
         for row, ((log, notation), colour) in enumerate(zip(lanes, colours, strict=True)):

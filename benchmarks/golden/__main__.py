@@ -112,7 +112,7 @@ def compare(options: argparse.Namespace) -> None:
         outcome = "different" if close else "same to 1e-9" if exact else "same"
         counts[outcome] += 1
         if outcome != "same":
-            print(f"{name}: {outcome}", *(close or exact)[:8], sep="\n    ")
+            print(f"{name}: {outcome}", *(line[:200] for line in (close or exact)[:8]), sep="\n    ")
     missing = sorted(old.keys() ^ new.keys())
     for name in missing:
         print(f"{name}: only in {options.new if name in new else options.old}")
