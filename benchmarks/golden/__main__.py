@@ -50,6 +50,7 @@ LONGEST_LIST = 24
 """Floats of a list that are kept as numbers; of a longer one, a digest is."""
 
 TOLERANCE = 1e-9
+LONGEST_LINE = 200
 
 
 def main() -> None:
@@ -112,7 +113,8 @@ def compare(options: argparse.Namespace) -> None:
         outcome = "different" if close else "same to 1e-9" if exact else "same"
         counts[outcome] += 1
         if outcome != "same":
-            print(f"{name}: {outcome}", *(line[:200] for line in (close or exact)[:8]), sep="\n    ")
+            shown = (line[:LONGEST_LINE] for line in (close or exact)[:8])
+            print(f"{name}: {outcome}", *shown, sep="\n    ")
     missing = sorted(old.keys() ^ new.keys())
     for name in missing:
         print(f"{name}: only in {options.new if name in new else options.old}")
