@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import GOOD, SchemaMismatchError
 from selfmodel.logs.reader import TrialLog
-from selfmodel.robot.mjcf.adaptation import MAX_SUBSTEPS
-from selfmodel.robot.mjcf.isolated_model import check_compiles
+from selfmodel.robot.mjcf.load import MAX_SUBSTEPS, check_compiles
 from selfmodel.robot.mjcf.untrusted import checked_model
 from selfmodel.robot.mujoco_errors import MUJOCO_ERRORS, uncounted_warnings
 from selfmodel.robot.robot import Robot

@@ -21,9 +21,7 @@ from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.designs import DESIGNS
-from selfmodel.robot.mjcf.adaptation import adapt
-from selfmodel.robot.mjcf.isolated_model import check_compiles
-from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.load import adapt, check_compiles, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot

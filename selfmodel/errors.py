@@ -1,7 +1,7 @@
 """The errors of selfmodel, and the message for an unknown name."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class InputError(ValueError):
@@ -35,11 +35,11 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
     """
     names = [str(item) for item in known]
     nearest = _nearest(name, names)
-    hint = f"did you mean {_listed(nearest)}? " if nearest else ""
-    return InputError(f"unknown {what} {name!r}: {hint}the known ones are {_listed(names)}")
+    hint = f"did you mean {listed(nearest)}? " if nearest else ""
+    return InputError(f"unknown {what} {name!r}: {hint}the known ones are {listed(names)}")
 
 
-_MOST_COMPARED, _LONGEST_COMPARED, _MOST_LISTED = 1000, 200, 200
+_MOST_COMPARED, _LONGEST_COMPARED = 1000, 200
 
 
 def _nearest(name: str, names: list[str]) -> list[str]:
@@ -50,7 +50,7 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     return difflib.get_close_matches(name, short, n=3, cutoff=0.5)
 
 
-def _listed(names: list[str]) -> str:
-    if len(names) > _MOST_LISTED:
-        return f"{', '.join(names[:_MOST_LISTED])} and {len(names) - _MOST_LISTED} more"
-    return ", ".join(names) if names else "none"
+def listed(names: Sequence[str], most: int = 200) -> str:
+    """Returns names as part of a sentence: separated by commas, and the number beyond the most."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return (", ".join(names[:most]) or "none") + more

@@ -20,11 +20,11 @@ from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.mjcf.adaptation import adapt_text
-from selfmodel.robot.mjcf.document.document import read_document
-from selfmodel.robot.mjcf.document.files import InMemory
-from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.document import read_document
+from selfmodel.robot.mjcf.files import InMemory
+from selfmodel.robot.mjcf.load import adapt_text, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mjcf.untrusted import parse_xml
 from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
@@ -120,8 +120,7 @@ def specification(domain: str, task: str) -> mujoco.MjSpec:
         task: One of its tasks.
     """
     mjcf, assets = _model(domain, task)
-    text = mjcf if isinstance(mjcf, bytes) else mjcf.encode()
-    document = read_document(text, InMemory(assets))
+    document = read_document(parse_xml(mjcf), InMemory(assets))
     with loading_a_model():
         return mujoco.MjSpec.from_string(document.text, assets=dict(document.assets))
 

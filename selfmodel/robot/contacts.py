@@ -1,7 +1,9 @@
-"""Possible contacts of a model: the geoms that can touch static geoms."""
+"""Possible contacts of a model: which geoms can touch which, by their masks and explicit pairs."""
 
 import mujoco
 import numpy as np
+
+from selfmodel.arrays import BoolArray, IndexArray
 
 
 def contacts_enabled(model: mujoco.MjModel) -> bool:
@@ -10,35 +12,36 @@ def contacts_enabled(model: mujoco.MjModel) -> bool:
     return not model.opt.disableflags & (disable.mjDSBL_CONTACT | disable.mjDSBL_CONSTRAINT)
 
 
+def touching_geoms(model: mujoco.MjModel) -> BoolArray:
+    """Returns whether each geom can touch anything, by a mask or a ``<pair>``, ``(ngeom,)``."""
+    touching = (model.geom_contype | model.geom_conaffinity) != 0
+    touching[model.pair_geom1] = touching[model.pair_geom2] = True
+    return np.asarray(touching)
+
+
+def can_touch(model: mujoco.MjModel, geoms: BoolArray | IndexArray) -> BoolArray:
+    """Returns whether the mask of each geom lets it touch one of some geoms, ``(ngeom,)``."""
+    contype, conaffinity = (
+        np.bitwise_or.reduce(mask[geoms], initial=0)
+        for mask in (model.geom_contype, model.geom_conaffinity)
+    )
+    touching = (model.geom_contype & conaffinity) | (model.geom_conaffinity & contype)
+    return np.asarray(touching != 0)
+
+
+def static_geoms(model: mujoco.MjModel) -> BoolArray:
+    """Returns whether each geom belongs to the world or is fixed to it, ``(ngeom,)``."""
+    return np.asarray(model.body_weldid[model.geom_bodyid] == 0)
+
+
 def ground_contact_geoms(model: mujoco.MjModel) -> list[int]:
     """Returns the ids of the moving geoms that can touch a static geom."""
-    moves = model.body_weldid[model.geom_bodyid] != 0
-    contype, conaffinity = (
-        joined_mask(mask[~moves]) for mask in (model.geom_contype, model.geom_conaffinity)
-    )
-    paired = {
-        first
-        for pair in contact_pairs(model)
-        for first, second in (pair, pair[::-1])
-        if moves[first] and not moves[second]
-    }
-    moving = map(int, np.flatnonzero(moves))
-    return [
-        geom for geom in moving if geom in paired or _can_touch(model, geom, contype, conaffinity)
-    ]
-
-
-def contact_pairs(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """Returns the ids of the geoms of each explicit ``<pair>``, to which masks do not apply."""
-    return list(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
-
-
-def joined_mask(masks: np.ndarray) -> int:
-    """Returns the bitwise or of contact masks; 0 for no masks."""
-    return int(np.bitwise_or.reduce(masks, initial=0))
-
-
-def _can_touch(model: mujoco.MjModel, geom: int, contype: int, conaffinity: int) -> bool:
-    """Returns whether a geom can touch a geom with these two masks."""
-    own = int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])
-    return bool(own[0] & conaffinity or own[1] & contype)
+    static = static_geoms(model)
+    touching = can_touch(model, static)
+    for geoms, others in (
+        (model.pair_geom1, model.pair_geom2),
+        (model.pair_geom2, model.pair_geom1),
+    ):
+        touching[geoms[static[others]]] = True
+    ids: list[int] = np.flatnonzero(touching & ~static).tolist()
+    return ids

@@ -15,6 +15,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot import model_edits
 from selfmodel.robot.actuators import motor_bodies, motor_joints
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.contacts import can_touch, static_geoms
 from selfmodel.robot.model_edits import (
     add_point_mass,
     inertia_box_reach,
@@ -193,13 +194,9 @@ class Embodiment:
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between static geoms and the geoms that can touch them."""
         model = self.model
-        world = model.body_weldid[model.geom_bodyid] == 0
-        contype, conaffinity = model.geom_contype, model.geom_conaffinity
-        touching = (contype & np.bitwise_or.reduce(conaffinity[world])) | (
-            conaffinity & np.bitwise_or.reduce(contype[world])
-        )
+        world = static_geoms(model)
         # A contact has the larger coefficient of its two geoms.
-        model.geom_friction[world | (touching != 0), 0] = coefficient
+        model.geom_friction[world | can_touch(model, world), 0] = coefficient
         paired = world[model.pair_geom1] | world[model.pair_geom2]
         model.pair_friction[paired, :2] = coefficient
 

@@ -3,8 +3,10 @@
 import mujoco
 import numpy as np
 
-from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS
-from selfmodel.robot.anatomy_reader import joints_of_body
+from selfmodel.errors import InputError, listed
+from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS, motor_joints
+from selfmodel.robot.anatomy_reader import driven_joints, find_root_body, joints_of_body
+from selfmodel.robot.mujoco_errors import loading_a_model
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _UNSUPPORTED_JOINTS = {
@@ -131,3 +133,75 @@ def _check_names(model: mujoco.MjModel) -> None:
 
 def _label(part: mujoco.MjModel) -> str:
     return repr(part.name) if part.name else f"number {int(part.id)}"
+
+
+_PROBE_SECONDS = 0.2
+_MAX_PROBE_STEPS = 200
+
+
+def check_usable(model: mujoco.MjModel) -> None:
+    """Checks that a model can be simulated, driven, logged and diagnosed.
+
+    Raises:
+        InputError: The model cannot be a robot; the message has the reason and the part.
+    """
+    if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
+        raise InputError(
+            f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
+        )
+    if not model.nu:
+        raise InputError(
+            "the model has no actuators: give each joint that a motor is to drive an element in "
+            "<actuator>"
+        )
+    _check_one_tree(model)
+    driven = driven_joints(model)
+    if not driven:
+        raise InputError(
+            "the model's motors drive no joint, so no fault could be diagnosed: give the joints of "
+            "its limbs motors in <actuator>"
+        )
+    try:
+        root = find_root_body(model, driven)
+        check_model(model, root)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    _check_passive_base(model, root)
+    _check_stable(model)
+
+
+def _check_one_tree(model: mujoco.MjModel) -> None:
+    """Checks that all moving bodies belong to one tree: a log contains the state of one robot."""
+    roots = {int(model.body_rootid[body]) for body in model.jnt_bodyid}
+    if len(roots) > 1:
+        names = [model.body(body).name for body in sorted(roots)]
+        raise InputError(
+            f"expected one tree of moving bodies, got {listed(names, 12)}: keep the "
+            f"robot, and remove the other bodies or fix them to the world"
+        )
+
+
+def _check_passive_base(model: mujoco.MjModel, root: int) -> None:
+    base_joints = joints_of_body(model, root)
+    for motor in range(model.nu):
+        for joint in motor_joints(model, motor).intersection(base_joints):
+            raise InputError(
+                f"the motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
+                f"root body {model.body(root).name}, which only the limbs may move: remove the "
+                f"motor"
+            )
+
+
+def _check_stable(model: mujoco.MjModel) -> None:
+    """Checks that a short simulation without commands does not diverge."""
+    steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
+    with loading_a_model():
+        data = mujoco.MjData(model)
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+    unstable = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)
+    if any(data.warning[w].number for w in (*unstable, mujoco.mjtWarning.mjWARN_BADQACC)):
+        raise InputError(
+            f"the simulation diverges within {steps * model.opt.timestep:.2g} s, without "
+            f"commands: give the model a smaller <option timestep>, or realistic masses and joints"
+        )

@@ -16,6 +16,7 @@ from selfmodel.robot.actuators import (
     tendon_bodies,
     tendon_joints,
 )
+from selfmodel.robot.contacts import can_touch, static_geoms
 
 _MIN_MIX = 1e-15
 """Smallest weight of a geom in the mean of contact parameters (MuJoCo's ``mjMINVAL``)."""
@@ -48,14 +49,8 @@ def scale_grip(model: mujoco.MjModel, bodies: IndexArray, factor: float) -> None
 
 def _ground_of(model: mujoco.MjModel, geom: int) -> int | None:
     """Returns the id of the first static geom that a geom can touch; None if there is none."""
-    for other in np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0).tolist():
-        touches = (
-            model.geom_contype[geom] & model.geom_conaffinity[other]
-            or model.geom_conaffinity[geom] & model.geom_contype[other]
-        )
-        if touches:
-            return int(other)
-    return None
+    ground = np.flatnonzero(static_geoms(model) & can_touch(model, np.array([geom])))
+    return int(ground[0]) if len(ground) else None
 
 
 def _adopt_contact_parameters(model: mujoco.MjModel, geom: int, other: int) -> None:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.robot.contacts import touching_geoms
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer, with_known_base
 from selfmodel.trials.behaviour import Behaviour
@@ -216,9 +217,7 @@ def _or_whole_bodies(model: mujoco.MjModel, chosen: BoolArray) -> BoolArray:
 
 def _covered(model: mujoco.MjModel, seen: BoolArray) -> BoolArray:
     """Returns whether each geom is the collision geom of a body with a mesh to be drawn instead."""
-    collides = (model.geom_contype | model.geom_conaffinity) != 0
-    collides[model.pair_geom1] = True
-    collides[model.pair_geom2] = True
+    collides = touching_geoms(model)
     covered = np.zeros(model.ngeom, dtype=bool)
     meshes = (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH) & ~collides
     for geom in np.flatnonzero(meshes & seen):

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.robot.contacts import contact_pairs
+from selfmodel.robot.contacts import touching_geoms
 from selfmodel.robot.robot import Robot
 
 CONTACT_MEMORY = 4 * 2**20
@@ -109,8 +109,7 @@ def _solid_geoms(robot: Robot) -> BoolArray:
     model = robot.model
     root = int(model.body(robot.root).id)
     own = [body for body in range(model.nbody) if root in (body, *_ancestors(model, body))]
-    touches = (model.geom_contype | model.geom_conaffinity) != 0
-    touches[[geom for pair in contact_pairs(model) for geom in pair]] = True
+    touches = touching_geoms(model)
     touching = np.isin(model.geom_bodyid, model.geom_bodyid[touches])
     return np.asarray(np.isin(model.geom_bodyid, own) & (touches | ~touching))
 

@@ -8,12 +8,12 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from selfmodel.logs.contents import read_contents
 from selfmodel.logs.viewers import _roll_pitch_yaw, body_names, urdf
-from selfmodel.robot.mjcf.document.document import parse_xml
-from selfmodel.robot.mjcf.document.files import InMemory
+from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.settings import MjcfSettings
+from selfmodel.robot.mjcf.untrusted import parse_xml
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.urdf.conversion import convert
-from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.urdf import read_urdf
+from selfmodel.robot.urdf_conversion import convert
 from selfmodel.tasks import ROBOTS
 
 

@@ -10,9 +10,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import unknown_name
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
-from selfmodel.robot.mjcf.document.document import Document
-from selfmodel.robot.mjcf.document.expand import format_numbers
-from selfmodel.robot.mjcf.document.names import UniqueNames
+from selfmodel.robot.mjcf.document import Document, format_numbers
+from selfmodel.robot.mjcf.names import UniqueNames
 from selfmodel.robot.mjcf.settings import MjcfSettings
 
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
@@ -20,17 +19,17 @@ _SITE_MARGIN = 0.005
 """Distance by which a touch site extends beyond the geoms of its body, m."""
 
 
-def add_sensors(document: Document, model: mujoco.MjModel, settings: MjcfSettings) -> None:
+def add_sensors(document: Document, settings: MjcfSettings) -> None:
     """Adds the missing angle and touch sensors, and removes sensors that measure no driven limb.
 
     Args:
         document: The MJCF, edited in place.
-        model: The compiled document.
         settings: Settings with the joints and bodies that get sensors.
 
     Raises:
         InputError: The settings name a joint or body that the model does not have.
     """
+    model = document.model
     _remove_unused(document, model)
     sensors = document.section("sensor")
     names = UniqueNames(sensor.get("name") for sensor in document.children("sensor"))
@@ -39,7 +38,7 @@ def add_sensors(document: Document, model: mujoco.MjModel, settings: MjcfSetting
         ET.SubElement(sensors, "jointpos", {"name": names.new(f"{joint}_angle"), "joint": joint})
     limbs = _limbs_to_measure(document, model, settings)
     sites = UniqueNames(model.site(s).name for s in range(model.nsite))
-    bodies = {body.get("name"): body for body in document.bodies()}
+    bodies = document.named_bodies()
     for limb in limbs:
         name = names.new(f"{limb}_touch")
         site = _touch_site(model, model.body(limb).id) | {"name": sites.new(name)}

@@ -1,15 +1,16 @@
-"""Checks of an untrusted model before MuJoCo compiles the model: it names no other files.
+"""The text of an untrusted model, before MuJoCo compiles it: plain XML that names no other files.
 
-A log may come from any source, and MuJoCo would read any file that the model names. The memory and
-the time of the model are limited by the child process that compiles it first (``isolated_model``).
+A model may come from any source, and MuJoCo would read any file that it names. The memory and the
+time of the model are limited by the child process that compiles it first.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from xml.etree import ElementTree as ET  # _Checker refuses document types and deep trees
-from xml.parsers import expat  # the same
+from xml.etree import ElementTree as ET  # _PlainTree refuses document types and deep trees
+
+from selfmodel.errors import InputError
 
 MAX_TEXT = 2_000_000
 """Largest length of a model's text, characters: MuJoCo takes up to 200 bytes for each."""
@@ -62,82 +63,104 @@ def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
         attached: Contents of the attachments of the log, by name.
 
     Raises:
-        ValueError: The model is no XML, is nested too deeply, or names other files; the message
+        InputError: The model is no XML, is nested too deeply, or names other files; the message
             contains the element.
     """
     if len(mjcf) > MAX_TEXT:
-        raise ValueError(f"the model has {len(mjcf)} characters, more than {MAX_TEXT}")
-    checker = _Checker(attached)
+        raise InputError(f"the model has {len(mjcf)} characters, more than {MAX_TEXT}")
+    root = parse_xml(mjcf)
+    files = named_files(root, attached)
+    return CheckedModel(ET.tostring(root, encoding="unicode"), MappingProxyType(files))
+
+
+def parse_xml(text: str | bytes) -> ET.Element:
+    """Returns the root element of the text of a model.
+
+    Raises:
+        InputError: The text is no XML, has a document type, or is nested too deeply.
+    """
+    parser = ET.XMLParser(target=_PlainTree())  # noqa: S314  # which refuses what is unsafe
     try:
-        checker.check(mjcf)
-        text = ET.tostring(ET.fromstring(mjcf), encoding="unicode")  # noqa: S314  # checked
-    except (expat.ExpatError, ET.ParseError) as error:
-        raise ValueError(f"the model is not XML: {error}") from error
-    return CheckedModel(text, MappingProxyType(checker.files))
+        parser.feed(text)
+        root: ET.Element = parser.close()
+    except (ET.ParseError, LookupError, ValueError) as error:  # LookupError: unknown encoding
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
+    return root
 
 
-class _Checker:
-    """Checks each element while the XML is parsed, before a tree is built."""
+class _PlainTree(ET.TreeBuilder):
+    """Refuses document types (and with them entities) and deep trees while they are parsed."""
 
-    def __init__(self, attached: Mapping[str, bytes]) -> None:
-        self.files: dict[str, bytes] = {}
-        self._attached = attached
-        self._depth = 0
-        self._folder = ""
+    _depth = 0
 
-    def check(self, mjcf: str) -> None:
-        parser = expat.ParserCreate()
-        parser.StartElementHandler = self._start
-        parser.EndElementHandler = self._end
-        parser.StartDoctypeDeclHandler = self._doctype
-        parser.Parse(mjcf, True)
-        if self._folder and self.files:
-            raise ValueError(
-                f"the model reads {next(iter(self.files))!r} in the folder {self._folder!r}: a "
-                f"model in a log may name attached files only"
-            )
+    def doctype(self, *_: object) -> None:
+        """Refuses a document type."""
+        raise InputError("the model has a <!DOCTYPE>, which no model needs: remove the <!DOCTYPE>")
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        if not self._depth and tag != "mujoco":
-            raise ValueError(f"expected a model in <mujoco>, got <{tag}>")
+    def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:
+        """Opens an element, if it is not too deep."""
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise ValueError(f"the model has more than {MAX_DEPTH} elements within each other")
-        # <model> in <asset> reads a file; as the root element it is refused above.
-        if tag in REFUSED_ELEMENTS:
-            named = attributes.get("file") or attributes.get("plugin") or attributes.get("name")
-            raise ValueError(
-                f"the model has <{tag}>{f' ({named!r})' if named else ''}, which "
-                f"{REFUSED_ELEMENTS[tag]}: expected a model without <{tag}> in a log"
-            )
-        for name, text in filter(lambda item: item[1], attributes.items()):
-            self._attribute(tag, name, text)
+            raise InputError(f"the model has more than {MAX_DEPTH} elements within each other")
+        return super().start(tag, attrs)
 
-    def _attribute(self, tag: str, name: str, text: str) -> None:
-        if name.startswith("file"):
-            self._file(tag, text)
-        elif name in _FOLDER_ATTRIBUTES:
-            self._folder = text
-        elif name == "content_type":
-            raise ValueError(
-                f"the model's <{tag}> has the content type {text!r}: in a log, the ending of "
-                f"a file's name must determine its type"
-            )
-
-    def _file(self, tag: str, name: str) -> None:
-        if name not in self._attached or not _PLAIN_NAME.fullmatch(name):
-            raise ValueError(
-                f"the model's <{tag}> names the file {name!r}, which is not attached to the log"
-            )
-        if not name.lower().endswith(ASSET_ENDINGS):
-            raise ValueError(
-                f"the model names the file {name!r}: a model in a log may name "
-                f"{', '.join(ASSET_ENDINGS)}"
-            )
-        self.files[name] = self._attached[name]
-
-    def _end(self, _: str) -> None:
+    def end(self, tag: str) -> ET.Element:
+        """Closes an element."""
         self._depth -= 1
+        return super().end(tag)
 
-    def _doctype(self, *_: object) -> None:
-        raise ValueError("the model has a <!DOCTYPE>, which is not allowed in a log")
+
+def named_files(root: ET.Element, attached: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Returns the files that a model names, after a check that a log can contain the model.
+
+    Args:
+        root: The ``<mujoco>`` element.
+        attached: Contents of files by name.
+
+    Raises:
+        InputError: The model is no MJCF, reads other models, runs other code, or names a file that
+            is not attached, or is no asset.
+    """
+    if root.tag != "mujoco":
+        raise InputError(f"expected a model in <mujoco>, got <{root.tag[:40]}>")
+    files: dict[str, bytes] = {}
+    folder = ""
+    for element in root.iter():
+        if element.tag in REFUSED_ELEMENTS:
+            named = element.get("file") or element.get("plugin") or element.get("name")
+            raise InputError(
+                f"the model has <{element.tag}>{f' ({named!r})' if named else ''}, which "
+                f"{REFUSED_ELEMENTS[element.tag]}: expected a model without <{element.tag}> in a "
+                f"log"
+            )
+        for attribute, text in filter(lambda item: item[1], element.items()):
+            if attribute.startswith("file"):
+                files[text] = _attached(element.tag, text, attached)
+            elif attribute in _FOLDER_ATTRIBUTES:
+                folder = text
+            elif attribute == "content_type":
+                raise InputError(
+                    f"the model's <{element.tag}> has the content type {text!r}: in a log, the "
+                    f"ending of a file's name must determine its type"
+                )
+    if folder and files:
+        raise InputError(
+            f"the model reads {next(iter(files))!r} in the folder {folder!r}: a model in a log may "
+            f"name attached files only"
+        )
+    return files
+
+
+def _attached(tag: str, name: str, attached: Mapping[str, bytes]) -> bytes:
+    if name not in attached or not _PLAIN_NAME.fullmatch(name):
+        raise InputError(
+            f"the model's <{tag}> names the file {name!r}, which is not attached to the log"
+        )
+    if not name.lower().endswith(ASSET_ENDINGS):
+        raise InputError(
+            f"the model names the file {name!r}: a model in a log may name "
+            f"{', '.join(ASSET_ENDINGS)}"
+        )
+    return attached[name]

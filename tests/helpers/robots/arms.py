@@ -3,8 +3,7 @@
 from functools import lru_cache
 from importlib.resources import files
 
-from selfmodel.robot.mjcf.adaptation import adapt_text
-from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.load import adapt_text, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 

@@ -79,6 +79,12 @@ AWKWARD: dict[str, Awkward] = {
     "deep nesting": Awkward(_deep(5000), "200 elements within each other"),
     "an element that MJCF has not": Awkward(mjcf(more="<leg/>"), "MuJoCo cannot load the model"),
     "UTF-16": Awkward(f'<?xml version="1.0" encoding="utf-16"?>{mjcf()}'.encode("utf-16")),
+    "an encoding that is none": Awkward(
+        '<?xml version="1.0" encoding="rot13"?>' + mjcf(), "no XML"
+    ),
+    "a name of 100,000 characters": Awkward(
+        mjcf().replace("left_hip", "h" * 100_000), "at most 200 characters"
+    ),
     # Files.
     "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj"), torso=MESHED), "'m.obj'"),
     "a missing mesh that is not used": Awkward(mjcf(more=MESH.format("m", "m.obj"))),

@@ -9,8 +9,7 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.actuators import command_ranges
-from selfmodel.robot.mjcf.adaptation import adapt
-from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.load import adapt, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers

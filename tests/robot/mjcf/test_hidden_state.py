@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.mjcf.adaptation import AdaptedMjcf, adapt
-from selfmodel.robot.mjcf.hidden_state import MIN_ITERATIONS
-from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.expand import MIN_ITERATIONS
+from selfmodel.robot.mjcf.load import AdaptedMjcf, adapt, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.joint_values import value_of
 from selfmodel.robot.mjcf.load import load_mjcf
-from selfmodel.robot.mjcf.settings import checked_settings
+from selfmodel.robot.mjcf.settings import checked_settings, value_of
 from tests.robot.mjcf.awkward import mjcf
 
 

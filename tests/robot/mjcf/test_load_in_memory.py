@@ -10,9 +10,8 @@ import pytest
 from dm_control.suite import dog, quadruped, swimmer
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.adaptation import adapt_text
-from selfmodel.robot.mjcf.load import robot_from
-from selfmodel.robot.mjcf.meshes.visuals import MAX_ASSET_BYTES
+from selfmodel.robot.mjcf.load import adapt_text, robot_from
+from selfmodel.robot.mjcf.meshes import MAX_ASSET_BYTES
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from tests.robot.mjcf.awkward import CUBE, MESH, MESHED, TORSO, mjcf

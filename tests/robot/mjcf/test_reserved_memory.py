@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.robot.mjcf.adaptation import AdaptedMjcf, adapt
-from selfmodel.robot.mjcf.load import robot_from
+from selfmodel.robot.mjcf.load import AdaptedMjcf, adapt, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.test_adaptation import written

@@ -3,11 +3,12 @@
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from selfmodel.robot.mjcf.document.document import Document, parse_xml
-from selfmodel.robot.mjcf.document.files import InMemory
+from selfmodel.robot.mjcf.document import Document
+from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.settings import checked_settings
-from selfmodel.robot.urdf.conversion import convert
-from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.mjcf.untrusted import parse_xml
+from selfmodel.robot.urdf import read_urdf
+from selfmodel.robot.urdf_conversion import convert
 
 CUBE = """v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"""
 """A tetrahedron as OBJ."""

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document.document import parse_xml
-from selfmodel.robot.mjcf.document.files import robot_folder
-from selfmodel.robot.urdf.reading import read_urdf
+from selfmodel.robot.mjcf.files import robot_folder
+from selfmodel.robot.mjcf.untrusted import parse_xml
+from selfmodel.robot.urdf import read_urdf
 from tests.robot.urdf.samples import CUBE, link, read, urdf
 
 MESH = '<{0}><geometry><mesh filename="{1}"/></geometry></{0}>'

@@ -5,8 +5,8 @@ import time
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document.document import parse_xml
-from selfmodel.robot.urdf.tree import MAX_LINK_DEPTH, check_tree, check_types
+from selfmodel.robot.mjcf.untrusted import parse_xml
+from selfmodel.robot.urdf import MAX_LINK_DEPTH, check_tree, check_types
 from tests.robot.urdf.samples import WALKER, joint, link, urdf
 
 

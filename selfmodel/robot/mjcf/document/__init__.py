@@ -1,1 +1,0 @@
-"""MJCF document: its files, its explicit elements, and their names and frames."""

@@ -1,1 +1,0 @@
-"""Motors of an MJCF: position servos, their reach, and command ranges."""

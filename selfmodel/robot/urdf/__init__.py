@@ -1,1 +1,0 @@
-"""Robots from URDF files: read, converted by MuJoCo's importer, and given motors and a stance."""

@@ -1,0 +1,139 @@
+"""Tests of position servos that replace the torque motors of a file."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from selfmodel.errors import InputError
+from selfmodel.robot.mjcf.load import adapt, load_mjcf
+from selfmodel.robot.mjcf.settings import parse_setting, read_settings
+from tests.robot.mjcf.awkward import KEY, LEGS, mjcf
+from tests.robot.mjcf.test_adaptation import written
+
+TORQUE_MOTORS = """<motor name="left" joint="left_hip" gear="-4" ctrlrange="-2 1"/>
+<motor name="right" joint="right_hip" ctrlrange="-9 9" forcerange="-7 7"/>"""
+GAINS = ("kp=30", "kd=2")
+CLASS = '<default><position kp="7" inheritrange="1"/></default>'
+
+
+def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:
+    """Returns the model of the robot of a text with settings."""
+    path = written(folder, text)
+    extra = {key: value for one in given for key, value in parse_setting(one).items()}
+    return load_mjcf(path, read_settings(path, extra)).model
+
+
+def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(tmp_path: Path):
+    model = loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), *GAINS)
+
+    assert [model.actuator(motor).name for motor in range(model.nu)] == ["left", "right"]
+    assert model.actuator_gear[:, 0].tolist() == [1, 1]
+    assert model.actuator_forcerange.tolist() == [[-4, 8], [-7, 7]]
+    assert np.array_equal(model.actuator_ctrlrange, model.jnt_range[model.actuator_trnid[:, 0]])
+
+
+def test_a_gain_of_the_motor_is_part_of_its_torque_limits(tmp_path: Path):
+    left = '<general name="left" joint="left_hip" gainprm="3" gear="2" ctrlrange="-1 2"/>'
+    motors = left + TORQUE_MOTORS.splitlines()[1]
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+    assert model.actuator_forcerange.tolist() == [[-6, 12], [-7, 7]]
+
+
+def test_a_motor_with_dynamics_stays(tmp_path: Path):
+    left = '<general name="left" joint="left_hip" dyntype="filter" dynprm="1" ctrlrange="-1 2"/>'
+    motors = left + TORQUE_MOTORS.splitlines()[1]
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+    assert model.actuator_gainprm[:, 0].tolist() == [1, 30]
+
+
+@pytest.fixture(scope="module")
+def servos(tmp_path_factory: pytest.TempPathFactory) -> mujoco.MjModel:
+    folder = tmp_path_factory.mktemp("servos")
+    return loaded(folder, mjcf(motors=TORQUE_MOTORS), *GAINS)
+
+
+@given(angle=st.floats(-0.5, 0.5), speed=st.floats(-3, 3), command=st.floats(-0.5, 0.5))
+def test_the_torque_of_a_servo_is_that_of_its_gains(
+    servos: mujoco.MjModel, angle: float, speed: float, command: float
+):
+    data = mujoco.MjData(servos)
+    joint = servos.joint("right_hip")
+    data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = angle, speed
+    data.ctrl[1] = command
+    mujoco.mj_forward(servos, data)
+
+    expected = np.clip(30 * (command - angle) - 2 * speed, -7, 7)
+    assert data.qfrc_actuator[joint.dofadr[0]] == pytest.approx(expected, abs=1e-9)
+
+
+def test_attributes_of_a_class_do_not_change_a_servo(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS)
+    plain = loaded(tmp_path, text, *GAINS)
+    of_class = loaded(tmp_path, text.replace("<mujoco>", f"<mujoco>{CLASS}"), *GAINS)
+
+    for field in ("gainprm", "biasprm", "gear", "ctrlrange", "forcerange", "dyntype"):
+        name = f"actuator_{field}"
+        assert np.array_equal(getattr(plain, name), getattr(of_class, name)), field
+
+
+def test_servos_of_the_file_stay(tmp_path: Path):
+    motors = TORQUE_MOTORS.replace('<motor name="left"', '<position kp="5" name="left"')
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+    assert model.actuator_gainprm[:, 0].tolist() == [5, 30]
+
+
+def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS, legs=LEGS.replace('range="-40 40"', ""))
+
+    with pytest.raises(InputError, match=r"range of the joint left_hip.*reach=0\.5"):
+        loaded(tmp_path, text, *GAINS)
+    model = loaded(tmp_path, text, *GAINS, "reach=0.5")
+    assert model.actuator_ctrlrange.tolist() == [[-0.5, 0.5], [-0.5, 0.5]]
+    key = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
+    posed = text.replace("<mujoco>", f"<mujoco>{key}")
+    model = loaded(tmp_path, posed, *GAINS, "reach=0.5")
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.9, -0.6, 0.4])
+
+
+def test_gains_are_for_the_joints_that_their_patterns_fit(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS)
+    model = loaded(tmp_path, text, 'kp={"left_*" = 30, right_hip = 9}', "kd=2")
+
+    assert model.actuator_gainprm[:, 0].tolist() == [30, 9]
+
+
+def test_motors_without_gains_stay(tmp_path: Path):
+    text = mjcf(motors=TORQUE_MOTORS)
+    model = loaded(tmp_path, text, "kp={left_hip=30}", "kd={left_hip=2}")
+
+    assert model.actuator_gainprm[:, 0].tolist() == [30, 1]
+
+
+def test_one_gain_alone_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="expected kp and kd for the joint left_hip"):
+        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp=30")
+
+
+def test_a_gain_for_no_joint_is_refused_with_the_nearest_name(tmp_path: Path):
+    with pytest.raises(InputError, match="left_hip"):
+        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp={left_hop=30}", "kd=1")
+
+
+def test_a_model_without_torque_motors_is_refused(tmp_path: Path):
+    motors = TORQUE_MOTORS.replace("<motor", '<position kp="5"')
+
+    with pytest.raises(InputError, match="servos already"):
+        loaded(tmp_path, mjcf(motors=motors), *GAINS)
+
+
+def test_the_conversion_is_noted(tmp_path: Path):
+    path = written(tmp_path, mjcf(motors=TORQUE_MOTORS))
+    found = adapt(path, read_settings(path, {"kp": 30, "kd": 2}))
+
+    assert any("2 torque motors are position servos with kp=30" in note for note in found.notes)
