@@ -38,6 +38,9 @@ _NUMBERS = (
 )
 """Attributes of a model that determine its motion."""
 
+MAX_NAME = 1000
+"""Longest name of a motor or a hinge, characters: every message of a log may have all names."""
+
 MAX_ITERATIONS = 10_000
 """Largest number of iterations of a solver; MuJoCo's default is 100 or less. The number of a step
 depends on the contacts, so the first steps of a model do not bound it."""
@@ -128,6 +131,11 @@ def _check_names(model: mujoco.MjModel) -> None:
                 raise ValueError(
                     f"the model's {kind} number {int(part.id)} has no name: give it one, because "
                     f"logs and faults identify parts by name"
+                )
+            if len(part.name) > MAX_NAME:
+                raise ValueError(
+                    f"expected names of at most {MAX_NAME} characters, got {len(part.name)} in the "
+                    f"name of the {kind} {part.name[:20]}...: shorten it"
                 )
 
 

@@ -4,13 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from xml.etree import ElementTree as ET  # of checked texts
 
-from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.document import Document
-
-MAX_NAME = 200
-"""Largest length of the name of a part, characters: names stand in notation, logs and tables."""
-
-_MAX_QUOTED = 40
 
 _SPECIAL_CHARACTERS = re.compile(r"[^\w.-]")
 _JOINT_TAGS = ("joint", "freejoint")
@@ -97,11 +91,6 @@ def _set_name(element: ET.Element, names: UniqueNames, base: str) -> None:
 
 
 def _replace_special_characters(document: Document, kind: str, elements: list[ET.Element]) -> None:
-    for long in (text for e in elements if len(text := e.get("name", "")) > MAX_NAME):
-        raise InputError(
-            f"expected a {kind} with a name of at most {MAX_NAME} characters, got "
-            f"{long[:_MAX_QUOTED]!r}... with {len(long)}: rename it"
-        )
     special = [
         name for e in elements if (name := e.get("name")) and _SPECIAL_CHARACTERS.search(name)
     ]

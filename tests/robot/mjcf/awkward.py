@@ -83,7 +83,7 @@ AWKWARD: dict[str, Awkward] = {
         '<?xml version="1.0" encoding="rot13"?>' + mjcf(), "no XML"
     ),
     "a name of 100,000 characters": Awkward(
-        mjcf().replace("left_hip", "h" * 100_000), "at most 200 characters"
+        mjcf().replace("left_hip", "h" * 100_000), "at most 1000 characters"
     ),
     # Files.
     "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj"), torso=MESHED), "'m.obj'"),
