@@ -12,7 +12,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.files import read_file
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
-from selfmodel.logs.files import replace_file
+from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, result_bytes
 from selfmodel.recovery.result import Database
@@ -94,7 +94,7 @@ def create_journal(
             ``recover`` gets ``calibrate``. A report of an unfinished run repeats the fit.
 
     Raises:
-        InputError: The folder is not empty, or cannot be made.
+        InputError: The folder is not empty, or a file.
         LogWriteError: The disk is full, or failed.
     """
     try:
@@ -106,12 +106,7 @@ def create_journal(
             f"{folder} holds another run or other files ({', '.join(holds[:3])}): nothing is "
             f"overwritten, choose a folder that is empty or does not exist"
         )
-    try:
-        (folder / TRIALS).mkdir(parents=True)
-    except OSError as error:
-        raise InputError(
-            f"{folder} cannot be made: {error.strerror}; choose another folder"
-        ) from error
+    make_folder(folder / TRIALS)
     replace_file(folder / OPTIONS, result_bytes({"calibrated": calibrated}))
     return FolderJournal(folder, HypothesisSpace(anatomy, tuple(kinds)))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
 from selfmodel.logs.repertoires import (
@@ -18,6 +19,7 @@ from selfmodel.logs.repertoires import (
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
+from tests.helpers.damage import damaged
 from tests.helpers.drivers import random_controllers
 
 
@@ -67,10 +69,20 @@ def test_an_altered_array_is_noticed(repertoire: Repertoire, name: str):
         parse_repertoire(altered.getvalue(), "here")
 
 
-@pytest.mark.parametrize("cut", [0, 10, 500, -1])
-def test_damaged_bytes_are_an_error_with_the_remedy(repertoire: Repertoire, cut: int):
-    with pytest.raises(InputError, match=r"here: expected a repertoire \(.npz.* repertoire make`"):
-        parse_repertoire(repertoire_bytes(repertoire)[:cut], "here")
+@given(data=st.data())
+def test_damaged_bytes_are_an_error_with_the_remedy_or_change_nothing(
+    repertoire: Repertoire, data: st.DataObject
+):
+    whole = repertoire_bytes(repertoire)
+    try:
+        found = parse_repertoire(data.draw(damaged(whole)), "here")
+    except InputError as error:
+        sentence = str(error)
+    else:
+        sentence = "here: expected a repertoire; make it anew with `selfmodel repertoire make`"
+        assert repertoire_bytes(found) == whole
+    assert sentence.startswith("here: expected a repertoire")
+    assert "repertoire make`" in sentence
 
 
 def test_a_controller_file_is_no_repertoire(repertoire: Repertoire):
