@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy_reader import joint_limits
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.conditions import dead_sensors
+from selfmodel.simulation.domain import dead_sensors
 from selfmodel.simulation.initial_pose import rotated_by_vector
 from selfmodel.simulation.reality_gap import RealityGap, draw_gap_of
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, Signal

@@ -38,7 +38,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
@@ -145,7 +145,7 @@ class RecoveryLoop:
         return self.evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
 
     def evolved(
-        self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], Uncertainty]
+        self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
     ) -> tuple[CandidateController, ...]:
         """Evolves controllers for hypotheses; returns them best first."""
         self.on_event(SearchBegins("repair", hypotheses[0]))
@@ -154,7 +154,7 @@ class RecoveryLoop:
         self._predictions.update({one.controller: one.predicted for one in found})
         return found
 
-    def _assumed(self) -> Uncertainty:
+    def _assumed(self) -> DomainDistribution:
         return assumed_uncertainty(self.simulator.robot)
 
     def _prepare_repair(self) -> None:

@@ -16,7 +16,7 @@ from selfmodel.recovery.scores import DISPLACEMENT, Score, scores_of
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.cache import Cache
-from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Run, Simulator
 
 
@@ -52,7 +52,7 @@ class Repair(Protocol):
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
-        uncertainty: Callable[[], Uncertainty],
+        uncertainty: Callable[[], DomainDistribution],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,
@@ -126,7 +126,7 @@ class RepairSearch:
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
-        _uncertainty: Callable[[], Uncertainty],
+        _uncertainty: Callable[[], DomainDistribution],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,

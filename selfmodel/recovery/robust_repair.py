@@ -25,7 +25,7 @@ from selfmodel.recovery.repair import CandidateController, mutants
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import UPRIGHT, Score, scores_of
 from selfmodel.settings import Settings
-from selfmodel.simulation.conditions import Uncertainty, draw_conditions
+from selfmodel.simulation.domain import DomainDistribution, draw_samples
 from selfmodel.simulation.simulator import Simulator
 
 FIRST_COST, COST = 2.8, 0.8
@@ -108,7 +108,7 @@ class RobustFitness:
     simulator: Simulator
     score: Score
     hypotheses: Sequence[Hypothesis]
-    uncertainty: Uncertainty
+    uncertainty: DomainDistribution
 
     def __call__(
         self, controllers: Sequence[Controller], count: int, steps: int, rng: np.random.Generator
@@ -121,7 +121,7 @@ class RobustFitness:
             steps: Control steps of a rollout.
             rng: Random number generator of the conditions.
         """
-        conditions = draw_conditions(self.hypotheses, self.uncertainty, count, rng)
+        conditions = draw_samples(self.hypotheses, self.uncertainty, count, rng)
         outcome = self.simulator.run_under(
             conditions, self.uncertainty, controllers, steps, self.score.record
         )
@@ -161,7 +161,7 @@ class RobustRepair:
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
-        uncertainty: Callable[[], Uncertainty],
+        uncertainty: Callable[[], DomainDistribution],
         seeds: Sequence[Controller],
         rng: np.random.Generator,
         on_generation: GenerationCallback,

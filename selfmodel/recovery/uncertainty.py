@@ -21,7 +21,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.batch import batch_bytes
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
-from selfmodel.simulation.conditions import Condition, Uncertainty, draw_conditions
+from selfmodel.simulation.domain import DomainDistribution, DomainSample, draw_samples
 from selfmodel.simulation.initial_pose import StartSpread, start_spread
 from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
 from selfmodel.simulation.simulator import Simulator
@@ -94,12 +94,12 @@ MIN_EFFECTIVE = 1 / 8
 flattened."""
 
 
-def assumed_uncertainty(robot: Robot) -> Uncertainty:
+def assumed_uncertainty(robot: Robot) -> DomainDistribution:
     """Returns the uncertainty of a robot before its first trial."""
     touch = _touch(robot.anatomy)
     factors = np.full(4 + robot.model.nu, ASSUMED_FACTORS)
     factors[2:4] *= 2  # friction and damping
-    return Uncertainty(
+    return DomainDistribution(
         models=LogNormal(factors, np.full(robot.model.nbody, BODIES)),
         reading_noise=np.where(touch, 0.0, ASSUMED_NOISE),
         wrong_touches=np.where(touch, ASSUMED_WRONG_TOUCHES, 0.0),
@@ -108,7 +108,7 @@ def assumed_uncertainty(robot: Robot) -> Uncertainty:
     )
 
 
-def noise_of_gap(robot: Robot, level: float) -> Uncertainty:
+def noise_of_gap(robot: Robot, level: float) -> DomainDistribution:
     """Returns the noise of a reality gap alone: the parameters are those of the robot's model.
 
     Args:
@@ -116,7 +116,7 @@ def noise_of_gap(robot: Robot, level: float) -> Uncertainty:
         level: Level of the reality gap.
     """
     touch = _touch(robot.anatomy)
-    return Uncertainty(
+    return DomainDistribution(
         models=exact(robot),
         reading_noise=np.where(touch, 0.0, level),
         wrong_touches=np.where(touch, level / 2, 0.0),
@@ -126,7 +126,7 @@ def noise_of_gap(robot: Robot, level: float) -> Uncertainty:
 
 def estimated_uncertainty(
     simulator: Simulator, trials: Sequence[Trial], calibration: Calibration | None
-) -> Uncertainty:
+) -> DomainDistribution:
     """Returns the uncertainty of a robot after its healthy trials.
 
     The noise is that of the trials in excess of the same estimate in noise-free simulations of
@@ -148,7 +148,7 @@ def estimated_uncertainty(
         angles.append(_start_variance(logged["joint_positions"], simulated["joint_positions"]))
         tilts.append(_start_variance(_tilts(logged), _tilts(simulated)))
     angle = _deviation(angles)
-    found = Uncertainty(
+    found = DomainDistribution(
         models=exact(robot),
         reading_noise=np.where(touch, 0.0, np.sqrt(np.mean(noise, axis=0))),
         wrong_touches=np.where(touch, np.mean(wrong, axis=0), 0.0),
@@ -241,18 +241,18 @@ class Posterior:
         self._likelihoods: dict[Any, FloatArray] = {}  # by hypothesis, and content of the trial
 
     @cached_property
-    def _uncertainty(self) -> Uncertainty:
+    def _uncertainty(self) -> DomainDistribution:
         return estimated_uncertainty(self._simulator, self._healthy, self._calibration)
 
     @cached_property
-    def _conditions(self) -> tuple[Condition, ...]:
+    def _conditions(self) -> tuple[DomainSample, ...]:
         """A condition per model, then ``REPEATS`` with the model of the first one."""
         count = self._models + REPEATS
-        drawn = draw_conditions((INTACT,), self._uncertainty, count, self._rng)
+        drawn = draw_samples((INTACT,), self._uncertainty, count, self._rng)
         repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[self._models :]]
         return (*drawn[: self._models], *repeats)
 
-    def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> Uncertainty:
+    def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> DomainDistribution:
         """Returns an uncertainty whose models are weighted by their predictions of trials.
 
         Args:
@@ -328,9 +328,9 @@ def flattened_weights(likelihood: FloatArray) -> FloatArray:
 
 def _paths(
     simulator: Simulator,
-    uncertainty: Uncertainty,
+    uncertainty: DomainDistribution,
     trial: Trial,
-    conditions: Sequence[Condition],
+    conditions: Sequence[DomainSample],
 ) -> FloatArray:
     """Returns the path of a trial's controller under each condition, ``(conditions, values)``.
 

@@ -14,10 +14,10 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.batch import SimulationResult, SimulationStats, batch_bytes
-from selfmodel.simulation.conditions import (
-    Condition,
+from selfmodel.simulation.domain import (
+    DomainDistribution,
+    DomainSample,
     ReadingNoise,
-    Uncertainty,
     initial_positions,
 )
 from selfmodel.simulation.ground_contacts import ground_contact_points
@@ -170,8 +170,8 @@ class Simulator:
 
     def run_under(
         self,
-        conditions: Sequence[Condition],
-        uncertainty: Uncertainty,
+        conditions: Sequence[DomainSample],
+        uncertainty: DomainDistribution,
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],

@@ -186,7 +186,7 @@ def test_every_search_starts_from_what_the_database_holds(
             super().__init__(length, draw, settings, rng, seeds)
 
     monkeypatch.setattr("selfmodel.recovery.repair.Evolution", Spy)
-    monkeypatch.setattr("selfmodel.diagnosis.diagnose.Evolution", Spy)
+    monkeypatch.setattr("selfmodel.diagnosis.search.Evolution", Spy)
     events: list[Event] = []
     truth = parse("break:back_left_knee", quadruped.anatomy)
     outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)

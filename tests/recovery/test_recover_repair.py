@@ -24,7 +24,7 @@ from selfmodel.recovery.scores import Score
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
@@ -43,12 +43,12 @@ class StubRepair:
     def __init__(self, candidates: Sequence[Controller]) -> None:
         self._candidates = candidates
         self.hypotheses: list[tuple[str, ...]] = []
-        self.uncertainties: list[Uncertainty] = []
+        self.uncertainties: list[DomainDistribution] = []
 
     def __call__(
         self,
         hypotheses: Sequence[Hypothesis],
-        uncertainty: Callable[[], Uncertainty],
+        uncertainty: Callable[[], DomainDistribution],
         *_rest: object,
     ) -> tuple[CandidateController, ...]:
         """Returns the candidates; each prediction is the number of the call."""
@@ -74,7 +74,7 @@ def found(quadruped: Robot, monkeypatch: pytest.MonkeyPatch) -> dict[str, object
             return Diagnosis(ranked, 1, 1.0, (alike,), "ambiguous", "stub")
 
     class Watched(module.Posterior):
-        def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> Uncertainty:
+        def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> DomainDistribution:
             asked.append((len(trials), str(hypothesis)))
             return super().after(trials, hypothesis)
 

@@ -11,7 +11,7 @@ from selfmodel.recovery.repair import RepairSearch
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.conditions import Uncertainty
+from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs
@@ -43,7 +43,7 @@ def test_its_candidates_are_the_survivors_with_their_fitness_best_first(quadrupe
     assert 1 < len({one.controller for one in found}) == len(found) <= numbers.survivors
 
 
-def assumed() -> Uncertainty:
+def assumed() -> DomainDistribution:
     """The uncertainty of a repair that asks for none."""
     raise AssertionError("the paper's repair simulates the self-model alone")
 

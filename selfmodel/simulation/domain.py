@@ -1,7 +1,8 @@
-"""Conditions of a run: one draw of everything that trials leave open about a robot.
+"""Domain randomisation: draws of everything that trials leave open about a robot.
 
 A controller that is evolved in one exact simulation depends on its exactness. Rollouts under
-several conditions measure how a controller performs on a robot that is only known approximately.
+several domain samples measure how a controller performs on a robot that is only known
+approximately.
 Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
 """
 
@@ -29,7 +30,7 @@ _SEEDS = 2**63
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class DomainDistribution:
     """Distribution of the runs of a robot around those of its self-model.
 
     Attributes:
@@ -59,8 +60,8 @@ NO_SPREAD = StartSpread(0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Condition:
-    """One draw of an uncertainty.
+class DomainSample:
+    """One draw of a domain: the condition of a run.
 
     Attributes:
         hypothesis: Faults of the robot.
@@ -83,12 +84,12 @@ class Condition:
         return embodiment
 
 
-def draw_conditions(
+def draw_samples(
     hypotheses: Sequence[Hypothesis],
-    uncertainty: Uncertainty,
+    uncertainty: DomainDistribution,
     count: int,
     rng: np.random.Generator,
-) -> tuple[Condition, ...]:
+) -> tuple[DomainSample, ...]:
     """Returns random conditions, with the hypotheses in turn from a random one.
 
     Args:
@@ -100,7 +101,7 @@ def draw_conditions(
     first = int(rng.integers(len(hypotheses)))
     certain = uncertainty.is_none
     return tuple(
-        Condition(
+        DomainSample(
             hypotheses[(first + number) % len(hypotheses)],
             uncertainty.models.draw(rng),
             int(rng.choice(uncertainty.delays)),
@@ -113,7 +114,7 @@ def draw_conditions(
 def initial_positions(
     robot: Robot,
     embodiments: Sequence[Embodiment],
-    conditions: Sequence[Condition],
+    conditions: Sequence[DomainSample],
     spread: StartSpread,
 ) -> FloatArray:
     """Returns the initial generalised positions of a robot, ``(conditions, nq)``.
@@ -150,8 +151,8 @@ class ReadingNoise:
         self,
         anatomy: Anatomy,
         embodiments: Sequence[Embodiment],
-        conditions: Sequence[Condition],
-        uncertainty: Uncertainty,
+        conditions: Sequence[DomainSample],
+        uncertainty: DomainDistribution,
     ) -> None:
         silent = np.array([dead_sensors(anatomy, own) for own in embodiments])
         self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]

@@ -9,7 +9,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.conditions import Uncertainty, draw_conditions
+from selfmodel.simulation.domain import DomainDistribution, draw_samples
 from selfmodel.simulation.initial_pose import StartSpread
 from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
@@ -19,14 +19,14 @@ STEPS = 60
 RECORD = ("base_position", "sensors", "joint_positions")
 
 
-def certain(robot: Robot) -> Uncertainty:
+def certain(robot: Robot) -> DomainDistribution:
     nothing = np.zeros(len(robot.anatomy.sensors))
-    return Uncertainty(exact(robot), nothing, nothing, StartSpread(0.0, 0.0))
+    return DomainDistribution(exact(robot), nothing, nothing, StartSpread(0.0, 0.0))
 
 
-def uncertain(robot: Robot) -> Uncertainty:
+def uncertain(robot: Robot) -> DomainDistribution:
     touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
-    return Uncertainty(
+    return DomainDistribution(
         LogNormal(np.full(4 + robot.model.nu, 0.1), np.full(robot.model.nbody, 0.1)),
         np.where(touch, 0.0, 0.1),
         np.where(touch, 0.05, 0.0),
@@ -38,7 +38,7 @@ def uncertain(robot: Robot) -> Uncertainty:
 def test_a_robot_without_uncertainty_is_the_self_model_to_the_bit(robot: Robot):
     simulator, drivers = Simulator(robot, 1), random_controllers(robot, 2)
     hypothesis = parse(f"jam:{robot.anatomy.joints[0].name}", robot.anatomy)
-    drawn = draw_conditions((hypothesis,), certain(robot), 2, np.random.default_rng(0))
+    drawn = draw_samples((hypothesis,), certain(robot), 2, np.random.default_rng(0))
     outcome = simulator.run_under(drawn, certain(robot), drivers, STEPS, RECORD)
     expected = simulator.run([(hypothesis, driver) for driver in drivers], STEPS, RECORD)
 
@@ -52,7 +52,7 @@ def test_a_robot_without_uncertainty_is_the_self_model_to_the_bit(robot: Robot):
 
 def test_a_rollout_has_the_same_bits_in_any_batch_and_at_any_number_of_threads(robot: Robot):
     drivers, unknown = random_controllers(robot, 3), uncertain(robot)
-    drawn = draw_conditions((INTACT,), unknown, 4, np.random.default_rng(1))
+    drawn = draw_samples((INTACT,), unknown, 4, np.random.default_rng(1))
     many = Simulator(robot, 2).run_under(drawn, unknown, drivers, STEPS, RECORD)
     alone = Simulator(robot, 1).run_under(drawn[2:3], unknown, drivers[1:2], STEPS, RECORD)
 
@@ -62,7 +62,7 @@ def test_a_rollout_has_the_same_bits_in_any_batch_and_at_any_number_of_threads(r
 
 def test_conditions_are_common_to_all_controllers_and_differ_from_each_other(quadruped: Robot):
     (driver,), unknown = random_controllers(quadruped, 1), uncertain(quadruped)
-    drawn = draw_conditions((INTACT,), unknown, 3, np.random.default_rng(2))
+    drawn = draw_samples((INTACT,), unknown, 3, np.random.default_rng(2))
     outcome = Simulator(quadruped, 1).run_under(drawn, unknown, [driver] * 2, STEPS, RECORD)
 
     for signal in RECORD:
@@ -80,7 +80,7 @@ def test_readings_have_the_noise_of_the_uncertainty(quadruped: Robot):
         wrong_touches=np.where(touch, 0.05, 0.0),
     )
     still = Playback(quadruped.anatomy.names.motors, np.zeros((400, len(quadruped.anatomy.motors))))
-    drawn = draw_conditions((INTACT,), unknown, 8, np.random.default_rng(3))
+    drawn = draw_samples((INTACT,), unknown, 8, np.random.default_rng(3))
     simulator = Simulator(quadruped, 1)
     noisy = simulator.run_under(drawn, unknown, [still], 400, ("sensors",)).behaviour["sensors"][0]
     clean = simulator.run([(INTACT, still)], 400, ("sensors",)).behaviour["sensors"][0]
@@ -97,7 +97,7 @@ def test_a_dead_sensor_has_no_noise(quadruped: Robot):
         quadruped.anatomy.names.sensors.index(name)
         for name in ("front_left_angle", "back_left_touch")
     ]
-    drawn = draw_conditions((dead,), uncertain(quadruped), 2, np.random.default_rng(4))
+    drawn = draw_samples((dead,), uncertain(quadruped), 2, np.random.default_rng(4))
     outcome = Simulator(quadruped, 1).run_under(
         drawn, uncertain(quadruped), random_controllers(quadruped, 1), STEPS, ("sensors",)
     )
@@ -109,7 +109,7 @@ def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robo
     noisy = parse("sensor:front_left_angle=noise0.3", quadruped.anatomy)
     column = quadruped.anatomy.names.sensors.index("front_left_angle")
     unknown = dataclasses.replace(certain(quadruped), start=StartSpread(1e-9, 0.0))
-    drawn = draw_conditions((noisy,), unknown, 3, np.random.default_rng(7))
+    drawn = draw_samples((noisy,), unknown, 3, np.random.default_rng(7))
     still = Playback(quadruped.anatomy.names.motors, np.zeros((5, len(quadruped.anatomy.motors))))
     outcome = Simulator(quadruped, 1).run_under(drawn, unknown, [still], 5, ("sensors",))
 
@@ -122,7 +122,7 @@ def test_a_robot_without_sensors_has_conditions(quadruped: Robot):
     for sensor in list(spec.sensors):
         spec.delete(sensor)
     bare = Robot("bare", spec.to_xml(), quadruped.control_timestep)
-    drawn = draw_conditions((INTACT,), uncertain(bare), 2, np.random.default_rng(0))
+    drawn = draw_samples((INTACT,), uncertain(bare), 2, np.random.default_rng(0))
     outcome = Simulator(bare, 1).run_under(
         drawn, uncertain(bare), random_controllers(bare, 1), STEPS, ("sensors",)
     )
@@ -133,18 +133,18 @@ def test_a_robot_without_sensors_has_conditions(quadruped: Robot):
 def test_hypotheses_that_cannot_be_told_apart_are_simulated_in_turn(quadruped: Robot):
     alike = [parse(text, quadruped.anatomy) for text in ("intact", "friction=0.5", "wind=3")]
     rng = np.random.default_rng(5)
-    drawn = draw_conditions(alike, uncertain(quadruped), 6, rng)
+    drawn = draw_samples(alike, uncertain(quadruped), 6, rng)
 
     assert [own.hypothesis for own in drawn[:3]] == [own.hypothesis for own in drawn[3:]]
     assert {own.hypothesis for own in drawn} == set(alike)
-    firsts = {draw_conditions(alike, certain(quadruped), 1, rng)[0].hypothesis for _ in range(40)}
+    firsts = {draw_samples(alike, certain(quadruped), 1, rng)[0].hypothesis for _ in range(40)}
     assert firsts == set(alike)
 
 
 @pytest.mark.parametrize("delay", [0, 2])
 def test_an_added_delay_makes_commands_arrive_later(quadruped: Robot, delay: int):
     late = dataclasses.replace(certain(quadruped), delays=(delay,))
-    (condition,) = draw_conditions((INTACT,), late, 1, np.random.default_rng(6))
+    (condition,) = draw_samples((INTACT,), late, 1, np.random.default_rng(6))
 
     assert condition.embodiment(quadruped).added_delay.tolist() == [delay]
     slow = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
