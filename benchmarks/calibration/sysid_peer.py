@@ -19,7 +19,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields, state_writer
-from selfmodel.simulation.fit import MAX_LOG_FACTOR
+from selfmodel.simulation.factor_sets import MAX_LOG_FACTOR
 from selfmodel.simulation.model_factors import (
     Parameters,
     factor_names,

@@ -22,7 +22,8 @@ from selfmodel.errors import InputError
 from selfmodel.logs.files import create_file, refuse_existing
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
-from selfmodel.simulation.fit import FACTORS, NOMINAL
+from selfmodel.simulation.factor_sets import FACTORS
+from selfmodel.simulation.fit import NOMINAL
 from selfmodel.simulation.threads import thread_count
 
 

@@ -14,13 +14,12 @@ from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.batch import SimulationStats
+from selfmodel.simulation.factor_sets import FACTORS, JOINT_PRIOR_DEVIATIONS, prior_deviations
 from selfmodel.simulation.fit import (
-    JOINT_PRIOR_DEVIATIONS,
     NOMINAL,
     Fit,
     is_determined,
     nested_fits,
-    prior_deviations,
 )
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import (
@@ -109,7 +108,7 @@ class Calibration:
     error_before: float
     error: float
     joints: JointCalibration | None = None
-    chosen: str = NOMINAL
+    chosen: str = FACTORS
     determined: tuple[bool, ...] = ()
     held_out_gain: float = 0.0
     suspicion: Suspicion | None = None

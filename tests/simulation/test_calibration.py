@@ -21,7 +21,7 @@ from selfmodel.simulation.calibration import (
     calibrate,
     prediction_error,
 )
-from selfmodel.simulation.fit import FACTORS, MAX_LOG_FACTOR, prior_deviations
+from selfmodel.simulation.factor_sets import FACTORS, MAX_LOG_FACTOR, prior_deviations
 from selfmodel.simulation.model_factors import (
     SHARED,
     Parameters,

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.fit import (
-    UNDETERMINED_SHARE,
-    bases,
-    consistent_information,
-    is_determined,
-    prior_deviations,
-)
+from selfmodel.simulation.factor_sets import bases, prior_deviations
+from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import nominal
 from selfmodel.tasks import ROBOTS
 from tests.helpers.robots.arms import arm
