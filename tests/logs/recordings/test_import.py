@@ -73,6 +73,7 @@ def test_a_frame_as_recorded_stays(bag: Path, biped: Robot):
     behaviour = imported(bag, biped, text).behaviour
     assert np.allclose(behaviour["base_position"][0], [0.02, 0.03, 0.005])
     assert np.allclose(behaviour["base_orientation"][0], [np.cos(0.5), 0, 0, np.sin(0.5)])
+    assert np.allclose(np.linalg.norm(behaviour["base_linear_velocity"], axis=1), 0.005)
 
 
 def test_degrees_become_radians(bag: Path, biped: Robot):
@@ -302,6 +303,7 @@ def test_a_command_stands_through_silence(biped: Robot, tmp_path: Path):
     items = without("/commands", recorded())
     items += [("/commands", T0, array([0.1] * 4)), ("/commands", T0 + 5 * 10**8, array([0.2] * 4))]
     behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
+    assert behaviour.steps == 99  # the end of the commands is not that of the trial
     assert np.array_equal(behaviour["commands"][:, 0], np.where(behaviour.time < 0.5, 0.1, 0.2))
 
 
