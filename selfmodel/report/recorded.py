@@ -205,7 +205,8 @@ def recorded_calibration(
     fit = converted(path, result.calibration, CalibrationResult, what, remedy)
     if fit.joints is not None:
         return fitted(robot, healthy, threads)
-    names = (field.name for field in dataclasses.fields(Parameters))
+    # Factors of single joints and bodies are of other fits, and stay nominal.
+    names = {field.name for field in dataclasses.fields(Parameters)} & set(fit.__struct_fields__)
     parameters = Parameters(**{name: getattr(fit, name) for name in names})
     count = len(factor_names(robot))
     sizes = {len(parameters.factors), len(fit.deviations), len(fit.determined) or count}

@@ -101,7 +101,7 @@ def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
     def distance(judged: Trial) -> float:
         asked = comparator.prepare(judged).request
         outcome = Simulator(QUADRUPED, 1).predict([INTACT], asked).behaviour
-        return float(comparator.prepare(judged).distances(outcome)[0])
+        return float(comparator.prepare(judged).losses(outcome).total.mean())
 
     if comparator is SEGMENT_PREDICTION:
         assert distance(trial) < 1e-20
@@ -124,7 +124,8 @@ def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tm
 
     asked = SEGMENT_PREDICTION.prepare(log.trial).request
     predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
-    intact, *others = SEGMENT_PREDICTION.prepare(log.trial).distances(predicted)
+    losses = SEGMENT_PREDICTION.prepare(log.trial).losses(predicted)
+    intact, *others = losses.total.mean(axis=1)
     assert log.timing is not None
     assert np.flatnonzero(log.timing.missing).tolist() == [90]
     assert np.flatnonzero(log.timing.late).tolist() == list(LATE)
