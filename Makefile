@@ -37,6 +37,9 @@ $(TOOLS): $(READY)
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
 	$(BIN)/selfmodel recover quadruped --case 1
 
+picture: $(READY) ## draw the picture of the README from the newest run of `make demo`; needs EGL or OSMesa
+	$(BIN)/python examples/plot_lanes.py "$$(ls -dt runs/quadruped-* | head -n 1)" docs/figures/lanes.png
+
 test: $(TOOLS) ## run the fast tests: every promise, in about three minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 

@@ -3,7 +3,8 @@
 Usage: MUJOCO_GL=osmesa python examples/plot_lanes.py RUN_FOLDER FIGURE.png
 
 Each lane shows the robot at several moments of one trial, and a line each 5 m. A detached limb is
-not drawn. The picture needs EGL or OSMesa, as ``selfmodel render`` does.
+not drawn. The file has the displacements as text, too, with which a test compares the README. The
+picture needs EGL or OSMesa, as ``selfmodel render`` does.
 """
 
 import json
@@ -13,6 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
+from PIL.PngImagePlugin import PngInfo
 
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.film import evenly, film_of
@@ -53,13 +55,14 @@ def main(folder: Path, figure: Path) -> None:
     truth = json.loads((folder / "result.json").read_text(encoding="utf-8"))["truth"]
     shown = {"before": (logs[0], "intact"), "after": (logs[1], truth), "recovery": (best, truth)}
     image = Image.fromarray(_rendered(list(shown.values()), list(COLOURS.values())))
-    draw = ImageDraw.Draw(image)
+    draw, numbers = ImageDraw.Draw(image), PngInfo()
     font = ImageFont.load_default(20)
     for row, (stage, (log, _)) in enumerate(shown.items()):
         text = f"{TITLES[stage]}: {log.trial.displacement:.2f} m"
         colour = tuple(round(255 * part) for part in COLOURS[stage])
         draw.text((24, 18 + 28 * row), text, fill=colour, font=font)
-    image.save(figure)
+        numbers.add_text(stage, f"{log.trial.displacement:.1f}")
+    image.save(figure, pnginfo=numbers)
 
 
 def _rendered(

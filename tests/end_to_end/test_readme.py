@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.helpers.code_blocks import Block, blocks, commands
 
@@ -64,6 +65,17 @@ def test_every_command_is_this_projects_and_what_make_runs_is_run_by_ci():
         if command.startswith("make "):
             assert re.search(rf"\b{re.escape(command)}(?![\w-])", ci), command
     assert f"$(BIN)/{DEMO}" in (ROOT / "Makefile").read_text(encoding="utf-8")
+
+
+def test_the_numbers_of_the_demo_are_those_of_its_picture():
+    with Image.open(ROOT / "docs" / "figures" / "lanes.png") as picture:
+        numbers = [picture.info[stage] for stage in ("before", "after", "recovery")]
+
+    text = README.read_text(encoding="utf-8")
+    before, after, recovered = numbers
+    assert f"walks {before} m in ten seconds, {after} m after the loss, and {recovered} m" in text
+    assert f"in place of {before}" in text
+    assert f"in place of {recovered}" in text
 
 
 def test_a_block_of_the_readme_is_run_or_says_why_not():
