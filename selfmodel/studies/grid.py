@@ -1,5 +1,6 @@
 """A grid of cells, computed by any executor and continued after any interruption."""
 
+import asyncio
 import multiprocessing
 import os
 import signal
@@ -11,6 +12,7 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
+    ThreadPoolExecutor,
     wait,
 )
 from contextlib import contextmanager, suppress
@@ -133,16 +135,26 @@ def dask_executor(address: str) -> Iterator[Executor]:
     """
     try:
         import dask  # noqa: PLC0415  # an extra
-        from distributed import Client  # noqa: PLC0415  # an extra
+        from distributed import Client, Security  # noqa: PLC0415  # an extra
+        from distributed.comm import connect  # noqa: PLC0415  # an extra
     except ImportError as error:
         raise InputError(
             "a Dask cluster needs the package distributed: pip install 'selfmodel[dask]'"
         ) from error
     place = address if "://" in address else f"tcp://{address}"
+
+    async def greet() -> None:
+        """Connects once: a client waits without a limit for a server that accepts and is mute."""
+        options = Security().get_connection_args("client")
+        async with asyncio.timeout(CONNECT_SECONDS):
+            comm = await connect(place, timeout=CONNECT_SECONDS, **options)
+            await comm.close()
+
     # The connection itself has a timeout of its own, and is tried until that of the client ends.
     limits = dask.config.set({"distributed.comm.timeouts.connect": f"{CONNECT_SECONDS}s"})
     try:
-        with limits:
+        with limits, ThreadPoolExecutor(1) as own:  # a notebook has an event loop in this thread
+            own.submit(asyncio.run, greet()).result()
             client = Client(place, timeout=CONNECT_SECONDS)
     except (OSError, ValueError, RuntimeError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]

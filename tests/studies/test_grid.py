@@ -22,6 +22,8 @@ from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor, run_grid
 from tests.helpers.grids import calls, cell, cells, shared
 
 ROOT = Path(__file__).parents[2]
+LIMIT = 300
+"""Longest wait for another process, s: on a machine with other work, a start takes a minute."""
 
 SCRIPT = """
 import sys
@@ -61,9 +63,13 @@ def start(folder: Path) -> "subprocess.Popen[bytes]":
         stderr=subprocess.PIPE,
         start_new_session=True,
     )
+    limit = time.monotonic() + LIMIT
     while not list(folder.glob("study/runs/*/cell.json")):
         assert process.poll() is None
-        time.sleep(0.01)
+        if time.monotonic() > limit:
+            process.kill()
+            pytest.fail(f"no first result within {LIMIT} s")
+        time.sleep(0.05)
     return process
 
 
@@ -311,7 +317,7 @@ def test_an_executor_that_has_ended_is_named(tmp_path: Path, threads: ThreadPool
 def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
     process = start(tmp_path)
     process.kill()
-    process.communicate()
+    process.communicate(timeout=LIMIT)
     done = names(tmp_path / "study")
     assert 0 < len(done) < 6
 
@@ -325,7 +331,7 @@ def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
 def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
     process = start(tmp_path)
     os.killpg(process.pid, signal.SIGINT)  # a terminal's Ctrl-C reaches the workers too
-    _, told = process.communicate(timeout=60)  # ends when the last of them has closed it
+    _, told = process.communicate(timeout=LIMIT)  # ends when the last of them has closed it
     started = calls(tmp_path).total()
     time.sleep(0.5)
 
@@ -337,7 +343,7 @@ def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
 def test_two_commands_at_one_study_agree(tmp_path: Path):
     process = start(tmp_path)
     failed = run_grid(tmp_path / "study", cells(tmp_path, 6, seconds=0.3), workers=2)
-    out, _ = process.communicate(timeout=60)
+    out, _ = process.communicate(timeout=LIMIT)
 
     assert (failed, process.returncode) == ((), 0)
     assert names(tmp_path / "study") == [f"run-{seed:02d}" for seed in range(6)]

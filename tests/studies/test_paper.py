@@ -1,0 +1,96 @@
+"""Promises of the paper's experiment: medians over runs, fair costs, and what the paper reports."""
+
+import csv
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from selfmodel.settings import Settings
+from selfmodel.studies.paper import UNKNOWN, PaperResults, page, tables_of, write_results
+from selfmodel.studies.recoveries import ON_ROBOT
+from selfmodel.studies.tables import csv_bytes
+from tests.helpers.study_rows import evolution, recovery, trials
+
+
+def results(rows: Iterable, trial_rows: Iterable = (), grown: Iterable = ()) -> PaperResults:
+    return PaperResults(Settings(), list(rows), list(trial_rows), list(grown))
+
+
+def test_a_row_of_table_two_has_medians_and_counts_of_its_runs():
+    rows = [
+        recovery(seed=0, recovered=1.0),
+        recovery(seed=1, recovered=1.6, correct=False),
+        recovery(seed=2, recovered=4.0),
+        recovery(seed=3, recovered=9.0, before=-0.1),  # did not walk forward: in no ratio
+    ]
+    found, other = results([*rows, recovery(case=7, before=0.0)]).summaries()
+
+    assert (found["runs"], found["right"], found["best"]) == (4, 3, "intact")
+    assert (found["recovered"], found["recovery"]) == (2.8, 0.8)
+    assert (found["lowest"], found["highest"]) == (0.5, 2.0)
+    assert found["restored"] == 2  # 0.8 is restored, 0.5 is not
+    assert (found["restored_in_paper"], other["restored_in_paper"]) == (True, False)
+    assert (other["recovery"], other["lowest"]) == (None, None)
+
+
+def test_costs_are_of_the_runs_that_all_ways_of_a_robot_have():
+    easy, hard = {"case": 9}, {"case": 7}
+    rows = [
+        *trials([2.0, 0.0, 2.0], **easy),
+        *trials([2.0, 0.0, 1.0], **hard),
+        *trials([2.0, 0.0, 2.0], comparator="b", **hard),
+        *trials([2.0, 0.0, 2.0], robot="hexapod"),  # paired for itself
+    ]
+    found = results([], rows, evolution([0.5, 1.0], **hard))
+
+    assert {
+        (cost["robot"], cost["way"], cost["physical_trials"]): cost["recovery"]
+        for cost in found.costs()
+    } == {
+        ("quadruped", "a", 1): 0.5,
+        ("quadruped", "b", 1): 1.0,
+        ("quadruped", ON_ROBOT, 10): 0.25,
+        ("quadruped", ON_ROBOT, 20): 0.5,
+        ("hexapod", "a", 1): 1.0,
+    }
+    assert sorted(cost["physical_trials"] for cost in found.last_costs()) == [1, 1, 1, 20]
+    seeds = [row for seed in range(5) for row in trials([2.0, 0.0, float(seed)], seed=seed)]
+    (one,) = results([], seeds).costs()
+    assert (one["low"], one["recovery"], one["high"], one["runs"]) == (0.5, 1.0, 1.5, 5)
+    assert results([], trials([2.0, 0.0, 2.0]), evolution([1.0], case=2)).costs() == []
+
+
+def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    rows = [recovery(), recovery(case=7, correct=False), recovery(robot="hexapod", case=7)]
+    given = results(rows, trials([2.0, 0.0, 1.0, 3.0]), evolution([1.0]))
+    monkeypatch.setattr(sys.modules[write_results.__module__], "collect", lambda _folder: given)
+    _, files = write_results(tmp_path)
+    text = (tmp_path / "paper.md").read_text()
+
+    assert {path.stem for path in files if path.suffix == ".png"} == {
+        *("figure-1", "figure-5", "figure-6"),
+    }
+    assert all(f"({path.name})" in text for path in files if path.suffix == ".png")
+    for line in (
+        "| 1 | a lower leg breaks off | `break:front_left_knee` |  |",
+        "| 7 | a | not restored | 1 of 1 | 0 of 1 | 2.00 | 0.50 | 2.00 | 1.00 | `intact` | 50 |",
+        f"| quadruped | {ON_ROBOT} | 10 | 1 | 0.50 |",
+        "| quadruped | a | 2 | 1 | 1.50 |",
+        "7, 8 of the quadruped; 4, 7, 10 of the hexapod",
+        "trials after the failing one: 3; the paper's.",
+        *UNKNOWN,
+    ):
+        assert line in text
+    kept = json.loads((tmp_path / "results.json").read_text())
+    assert [row["case"] for row in kept["table_2"]] == [1, 7, 7]
+    with (tmp_path / "costs.csv").open() as file:
+        assert [row["recovery"] for row in csv.DictReader(file)] == ["0.5", "1.5", "0.5"]
+    assert [csv_bytes(table.records) for table in tables_of(given)][1] == (
+        tmp_path / "table-2.csv"
+    ).read_bytes()
+    assert "figure-6" not in page(results(rows))
