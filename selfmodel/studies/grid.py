@@ -136,7 +136,7 @@ def dask_executor(address: str) -> Iterator[Executor]:
     try:
         import dask  # noqa: PLC0415  # an extra
         from distributed import Client, Security  # noqa: PLC0415  # an extra
-        from distributed.comm import connect  # noqa: PLC0415  # an extra
+        from distributed.comm.core import connect  # noqa: PLC0415  # an extra
     except ImportError as error:
         raise InputError(
             "a Dask cluster needs the package distributed: pip install 'selfmodel[dask]'"
