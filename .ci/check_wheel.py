@@ -13,7 +13,7 @@ from pathlib import Path
 NEEDED = (
     *("selfmodel/py.typed", "selfmodel/__init__.pyi", "selfmodel/robot/__init__.pyi"),
     *("selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml"),
-    "selfmodel/cli/logs/foxglove-layout.json",
+    "selfmodel/cli/foxglove-layout.json",
     "selfmodel/studies/figures.mplstyle",
     "selfmodel/report/template.html",
 )

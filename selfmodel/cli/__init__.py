@@ -15,23 +15,71 @@ from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.physical.safety import handle_stop_signals, status_of
 
 COMMANDS = {
-    "robots": ("selfmodel.cli.robots:robots", "List the robots, or the parts of one."),
-    "recover": ("selfmodel.cli.recover:recover", "Diagnose a failure and evolve a new gait."),
-    "trial": ("selfmodel.cli.trial:trial", "Run and log one trial of the simulated robot."),
-    "calibrate": ("selfmodel.cli.calibrate:calibrate", "Fit the self-model to logged trials."),
-    "diagnose": ("selfmodel.cli.diagnose:diagnose", "Rank the hypotheses that explain logs."),
-    "replay": ("selfmodel.cli.replay:replay", "Simulate a logged trial again, and compare."),
-    "render": ("selfmodel.cli.render:render", "Draw a logged trial beside its simulation."),
-    "view": ("selfmodel.cli.view:view", "Open a logged trial and its simulation in Rerun."),
-    "report": ("selfmodel.cli.report:report", "Write a run, logs or a campaign as one HTML page."),
-    "ablate": ("selfmodel.cli.studies:ablate", "Compare comparators on the same trials."),
-    "suite": ("selfmodel.cli.suite:app", "Recover the bodies of dm_control's suite."),
-    "paper": ("selfmodel.cli.studies:paper", "Repeat the paper's experiment on its robots."),
-    "compare": ("selfmodel.cli.compare:compare", "Compare the methods of a study by pairs."),
-    "repertoire": ("selfmodel.cli.repertoire:app", "Make a repertoire of a robot's gaits."),
-    "logs": ("selfmodel.cli.logs:app", "Inspect, verify, salvage and import trial logs."),
+    "robots": (
+        "selfmodel.cli.commands:Robots",
+        "selfmodel.cli.robots:robots",
+        "List the robots, or the parts of one.",
+    ),
+    "recover": (
+        "selfmodel.cli.commands:Recover",
+        "selfmodel.cli.recover:recover",
+        "Diagnose a failure and evolve a new gait.",
+    ),
+    "trial": (
+        "selfmodel.cli.commands:RunTrial",
+        "selfmodel.cli.trial:trial",
+        "Run and log one trial of the simulated robot.",
+    ),
+    "calibrate": (
+        "selfmodel.cli.commands:Calibrate",
+        "selfmodel.cli.calibrate:calibrate",
+        "Fit the self-model to logged trials.",
+    ),
+    "diagnose": (
+        "selfmodel.cli.commands:Diagnose",
+        "selfmodel.cli.diagnose:diagnose",
+        "Rank the hypotheses that explain logs.",
+    ),
+    "replay": (
+        "selfmodel.cli.commands:ReplayTrial",
+        "selfmodel.cli.replay:replay",
+        "Simulate a logged trial again, and compare.",
+    ),
+    "render": (
+        "selfmodel.cli.commands:Render",
+        "selfmodel.cli.render:render",
+        "Draw a logged trial beside its simulation.",
+    ),
+    "view": (
+        "selfmodel.cli.commands:View",
+        "selfmodel.cli.view:view",
+        "Open a logged trial and its simulation in Rerun.",
+    ),
+    "report": (
+        "selfmodel.cli.commands:MakeReport",
+        "selfmodel.cli.report:report",
+        "Write a run, logs or a campaign as one HTML page.",
+    ),
+    "ablate": (
+        "selfmodel.cli.study_commands:Ablate",
+        "selfmodel.cli.studies:ablate",
+        "Compare comparators on the same trials.",
+    ),
+    "suite": ("selfmodel.cli.groups:suite", "", "Recover the bodies of dm_control's suite."),
+    "paper": (
+        "selfmodel.cli.study_commands:RepeatPaper",
+        "selfmodel.cli.studies:paper",
+        "Repeat the paper's experiment on its robots.",
+    ),
+    "compare": (
+        "selfmodel.cli.study_commands:Compare",
+        "selfmodel.cli.compare:compare",
+        "Compare the methods of a study by pairs.",
+    ),
+    "repertoire": ("selfmodel.cli.groups:repertoire", "", "Make a repertoire of a robot's gaits."),
+    "logs": ("selfmodel.cli.groups:logs", "", "Inspect, verify, salvage and import trial logs."),
 }
-"""``module:function`` and one-line help per command."""
+"""Options, work and one-line help per command; see ``group``."""
 
 app = group(
     "selfmodel",

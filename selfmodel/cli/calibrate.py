@@ -1,20 +1,12 @@
 """``selfmodel calibrate``: the self-model fitted to logs of the healthy robot."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from selfmodel import arguments
-from selfmodel.cli.arguments.inputs import check_folder
-from selfmodel.cli.arguments.options import (
-    Json,
-    LogFiles,
-    SelfModel,
-    Threads,
-)
+from selfmodel.cli.commands import Calibrate
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
@@ -27,42 +19,24 @@ from selfmodel.simulation.fit import NOMINAL
 from selfmodel.simulation.threads import thread_count
 
 
-def calibrate(
-    files: LogFiles,
-    *,
-    out: Annotated[
-        Path,
-        typer.Option(
-            *("--out", "-o"), metavar="MODEL.xml", help="MJCF file to write; it must not exist."
-        ),
-    ],
-    robot: SelfModel = None,
-    threads: Threads = 0,
-    as_json: Json = False,
-) -> None:
-    """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
-
-    Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
-
-    Give trials of the healthy robot: a fault in them would become part of the model. Commands
-    that read logs take the new model as --robot MODEL.xml.
-    """
+def calibrate(options: Calibrate) -> None:
+    """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials."""
     start = perf_counter()
-    if out.suffix.lower() != ".xml":
-        raise InputError(f"--out needs a name that ends in .xml, got {str(out)!r}")
-    check_folder(out)
-    refuse_existing(out)
-    logs = arguments.read_logs(files)
-    before = arguments.robot_of_logs(logs, robot)
-    _refuse_assets(before, robot or str(files[0]))
+    if options.out.suffix.lower() != ".xml":
+        raise InputError(f"--out needs a name that ends in .xml, got {str(options.out)!r}")
+    check_folder(options.out)
+    refuse_existing(options.out)
+    logs = arguments.read_logs(options.files)
+    before = arguments.robot_of_logs(logs, options.robot)
+    _refuse_assets(before, options.robot or str(options.files[0]))
     trials = [log.trial for log in logs]
-    fit = fit_to(before, trials, thread_count(threads))
-    with create_file(out) as file:
+    fit = fit_to(before, trials, thread_count(options.threads))
+    with create_file(options.out) as file:
         file.write(fit.robot.mjcf.encode())
     result = {
         "robot": before.name,
-        "logs": [str(path) for path in files],
-        "model": str(out),
+        "logs": [str(path) for path in options.files],
+        "model": str(options.out),
         "parameters": fit.rows(),
         "delay": fit.parameters.delay,
         "delay_before": before.control_delay,
@@ -79,7 +53,7 @@ def calibrate(
     }
     if fit.suspicion is not None:
         print_notes(f"warning: {fit.suspicion}")
-    if as_json:
+    if options.as_json:
         print_json(result)
     else:
         _print(result, fit.contacts)

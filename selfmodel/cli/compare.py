@@ -1,22 +1,19 @@
 """``selfmodel compare``: paired comparisons of the methods of a study, as tables and figures."""
 
 from itertools import groupby
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import pandas as pd
-import typer
 
-from selfmodel.cli.arguments.options import Json
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
+from selfmodel.cli.study_commands import Compare
 from selfmodel.errors import InputError
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import LEVEL
 from selfmodel.studies.rows import LoadedStudy, load, whole
 from selfmodel.studies.study import Row
 from selfmodel.studies.tables import (
-    FORMATS,
     as_json as json_of,
     check_format,
     frame_table,
@@ -28,51 +25,23 @@ COMPARISON = "comparison"
 """Folder of the files, in the folder of a study."""
 
 
-def compare(
-    study: Annotated[
-        Path,
-        typer.Argument(
-            metavar="STUDY",
-            help="Folder of ablate, paper or suite run; or its results.csv; or the results.jsonl "
-            "of other methods.",
-        ),
-    ],
-    *,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="DIR",
-            help="Folder of the tables and figures.",
-            show_default=f"STUDY/{COMPARISON}",
-        ),
-    ] = None,
-    table: Annotated[
-        str,
-        typer.Option(
-            "--table", "--table-format", metavar="|".join(FORMATS), help="Format of the tables."
-        ),
-    ] = "csv",
-    as_json: Json = False,
-) -> None:
-    """Compare the methods of a study by pairs: tests, intervals, marginal means, figures.
-
-    Two methods are compared on the physical robots and trials that both had. The p values are
-    corrected for the number of pairs in a table by Holm's method. Nothing is run.
-    """
-    check_format(table)
-    if out is None and not study.is_dir():
-        raise InputError(f"{study} is no folder of a study: give the folder of the tables, -o DIR")
-    found = load(study)
+def compare(options: Compare) -> None:
+    """Compare the methods of a study by pairs: tests, intervals, marginal means, figures."""
+    check_format(options.table)
+    if options.out is None and not options.study.is_dir():
+        raise InputError(
+            f"{options.study} is no folder of a study: give the folder of the tables, -o DIR"
+        )
+    found = load(options.study)
     pairs, means = found.comparisons(), found.marginal_means()
     tables = [
         frame_table("rows", found.rows),
         frame_table("marginal-means", means, list(map(_mean_texts, _records(means))), texts=2),
         frame_table("comparisons", pairs, list(map(_pair_texts, _records(pairs))), texts=3),
     ]
-    content = table_files(tables, table) | figures.of_comparisons(pairs)
-    files = list(map(str, write_files(out or study / COMPARISON, content)))
-    if as_json:
+    content = table_files(tables, options.table) | figures.of_comparisons(pairs)
+    files = list(map(str, write_files(options.out or options.study / COMPARISON, content)))
+    if options.as_json:
         shown = {"comparisons": pairs, "marginal_means": means}
         facts = {"study": found.kind, "rows": len(found.rows), "warnings": list(found.warnings())}
         print_json(

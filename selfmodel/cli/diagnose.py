@@ -9,20 +9,8 @@ from typing import Any
 
 from selfmodel import arguments, plugins
 from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
-from selfmodel.arguments import AUTO, comparator_choice
-from selfmodel.cli.arguments.options import (
-    DEFAULT_KIND_NAMES,
-    Calibrated,
-    ComparatorName,
-    Json,
-    KindNames,
-    LogFiles,
-    LoggedGenerations,
-    LoggedPopulation,
-    LoggedSeed,
-    SelfModel,
-    Threads,
-)
+from selfmodel.arguments import comparator_choice
+from selfmodel.cli.commands import Diagnose
 from selfmodel.cli.output.display import display
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
@@ -49,36 +37,20 @@ from selfmodel.settings import Settings
 from selfmodel.trials.trial import trial_names
 
 
-def diagnose(
-    files: LogFiles,
-    *,
-    robot: SelfModel = None,
-    comparator: ComparatorName = AUTO,
-    kinds: KindNames = DEFAULT_KIND_NAMES,
-    calibrate: Calibrated = True,
-    population: LoggedPopulation = None,
-    generations: LoggedGenerations = None,
-    seed: LoggedSeed = None,
-    threads: Threads = 0,
-    as_json: Json = False,
-) -> None:
-    """Rank hypotheses by how well they predict logged trials, without a robot.
-
-    Give the logs in the order in which the trials were run. The self-model is fitted to the
-    trials from before the failure, and the hypotheses predict all others.
-    """
+def diagnose(options: Diagnose) -> None:
+    """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
-    considered = plugins.kinds(kinds)
+    considered = plugins.kinds(options.kinds)
     made = diagnose_logs(
-        files,
-        robot=robot,
-        choose_comparator=comparator_choice(comparator),
+        options.files,
+        robot=options.robot,
+        choose_comparator=comparator_choice(options.comparator),
         kinds=considered,
-        calibrate=calibrate,
-        population=population,
-        generations=generations,
-        seed=seed,
-        threads=threads,
+        calibrate=options.calibrate,
+        population=options.population,
+        generations=options.generations,
+        seed=options.seed,
+        threads=options.threads,
     )
     found, diagnosis = made.inputs, made.diagnosis
     evidence = direct_evidence(
@@ -95,7 +67,7 @@ def diagnose(
         logs=tuple(log.trial.path for log in made.explained),
         played_back=tuple(log.trial.path for log in made.played_back),
         intact=tuple(trial.path for trial in found.healthy),
-        files={str(path): file_digest(path) for path in files},
+        files={str(path): file_digest(path) for path in options.files},
         calibration=found.calibration.to_dict() if found.calibration else None,
         **output_of(diagnosis),
         evidence=to_json(evidence),
@@ -103,7 +75,7 @@ def diagnose(
         distinct_hypotheses=found.search.distinct_hypotheses,
         seconds=perf_counter() - start,
     )
-    if as_json:
+    if options.as_json:
         print_json(values_of(result))
     else:
         _print(values_of(result), diagnosis, evidence)

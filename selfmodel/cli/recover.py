@@ -4,44 +4,11 @@ from datetime import datetime
 from functools import partial
 from os.path import relpath
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from selfmodel import arguments, plugins
-from selfmodel.arguments import AUTO, comparator_choice, repertoire_of
-from selfmodel.cli.arguments import inputs
-from selfmodel.cli.arguments.options import (
-    DEFAULT_KIND_NAMES,
-    Calibrated,
-    Case,
-    ComparatorName,
-    ControllerKind,
-    Damage,
-    GapLevel,
-    Generations,
-    Json,
-    KindNames,
-    ModelSettings,
-    Neurons,
-    NextTrialName,
-    Population,
-    RobotName,
-    Seed,
-    Steps,
-    Threads,
-    Trials,
-)
-from selfmodel.cli.arguments.repair_options import (
-    MaxJointSpeed,
-    MaxJointTorque,
-    MaxSelfCollision,
-    RecoveryScore,
-    Reference,
-    RepairName,
-    RepertoireFile,
-    SearchName,
-)
+from selfmodel.arguments import comparator_choice, repertoire_of
+from selfmodel.cli import inputs
+from selfmodel.cli.commands import Recover
 from selfmodel.cli.output.display import displacement_text, display
 from selfmodel.cli.output.printing import print_json, print_notes
 from selfmodel.cli.output.report import print_report, recovery_result
@@ -66,76 +33,32 @@ from selfmodel.studies.scores import choose_score
 from selfmodel.trials.trial import Trial
 
 
-def recover(
-    robot: RobotName,
-    *,
-    case: Case = None,
-    damage: Damage = None,
-    model_settings: ModelSettings = None,
-    comparator: ComparatorName = AUTO,
-    calibrate: Calibrated = True,
-    gap: GapLevel = 0.0,
-    kinds: KindNames = DEFAULT_KIND_NAMES,
-    next_trial: NextTrialName = "repair",
-    controller: ControllerKind = "network",
-    neurons: Neurons = None,
-    repair: RepairName = plugins.ROBUST,
-    search: SearchName = None,
-    repertoire: RepertoireFile = None,
-    score: RecoveryScore = None,
-    reference: Reference = None,
-    max_joint_speed: MaxJointSpeed = None,
-    max_joint_torque: MaxJointTorque = None,
-    max_self_collision: MaxSelfCollision = None,
-    seed: Seed = 0,
-    steps: Steps = 1000,
-    trials: Trials = 3,
-    population: Population = 100,
-    generations: Generations = 30,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="DIR",
-            help="Folder of the run, new or empty.",
-            show_default="a new one in runs",
-        ),
-    ] = None,
-    threads: Threads = 0,
-    report: Annotated[
-        bool,
-        typer.Option(
-            "--report",
-            help="Write report.html in the folder of the run, anew after each trial.",
-        ),
-    ] = False,
-    as_json: Json = False,
-) -> None:
-    """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
-
-    The physical robot is a simulated one with the failure of --case or --damage, which the
-    algorithm does not read. Every physical trial becomes a log in the folder of the run.
-    """
-    entry = arguments.robot_entry(robot, model_settings or ())
-    considered = plugins.kinds(kinds)
-    damaged = inputs.case_notation(entry.cases, case, damage)
+def recover(options: Recover) -> None:
+    """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
+    entry = arguments.robot_entry(options.robot, options.model_settings or ())
+    considered = plugins.kinds(options.kinds)
+    damaged = inputs.case_notation(entry.cases, options.case, options.damage)
     made = entry.robot()
-    design = plugins.design(controller, made, neurons)
+    design = plugins.design(options.controller, made, options.neurons)
     truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
     check_silent_neurons(design, silent_neurons(truth))
-    gaits = repertoire_of(repertoire, made, design)
-    plugins.repair(repair, search, gaits)  # an unknown name is refused before any work
-    settings = Settings(steps=steps, trials=trials, generations=generations).scaled(population)
+    gaits = repertoire_of(options.repertoire, made, design)
+    plugins.repair(
+        options.repair, options.search, gaits
+    )  # an unknown name is refused before any work
+    settings = Settings(
+        steps=options.steps, trials=options.trials, generations=options.generations
+    ).scaled(options.population)
     chosen = choose_score(
-        score or plugins.DEFAULT_SCORES[repair],
+        options.score or plugins.DEFAULT_SCORES[options.repair],
         entry,
         design,
-        steps=steps,
-        seed=seed,
-        reference=reference,
-        max_speed=max_joint_speed,
-        max_torque=max_joint_torque,
-        max_self_collision=max_self_collision,
+        steps=options.steps,
+        seed=options.seed,
+        reference=options.reference,
+        max_speed=options.max_joint_speed,
+        max_torque=options.max_joint_torque,
+        max_self_collision=options.max_self_collision,
     )
     if chosen.gait is not None:
         print_notes(
@@ -145,27 +68,29 @@ def recover(
         )
     experiment = Experiment(
         robot=made,
-        case=case,
+        case=options.case,
         truth=truth,
-        choose_comparator=comparator_choice(comparator),
+        choose_comparator=comparator_choice(options.comparator),
         kinds=considered,
-        calibrated=calibrate,
+        calibrated=options.calibrate,
         settings=settings,
-        seed=seed,
-        threads=thread_count(threads),
-        folder=out or _new_folder(made.name),
-        gap=gap,
-        next_trial=plugins.next_trial(next_trial),
+        seed=options.seed,
+        threads=thread_count(options.threads),
+        folder=options.out or _new_folder(made.name),
+        gap=options.gap,
+        next_trial=plugins.next_trial(options.next_trial),
         design=design,
         gait=chosen.gait,
         score=chosen.score,
         physical=entry.physical,
-        repair=repair,
-        search=search,
+        repair=options.repair,
+        search=options.search,
         repertoire=gaits,
     )
     with display(partial(_described, made, chosen.score)) as on_event:
-        progress = Progress(experiment.folder, made, on_event, experiment.threads, reports=report)
+        progress = Progress(
+            experiment.folder, made, on_event, experiment.threads, reports=options.report
+        )
         with progress.kept_on_failure():
             outcome = run(experiment, progress)
     result = recovery_result(experiment, outcome)
@@ -177,12 +102,14 @@ def recover(
         )
         replace_file(experiment.folder / RESULT, result_bytes(content))
     finally:  # the result is printed even if the disk is full
-        if as_json:
+        if options.as_json:
             print_json(values_of(result))
         else:
             print_report(values_of(result), outcome.recovery.diagnosis, experiment.folder)
-    if report:
-        subject = subject_of_run(experiment.folder, experiment.threads, comparator, considered)
+    if options.report:
+        subject = subject_of_run(
+            experiment.folder, experiment.threads, options.comparator, considered
+        )
         replace_file(experiment.folder / REPORT, html_of(report_of(subject)))
         print_notes(f"report: {experiment.folder / REPORT}")
 

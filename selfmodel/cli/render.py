@@ -11,22 +11,15 @@ from contextlib import suppress
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 from PIL import Image
 from rich.progress import track
 
-from selfmodel.cli.arguments.inputs import check_folder
-from selfmodel.cli.arguments.options import (
-    Json,
-    LogFile,
-    NamedKinds,
-    SelfModel,
-    Threads,
-)
+from selfmodel.cli.commands import Render
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import counted, plain
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
@@ -71,70 +64,32 @@ PICTURE_SECONDS = 60
 Frames = Iterator[NDArray[np.uint8]]
 
 
-def render(
-    file: LogFile,
-    *,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="PICTURE",
-            help="Film (.gif, .mp4) or strip of stick figures (.png, .svg, .pdf) to write.",
-            show_default="beside the log, .gif",
-        ),
-    ] = None,
-    hypothesis: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NOTATION",
-            help="Hypothesis to simulate, such as break:front_left_knee.",
-            show_default="intact",
-        ),
-    ] = None,
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="Simulate the best hypothesis of a diagnosis: the result.json of a recovery, or "
-            "the output of `selfmodel diagnose --json`.",
-        ),
-    ] = None,
-    kinds: NamedKinds = "all",
-    model: SelfModel = None,
-    stick: Annotated[
-        bool,
-        typer.Option("--stick", help="Draw the film with stick figures, which needs no OpenGL."),
-    ] = False,
-    pictures: Annotated[
-        int, typer.Option(min=2, max=50, metavar="N", help="Pictures of a strip.")
-    ] = 6,
-    threads: Threads = 0,
-    as_json: Json = False,
-) -> None:
-    """Draw a logged trial beside a simulation of the same controller.
-
-    The logged motion is on the left or above, the simulation of the hypothesis beside or below
-    it. In both, a limb that the hypothesis detaches is pale and a jammed part is red.
-    """
-    if not file.name:
-        raise InputError(f"expected a trial log, NAME.mcap, got the folder {file}")
-    out = file.with_suffix(".gif") if out is None else out
+def render(options: Render) -> None:
+    """Draw a logged trial beside a simulation of the same controller."""
+    out = options.out
+    if not options.file.name:
+        raise InputError(f"expected a trial log, NAME.mcap, got the folder {options.file}")
+    out = options.file.with_suffix(".gif") if out is None else out
     kind = out.suffix.lower()
-    _check_name(out, kind, stick=stick)
-    if hypothesis is not None and diagnosis is not None:
+    _check_name(out, kind, stick=options.stick)
+    if options.hypothesis is not None and options.diagnosis is not None:
         raise InputError("expected --hypothesis or --diagnosis, got both: leave one out")
     if kind == ".mp4":
         ffmpeg()  # a missing program is an error before any work is done
-    library = None if stick or kind in STRIPS else choose_gl()
+    library = None if options.stick or kind in STRIPS else choose_gl()
     if library is None:
         os.environ[GL] = "disable"
     # MuJoCo reads MUJOCO_GL as it is imported, so the library is chosen before.
     from selfmodel.cli.film import filmed  # noqa: PLC0415
     from selfmodel.cli.replayed_log import replayed_log  # noqa: PLC0415
 
-    notation = (hypothesis or "intact") if diagnosis is None else best_hypothesis(diagnosis)
-    given = replayed_log(file, notation, kinds=kinds, model=model)
-    film, facts = _film(given, pictures if kind in STRIPS else None, threads)
+    notation = (
+        (options.hypothesis or "intact")
+        if options.diagnosis is None
+        else best_hypothesis(options.diagnosis)
+    )
+    given = replayed_log(options.file, notation, kinds=options.kinds, model=options.model)
+    film, facts = _film(given, options.pictures if kind in STRIPS else None, options.threads)
     print_notes(*(f"note: {note}" for note in facts["notes"]))
     if library is None:
         from selfmodel.cli.sticks import stick_frames, strip  # noqa: PLC0415  # matplotlib
@@ -148,8 +103,13 @@ def render(
         data = (gif if kind == ".gif" else mp4)(_shown(frames, len(film.time)))
     replace_file(out, data)
     drawn_by = "matplotlib" if library is None else "mujoco"
-    if as_json:
-        told = {"log": str(file), "robot": given.robot.name, "model": model, **facts}
+    if options.as_json:
+        told = {
+            "log": str(options.file),
+            "robot": given.robot.name,
+            "model": options.model,
+            **facts,
+        }
         told |= {"out": str(out), "frames": len(film.time), "bytes": len(data)}
         print_json(told | {"drawn_by": drawn_by, "gl": library})
         return

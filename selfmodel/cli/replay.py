@@ -1,20 +1,11 @@
 """``selfmodel replay``: a logged trial simulated again, and compared with its log."""
 
 import math
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import mujoco
-import typer
 
-from selfmodel.cli.arguments.options import (
-    HypothesisText,
-    Json,
-    LogFile,
-    NamedKinds,
-    SelfModel,
-    Threads,
-)
+from selfmodel.cli.commands import ReplayTrial
 from selfmodel.cli.output.plain import counted
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.replay_figure import check_figure, draw
@@ -43,40 +34,26 @@ COLUMNS: tuple[tuple[Signal, str], ...] = (
 )
 
 
-def replay(
-    file: LogFile,
-    *,
-    hypothesis: HypothesisText = "intact",
-    kinds: NamedKinds = "all",
-    model: SelfModel = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"), metavar="FIGURE.png", help="Figure of the error: .png, .svg or .pdf."
-        ),
-    ] = None,
-    threads: Threads = 0,
-    as_json: Json = False,
-) -> None:
+def replay(options: ReplayTrial) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
-    if out is not None:
-        check_figure(out)
-    given = replayed_log(file, hypothesis, kinds=kinds, model=model)
+    if options.out is not None:
+        check_figure(options.out)
+    given = replayed_log(options.file, options.hypothesis, kinds=options.kinds, model=options.model)
     log, robot, assumed = given.log, given.robot, given.hypothesis
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    simulator = Simulator(robot, thread_count(threads))
+    simulator = Simulator(robot, thread_count(options.threads))
     found = simulate(log.trial, assumed, simulator, tolerance)
     if not found.observed:
         raise InputError(
-            f"{file}: nothing was observed: every number of the log is NaN, so there is nothing to "
-            f"compare a simulation with: give a log with observations"
+            f"{options.file}: nothing was observed: every number of the log is NaN, so there "
+            f"is nothing to compare a simulation with: give a log with observations"
         )
     result = {
-        "log": str(file),
+        "log": str(options.file),
         "robot": robot.name,
-        "model": model,
+        "model": options.model,
         "hypothesis": str(assumed),
         "steps": log.trial.behaviour.steps,
         "identical": found.identical,
@@ -86,10 +63,10 @@ def replay(
         "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
-    if out is not None:
-        draw(out, log, found, str(assumed))
-        result["figure"] = str(out)
-    if as_json:
+    if options.out is not None:
+        draw(options.out, log, found, str(assumed))
+        result["figure"] = str(options.out)
+    if options.as_json:
         print_json(result)
     else:
         _print(result, log, found)

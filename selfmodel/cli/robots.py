@@ -1,11 +1,9 @@
 """``selfmodel robots``: the robots of selfmodel, and the parts of a robot or a file."""
 
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from selfmodel.arguments import is_model, notes_on, robot_entry
-from selfmodel.cli.arguments.options import Json, ModelSettings
+from selfmodel.cli.commands import Robots
 from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.robot_parts import parts, print_parts
 from selfmodel.cli.output.tables import folding, print_tables
@@ -13,27 +11,19 @@ from selfmodel.robot.designs import network_for
 from selfmodel.tasks import ROBOTS, Entry
 
 
-def robots(
-    robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="Name of a robot, or path of an MJCF or URDF file."),
-    ] = None,
-    *,
-    model_settings: ModelSettings = None,
-    as_json: Json = False,
-) -> None:
+def robots(options: Robots) -> None:
     """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
-    if robot is None:
+    if options.robot is None:
         every = [_facts(robot_entry(name)) for name in ROBOTS]
-        if as_json:
+        if options.as_json:
             print_json({"robots": every})
         else:
             _print_all(every)
         return
-    entry = robot_entry(robot, model_settings or ())
-    notes = notes_on(robot, model_settings or ()) if is_model(robot) else ()
+    entry = robot_entry(options.robot, options.model_settings or ())
+    notes = notes_on(options.robot, options.model_settings or ()) if is_model(options.robot) else ()
     facts = {**_facts(entry), **parts(entry.robot()), "notes": list(notes)}
-    if as_json:
+    if options.as_json:
         print_json(facts)
         return
     print_parts(facts)

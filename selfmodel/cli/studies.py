@@ -4,47 +4,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import pandas as pd
-import typer
 
 from selfmodel.arguments import robot_entry
-from selfmodel.cli.arguments import inputs
-from selfmodel.cli.arguments.options import (
-    CONTROLLER,
-    DEFAULT_KIND_NAMES,
-    PAPER_KIND_NAMES,
-    STUDY,
-    Cases,
-    ComparatorName,
-    ComparatorNames,
-    ControllerKind,
-    Damages,
-    ExecutorName,
-    FirstSeed,
-    GapLevel,
-    GapLevels,
-    Generations,
-    Json,
-    KindNames,
-    Neurons,
-    Only,
-    Population,
-    Scheduler,
-    Seeds,
-    Steps,
-    StudyFolder,
-    Trials,
-    Workers,
-)
-from selfmodel.cli.arguments.repair_options import RepairName, StudyScore, StudySearch
-from selfmodel.cli.output.grid_display import PROCESSES, as_objects, end, run_shown
+from selfmodel.cli import inputs
+from selfmodel.cli.output.grid_display import as_objects, end, run_shown
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
-from selfmodel.comparators import COMPARATORS, DEFAULT
+from selfmodel.cli.study_commands import Ablate, ListSuite, RepeatPaper, RunSuite
+from selfmodel.comparators import COMPARATORS
 from selfmodel.faults.registry import kind_names
-from selfmodel.plugins import PAPER
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.studies import figures, plans
@@ -54,7 +25,6 @@ from selfmodel.studies.rows import outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import Interval
 from selfmodel.studies.study import Row, Study
 from selfmodel.studies.tables import (
-    FORMATS,
     Table,
     ablation_scores,
     as_json as json_of,
@@ -67,103 +37,36 @@ from selfmodel.studies.tables import (
 )
 from selfmodel.tasks import ROBOTS
 
-FORMAT_NAMES = "|".join(FORMATS)
-DEFAULT_PAPER_COMPARATORS = ",".join(plans.PAPER_COMPARATORS)
 
-TableFormat = Annotated[
-    str | None,
-    typer.Option(
-        "--table",
-        "--table-format",
-        metavar=FORMAT_NAMES,
-        help=f"Write the tables in this format too ({', '.join(FORMATS)}), into the folder tables "
-        f"of the study.",
-        rich_help_panel=STUDY,
-    ),
-]
-
-
-def ablate(
-    *,
-    out: StudyFolder,
-    robots: Annotated[
-        str, typer.Option(metavar="A,B|all", help="Robots.", rich_help_panel=STUDY)
-    ] = "all",
-    cases: Cases = "all",
-    damages: Damages = "",
-    kinds: KindNames = DEFAULT_KIND_NAMES,
-    comparators: ComparatorNames = "all",
-    gaps: GapLevels = "0",
-    seeds: Seeds = 1,
-    seed: FirstSeed = 0,
-    next_trial: Annotated[
-        str,
-        typer.Option(
-            metavar="WAY",
-            help="Choice of the trials' controllers: bank, the same gaits for all comparators; or "
-            "repair or disagreement, as in `selfmodel recover`.",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = plans.BANK,
-    repair: RepairName = PAPER,
-    search: StudySearch = None,
-    score: StudyScore = None,
-    steps: Steps = 1000,
-    trials: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=99,
-            metavar="N",
-            help="Physical trials of the damaged robot.",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = 3,
-    bank: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder of gaits, ROBOT-0.npz to ROBOT-5.npz.",
-            show_default="evolved",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = None,
-    population: Population = 100,
-    generations: Generations = 30,
-    workers: Workers = 0,
-    executor: ExecutorName = PROCESSES,
-    scheduler: Scheduler = None,
-    only: Only = "1/1",
-    table: TableFormat = None,
-    as_json: Json = False,
-) -> None:
-    """Compare comparators on the same trials: robots x cases x gaps x seeds.
-
-    The results are the rates of correct diagnoses, with 95 % intervals. An interrupted ablation
-    is continued by the same command.
-    """
-    check_format(table)
+def ablate(options: Ablate) -> None:
+    """Compare comparators on the same trials: robots x cases x gaps x seeds."""
+    cases = options.cases
+    check_format(options.table)
     cases = cases.strip()
     numbers = () if cases in ("all", "none") else inputs.whole_numbers("--case", cases, ())
     study = plans.ablation(
-        out,
-        robots=inputs.texts("--robots", robots, ROBOTS),
+        options.out,
+        robots=inputs.texts("--robots", options.robots, ROBOTS),
         cases=None if cases == "all" else numbers,
-        damages=[damage.strip() for damage in damages.split(",") if damage.strip()],
-        kinds=kind_names(kinds),
-        comparators=inputs.texts("--comparator", comparators, COMPARATORS),
-        gaps=inputs.numbers("--gap", gaps),
-        seeds=range(seed, seed + seeds),
-        settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
-        next_trial=next_trial,
-        bank=bank,
-        score=score,
-        repair=repair,
-        search=search,
-        only=inputs.share("--only", only),
+        damages=[damage.strip() for damage in options.damages.split(",") if damage.strip()],
+        kinds=kind_names(options.kinds),
+        comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
+        gaps=inputs.numbers("--gap", options.gaps),
+        seeds=range(options.seed, options.seed + options.seeds),
+        settings=Settings(
+            steps=options.steps, trials=options.trials, generations=options.generations
+        ).scaled(options.population),
+        next_trial=options.next_trial,
+        bank=options.bank,
+        score=options.score,
+        repair=options.repair,
+        search=options.search,
+        only=inputs.share("--only", options.only),
     )
-    failed = run_shown(study, executor=executor, scheduler=scheduler, workers=workers)
-    rows = study_rows(study.name, out)
+    failed = run_shown(
+        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
+    )
+    rows = study_rows(study.name, options.out)
     scores = ablation_scores(rows)
     ends = {one["trials"] for one in scores}
     shown = [one for one in scores if one["trials"] in (min(ends), max(ends))]
@@ -174,8 +77,8 @@ def ablate(
         results_files(study.name, rows, "scores", scores) | figures_of(rows, scores),
         [_score_table(scores)],
         {"rows": rows, "scores": scores},
-        table=table,
-        as_json=as_json,
+        table=options.table,
+        as_json=options.as_json,
         shown=_score_table(shown),
         legend="With 95 % intervals; time as a multiple of the paper's comparator's.",
         notes=[f"warning: {note}" for note in notes],
@@ -188,86 +91,42 @@ def figures_of(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
     return {f"figures/{name}": data for name, data in found.items()}
 
 
-def run_suite(
-    *,
-    out: StudyFolder,
-    domains: Annotated[
-        str,
-        typer.Option(
-            metavar="A,B|all",
-            help="Domains that `selfmodel suite list` lists, or MJCF and URDF files.",
-            rich_help_panel=STUDY,
-        ),
-    ] = "all",
-    tasks: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B|all",
-            help="Tasks of the domains.",
-            show_default="the first of each domain",
-            rich_help_panel=STUDY,
-        ),
-    ] = None,
-    cases: Cases = "all",
-    seeds: Seeds = 1,
-    seed: FirstSeed = 0,
-    only: Only = "1/1",
-    gap: GapLevel = 0.0,
-    repair: RepairName = PAPER,
-    search: StudySearch = None,
-    score: StudyScore = None,
-    controller: ControllerKind = "network",
-    neurons: Neurons = None,
-    comparator: ComparatorName = DEFAULT.name,
-    kinds: KindNames = PAPER_KIND_NAMES,
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            min=2,
-            max=10**6,
-            metavar="N",
-            help="Control steps of a trial.",
-            show_default="1000, an episode of the suite",
-            rich_help_panel=CONTROLLER,
-        ),
-    ] = None,
-    population: Population = 100,
-    generations: Generations = 30,
-    trials: Trials = 3,
-    workers: Workers = 0,
-    executor: ExecutorName = PROCESSES,
-    scheduler: Scheduler = None,
-    table: TableFormat = None,
-    as_json: Json = False,
-) -> None:
-    """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
-
-    An interrupted study is continued by the same command.
-    """
-    check_format(table)
-    names = inputs.texts("--domains", domains, plans.DOMAINS)
-    wanted = None if tasks is None else inputs.texts("--tasks", tasks, plans.tasks_of(names))
+def run_suite(options: RunSuite) -> None:
+    """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds."""
+    check_format(options.table)
+    names = inputs.texts("--domains", options.domains, plans.DOMAINS)
+    wanted = (
+        None
+        if options.tasks is None
+        else inputs.texts("--tasks", options.tasks, plans.tasks_of(names))
+    )
     bodies = plans.bodies_of(names, wanted)
     # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
-    length = steps if steps is not None else 1001 if score == "return" else 1000
-    study = plans.suite(
-        out,
-        bodies=bodies,
-        cases=inputs.whole_numbers("--case", cases, plans.known_cases(bodies)),
-        seeds=range(seed, seed + seeds),
-        settings=Settings(steps=length, trials=trials, generations=generations).scaled(population),
-        score=score,
-        controller=controller,
-        comparator=comparator,
-        kinds=kind_names(kinds),
-        gap=gap,
-        neurons=neurons,
-        repair=repair,
-        search=search,
-        only=inputs.share("--only", only),
+    length = (
+        options.steps if options.steps is not None else 1001 if options.score == "return" else 1000
     )
-    failed = run_shown(study, executor=executor, scheduler=scheduler, workers=workers)
-    rows = study_rows(study.name, out)
+    study = plans.suite(
+        options.out,
+        bodies=bodies,
+        cases=inputs.whole_numbers("--case", options.cases, plans.known_cases(bodies)),
+        seeds=range(options.seed, options.seed + options.seeds),
+        settings=Settings(
+            steps=length, trials=options.trials, generations=options.generations
+        ).scaled(options.population),
+        score=options.score,
+        controller=options.controller,
+        comparator=options.comparator,
+        kinds=kind_names(options.kinds),
+        gap=options.gap,
+        neurons=options.neurons,
+        repair=options.repair,
+        search=options.search,
+        only=inputs.share("--only", options.only),
+    )
+    failed = run_shown(
+        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
+    )
+    rows = study_rows(study.name, options.out)
     summaries = suite_summaries(rows)
     found = summary_table("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
     _finish(
@@ -276,17 +135,17 @@ def run_suite(
         results_files(study.name, rows, "summaries", summaries),
         [found],
         {"rows": rows, "summaries": summaries},
-        table=table,
-        as_json=as_json,
+        table=options.table,
+        as_json=options.as_json,
         shown=found,
         legend="Medians over the runs; right with its 95 % interval, %.",
     )
 
 
-def list_bodies(*, as_json: Json = False) -> None:
+def list_bodies(options: ListSuite) -> None:
     """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
     found = [_domain_facts(domain) for domain in plans.DOMAINS]
-    if as_json:
+    if options.as_json:
         print_json({"domains": found})
         return
     columns = ("domain", "tasks", "cases", "joints", "sensors", "motors", "weights", "step, s")
@@ -306,43 +165,23 @@ def list_bodies(*, as_json: Json = False) -> None:
     )
 
 
-def paper(
-    *,
-    out: StudyFolder,
-    robots: Annotated[
-        str,
-        typer.Option(metavar="A,B|all", help="The paper's robots.", rich_help_panel=STUDY),
-    ] = "all",
-    cases: Cases = "all",
-    comparators: ComparatorNames = DEFAULT_PAPER_COMPARATORS,
-    seeds: Seeds = 1,
-    seed: FirstSeed = 0,
-    steps: Steps = 1000,
-    trials: Trials = 3,
-    population: Population = 100,
-    generations: Generations = 30,
-    workers: Workers = 0,
-    executor: ExecutorName = PROCESSES,
-    scheduler: Scheduler = None,
-    table: TableFormat = None,
-    as_json: Json = False,
-) -> None:
-    """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown.
-
-    Each case is recovered with each comparator, and by evolution on the robot, the paper's
-    control. An interrupted experiment is continued by the same command.
-    """
-    check_format(table)
+def paper(options: RepeatPaper) -> None:
+    """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown."""
+    check_format(options.table)
     study = plans.paper(
-        out,
-        robots=inputs.texts("--robots", robots, ROBOTS),
-        cases=inputs.whole_numbers("--case", cases, plans.TABLE_ONE),
-        seeds=range(seed, seed + seeds),
-        comparators=inputs.texts("--comparator", comparators, COMPARATORS),
-        settings=Settings(steps=steps, trials=trials, generations=generations).scaled(population),
+        options.out,
+        robots=inputs.texts("--robots", options.robots, ROBOTS),
+        cases=inputs.whole_numbers("--case", options.cases, plans.TABLE_ONE),
+        seeds=range(options.seed, options.seed + options.seeds),
+        comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
+        settings=Settings(
+            steps=options.steps, trials=options.trials, generations=options.generations
+        ).scaled(options.population),
     )
-    failed = run_shown(study, executor=executor, scheduler=scheduler, workers=workers)
-    results, files = write_results(out)
+    failed = run_shown(
+        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
+    )
+    results, files = write_results(options.out)
     tables = tables_of(results)
     _finish(
         study,
@@ -350,8 +189,8 @@ def paper(
         {},
         tables,
         results.as_dict(),
-        table=table,
-        as_json=as_json,
+        table=options.table,
+        as_json=options.as_json,
         shown=tables[1],
         legend="Medians over the runs, m; the paper: whether it reports the case as restored.",
         written=files,

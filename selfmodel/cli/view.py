@@ -9,23 +9,15 @@ from collections.abc import Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Annotated, Any
+from typing import Any
 
 import mujoco
 import numpy as np
-import typer
 
 from selfmodel.arrays import FloatArray
-from selfmodel.cli.arguments.inputs import check_folder
-from selfmodel.cli.arguments.options import (
-    HypothesisText,
-    Json,
-    LogFile,
-    NamedKinds,
-    SelfModel,
-    Threads,
-)
+from selfmodel.cli.commands import View
 from selfmodel.cli.film import Film, film_of
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.replayed_log import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
@@ -66,62 +58,33 @@ DETACHED: Colour = (170, 170, 170, 255)
 JAMMED: Colour = (200, 40, 40, 255)
 
 
-def view(
-    file: LogFile,
-    *,
-    hypothesis: HypothesisText = "intact",
-    kinds: NamedKinds = "all",
-    model: SelfModel = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="NEW.rrd",
-            help="File of Rerun to write, instead of opening its viewer.",
-        ),
-    ] = None,
-    port: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=65535,
-            metavar="N",
-            help="Port of Rerun's viewer on this computer; a viewer that has it is used.",
-        ),
-    ] = PORT,
-    threads: Threads = 0,
-    as_json: Json = False,
-) -> None:
-    """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis.
-
-    Beside the bodies are the joint positions of both, and the errors over time. The command also
-    prints how to open the same log in Foxglove.
-    """
-    if out is None:
+def view(options: View) -> None:
+    """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis."""
+    if options.out is None:
         check_display()
     else:
-        if out.suffix.lower() != ".rrd":
-            raise InputError(f"--out needs a name that ends in .rrd, got {str(out)!r}")
-        check_folder(out)
-        refuse_existing(out)
+        if options.out.suffix.lower() != ".rrd":
+            raise InputError(f"--out needs a name that ends in .rrd, got {str(options.out)!r}")
+        check_folder(options.out)
+        refuse_existing(options.out)
     import_rerun()  # a missing package is an error before any work is done
-    given = replayed_log(file, hypothesis, kinds=kinds, model=model)
-    found = given.replayed(threads)
+    given = replayed_log(options.file, options.hypothesis, kinds=options.kinds, model=options.model)
+    found = given.replayed(options.threads)
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")
-    if out is None:
-        open_viewer(given, found, port)
-    written = write_recording(out, given, found) if out else None
+    if options.out is None:
+        open_viewer(given, found, options.port)
+    written = write_recording(options.out, given, found) if options.out else None
     layout = layout_path()
-    if as_json:
+    if options.as_json:
         print_json(
             {
-                "log": str(file),
+                "log": str(options.file),
                 "robot": given.robot.name,
                 "hypothesis": str(given.hypothesis),
                 "steps": given.log.trial.behaviour.steps,
                 "diverged": found.diverged,
-                "out": str(out) if out else None,
+                "out": str(options.out) if options.out else None,
                 "bytes": written,
                 "foxglove_layout": str(layout),
             }
@@ -129,15 +92,18 @@ def view(
         return
     body = f"{given.robot.name} as logged, and simulated as {given.hypothesis}, transparent"
     print_lines(
-        f"{out}: {body}; open it with `rerun {out}`." if out else f"Rerun shows {body}.",
-        f"In Foxglove or Lichtblick: open the local file {file}, then import the layout {layout}.",
+        f"{options.out}: {body}; open it with `rerun {options.out}`."
+        if options.out
+        else f"Rerun shows {body}.",
+        f"In Foxglove or Lichtblick: open the local file {options.file}, then import the layout "
+        f"{layout}.",
         "The layout's plots of legs are of the quadruped: other robots need their own indices.",
     )
 
 
 def layout_path() -> Path:
     """Returns the path of the installed layout for Foxglove and Lichtblick."""
-    with as_file(files("selfmodel.cli.logs") / "foxglove-layout.json") as path:
+    with as_file(files("selfmodel.cli") / "foxglove-layout.json") as path:
         return path
 
 

@@ -213,12 +213,13 @@ def test_replay_of_another_hypothesis_shows_where_they_part(folder: Path, tmp_pa
 def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
+    from selfmodel.cli.commands import ReplayTrial  # noqa: PLC0415  # what is tested
     from selfmodel.cli.replay import TOLERANCE, replay  # noqa: PLC0415  # what is tested
 
     monkeypatch.setattr(mujoco, "__version__", "3.99.0")
-    replay(folder / "a.mcap", hypothesis="break:front_left_knee", as_json=True)
+    replay(ReplayTrial(file=folder / "a.mcap", hypothesis="break:front_left_knee", as_json=True))
     told = json.loads(capsys.readouterr().out)
-    replay(folder / "a.mcap", hypothesis="intact")
+    replay(ReplayTrial(file=folder / "a.mcap"))
     said = capsys.readouterr().out
 
     assert told["mujoco"]["running"] == "3.99.0"

@@ -7,7 +7,7 @@ import pytest
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from typer.testing import CliRunner
 
-from selfmodel.cli.logs import app
+from selfmodel.cli.groups import logs as app
 from selfmodel.logs import (
     CorruptError,
     IncompleteError,

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from selfmodel.cli.arguments.inputs import check_folder
+from selfmodel.cli.inputs import check_folder
 from selfmodel.cli.output.plain import figure_text
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing, replace_file

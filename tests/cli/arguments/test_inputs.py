@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 from typer.testing import CliRunner
 
-from selfmodel.cli import app
-from selfmodel.cli.arguments import inputs
+from selfmodel.cli import app, inputs
 from selfmodel.errors import InputError
 
 
