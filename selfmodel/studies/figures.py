@@ -19,8 +19,8 @@ from scipy.spatial import ConvexHull
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
-from selfmodel.studies.rows import failure_of, whole
-from selfmodel.studies.study import Row
+from selfmodel.studies.rows import counted_trials, failure_of, whole
+from selfmodel.studies.study import Row, grouped
 
 STYLE = Path(__file__).with_name("figures.mplstyle")
 """Style file of matplotlib: ``matplotlib.style.use(STYLE)`` draws other figures alike."""
@@ -117,7 +117,7 @@ def by_gap(scores: Sequence[Row]) -> Figure:
                     [(score["correct"].low, score["correct"].high) for score in line],
                     k,  # the same look in panels without all comparators
                 )
-        axes.set_title(f"{robot}, {_counted(trials)}")
+        axes.set_title(f"{robot}, {counted_trials(trials)}")
         axes.set_ylim(-0.03, 1.03)
         axes.set_xticks(gaps)
         axes.grid(axis="y")
@@ -174,7 +174,7 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
         axes.spines[:].set_visible(False)
         axes.set_title(f"gap {gap:g}", fontsize=10)
         axes.set_xlabel("case")
-    figure.suptitle(f"{robot}, {_counted(trials)}: right diagnoses, %")
+    figure.suptitle(f"{robot}, {counted_trials(trials)}: right diagnoses, %")
     return figure
 
 
@@ -259,11 +259,7 @@ def by_trial(
     comparators = list(dict.fromkeys(trial["comparator"] for trial in trials))
     cases = sorted({trial["case"] for trial in trials})
     lines: dict[tuple[Any, ...], list[list[float]]] = {}
-    runs: dict[tuple[Any, ...], list[Row]] = {}
-    for trial in trials:
-        key = trial["robot"], trial["case"], trial["comparator"], trial["seed"]
-        runs.setdefault(key, []).append(trial)
-    for key, one in runs.items():
+    for key, one in grouped(trials, "robot", "case", "comparator", "seed").items():
         lines.setdefault(key[:3], []).append(restored(one))
     size = (1.8 + 0.75 * max(len(cases), 4), 0.9 + 2.6 * len(robots))
     figure = Figure(figsize=size, layout="constrained")
@@ -447,10 +443,6 @@ def counts_text(counts: Iterable[int]) -> str:
         return "n = 0"
     low, high = ordered[0], ordered[-1]
     return f"n = {low}" if low == high else f"n = {low} to {high}"
-
-
-def _counted(trials: int) -> str:
-    return f"{trials} {'trial' if trials == 1 else 'trials'}"
 
 
 def _first_and_last(rows: Sequence[Row]) -> list[int]:

@@ -22,7 +22,7 @@ from selfmodel.studies.cells import finished
 from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import frame_of, study_rows
-from selfmodel.studies.study import RUNS, Row
+from selfmodel.studies.study import RUNS, Row, grouped
 from selfmodel.studies.tables import Table, csv_bytes, markdown_table, summary_table, write_files
 from selfmodel.tasks import ROBOTS
 
@@ -45,6 +45,10 @@ UNKNOWN = (
 
 RESTORED_FROM = 0.8
 """Share of the displacement before the failure from which a function counts as restored here."""
+
+
+RECOVERY = ("robot", "comparator", "case", "seed")
+"""Columns that tell the trials of one recovery from those of others."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +77,7 @@ class PaperResults:
 
     def summaries(self) -> list[Row]:
         """Returns Table II: a row per robot, case and comparator, in the order of the rows."""
-        groups: dict[tuple[Any, ...], list[Row]] = {}
-        for row in self.recoveries:
-            groups.setdefault((row["robot"], row["case"], row["comparator"]), []).append(row)
+        groups = grouped(self.recoveries, "robot", "case", "comparator")
         return [_summary(group) for group in groups.values()]
 
     def costs(self) -> list[Row]:
@@ -85,14 +87,14 @@ class PaperResults:
         with a displacement above 0 before the failure.
         """
         ways: dict[tuple[str, str], dict[tuple[Any, ...], list[tuple[int, float]]]] = {}
-        for recovery in by_recovery(self.trials):
-            first = recovery[0]
+        for (robot, way, case, seed), recovery in grouped(self.trials, *RECOVERY).items():
             steps = list(enumerate(best_so_far(recovery)))[1:]
-            ways.setdefault((first["robot"], first["comparator"]), {})[_run(first)] = steps
+            ways.setdefault((robot, way), {})[case, seed] = steps
         for row in self.evolution:
             runs = ways.setdefault((row["robot"], ON_ROBOT), {})
             share = _ratio(row["best"], row["before"])
-            runs.setdefault(_run(row), []).append((row["evaluations"], share))
+            point = row["case"], row["seed"]
+            runs.setdefault(point, []).append((row["evaluations"], share))
         found = []
         for (robot, way), runs in ways.items():
             others = [other for (name, _), other in ways.items() if name == robot]
@@ -222,14 +224,6 @@ def tables_of(found: PaperResults) -> list[Table]:
     ]
 
 
-def by_recovery(trials: Sequence[Row]) -> list[list[Row]]:
-    """Returns the trials of each recovery."""
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for trial in trials:
-        groups.setdefault((*_run(trial), trial["comparator"]), []).append(trial)
-    return list(groups.values())
-
-
 def best_so_far(trials: Sequence[Row]) -> list[float]:
     """Returns the share of the displacement before the failure that trials restored.
 
@@ -242,10 +236,6 @@ def best_so_far(trials: Sequence[Row]) -> list[float]:
     before, after, *recovery = (trial["displacement"] for trial in trials)
     largest = [max(recovery[: count + 1]) for count in range(len(recovery))]
     return [_ratio(displacement, before) for displacement in (after, *largest)]
-
-
-def _run(row: Row) -> tuple[Any, ...]:
-    return row["robot"], row["case"], row["seed"]
 
 
 def _ratio(displacement: float, before: float) -> float:

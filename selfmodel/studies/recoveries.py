@@ -229,12 +229,6 @@ def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str
     return [trial.plan.name for trial in trials]
 
 
-def read_trials(folder: Path) -> tuple[list[Trial], list[Trial]]:
-    """Returns the trials before and those after the failure, from the folder of their cell."""
-    trials = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
-    return trials[:HEALTHY_TRIALS], trials[HEALTHY_TRIALS:]
-
-
 def truth_of(parameters: Parameters, robot: Robot) -> Hypothesis:
     """Returns the failure of the physical robot of a point."""
     kinds = plugins.kinds(parameters["shared"]["kinds"])
@@ -247,33 +241,12 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     Raises:
         InputError: The comparator cannot compare the trials.
     """
-    healthy, trials = read_trials(needs["trials"])
+    folder, shared, counts = needs["trials"], parameters["shared"], []
+    logged = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
+    healthy, trials = logged[:HEALTHY_TRIALS], logged[HEALTHY_TRIALS:]
     robot = planned_entry(parameters).robot()
-    mjcf = (needs["trials"] / CALIBRATED).read_text(encoding="utf-8")
+    mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
     calibrated = dataclasses.replace(robot, mjcf=mjcf)
-    return {"diagnoses": diagnoses_of(parameters, robot, calibrated, healthy, trials)}
-
-
-def diagnoses_of(
-    parameters: Parameters,
-    robot: Robot,
-    calibrated: Robot,
-    healthy: Sequence[Trial],
-    trials: Sequence[Trial],
-) -> list[dict[str, Any]]:
-    """Returns a row per diagnosis: after the first and after the last trial.
-
-    Args:
-        parameters: Those of the point.
-        robot: The nominal robot.
-        calibrated: The calibrated self-model.
-        healthy: Trials before the failure.
-        trials: Trials after the failure, at least one.
-
-    Raises:
-        InputError: The comparator cannot compare the trials.
-    """
-    shared, counts = parameters["shared"], []
     search = DiagnosticSearch(
         Simulator(calibrated, threads=1),
         plugins.comparator(parameters["comparator"]),
@@ -291,7 +264,9 @@ def diagnoses_of(
     diagnose_trials(trials, search, parameters["seed"], on_event, after={1, len(trials)})
     truth = truth_of(parameters, robot)
     rows = _diagnosis_rows(watch, shared, robot, truth, trials)
-    return [{**row, "distinct_hypotheses": count} for row, count in zip(rows, counts, strict=True)]
+    for row, count in zip(rows, counts, strict=True):
+        row["distinct_hypotheses"] = count
+    return {"diagnoses": rows}
 
 
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:

@@ -63,7 +63,7 @@ def _of_ablation(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
     gaps = sorted(rows["gap"].unique())
     return [
         (
-            (row.robot, _counted(row.trials), *(() if gap is None else (f"gap {gap:g}",))),
+            (row.robot, counted_trials(row.trials), *(() if gap is None else (f"gap {gap:g}",))),
             row.comparator,
             (f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial),
             row.seed,
@@ -112,7 +112,7 @@ def _of_methods(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
             value = method_value(one, trials)
             oracle = oracles.get((one.robot, one.case, one.gap, one.seed), 0.0)
             run = one.method, (f"gap {one.gap:g}", f"{one.case:2d}"), one.seed
-            table = one.robot, f"after {_counted(trials)}"
+            table = one.robot, f"after {counted_trials(trials)}"
             found.append(((*table, "m"), *run, value, "number"))
             if oracle > 0:
                 found.append(((*table, "÷ oracle"), *run, value / oracle, "number"))
@@ -330,5 +330,6 @@ def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number,
     return truth if pd.isna(case) else f"{case:2d}"
 
 
-def _counted(trials: int) -> str:
+def counted_trials(trials: int) -> str:
+    """Returns a number of trials with its noun."""
     return f"{trials} {'trial' if trials == 1 else 'trials'}"

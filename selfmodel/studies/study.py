@@ -139,6 +139,14 @@ def study_in(folder: Path) -> str | None:
     return None if first is None else str(first.parameters.get(SHARED, {}).get("study"))
 
 
+def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+    """Returns rows by their values of some columns, in the order of the first row of each group."""
+    found: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[name] for name in names), []).append(row)
+    return found
+
+
 def file_name(text: str) -> str:
     """Returns a text as a part of a file name."""
     return re.sub(r"[^\w.-]", "_", text, flags=re.ASCII).lstrip(".-") or "_"

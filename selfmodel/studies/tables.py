@@ -18,7 +18,7 @@ from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.studies.comparisons import ends
 from selfmodel.studies.rows import KINDS, REFERENCE, frame_of
 from selfmodel.studies.statistics import Interval, proportion, ratio
-from selfmodel.studies.study import Row
+from selfmodel.studies.study import Row, grouped
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
@@ -33,21 +33,17 @@ def ablation_scores(rows: Sequence[Row]) -> list[dict[str, Any]]:
         those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery trial
         over that before the failure. The last two are None without such runs.
     """
-    run = ("truth", "seed")
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        key = tuple(row[name] for name in ("robot", "gap", "comparator", "trials"))
-        groups.setdefault(key, []).append(row)
+    groups = grouped(rows, "robot", "gap", "comparator", "trials")
     found = []
     for (robot, gap, comparator, trials), own in sorted(groups.items()):
         reference = {
-            tuple(row[name] for name in run): row["seconds"]
+            (row["truth"], row["seed"]): row["seconds"]
             for row in groups.get((robot, gap, REFERENCE, trials), [])
         }
         times = [
             (row["seconds"], reference[key])
             for row in own
-            if (key := tuple(row[name] for name in run)) in reference
+            if (key := (row["truth"], row["seed"])) in reference
         ]
         scores = [
             (row["recovered"], row["before"])
@@ -83,10 +79,8 @@ def suite_summaries(rows: Sequence[Row]) -> list[dict[str, Any]]:
         median of the ``seconds``.
     """
     found = []
-    for robot in dict.fromkeys(row["robot"] for row in rows):
-        own = [row for row in rows if row["robot"] == robot]
-        for case in sorted({row["case"] for row in own}):
-            same = [row for row in own if row["case"] == case]
+    for (robot,), own in grouped(rows, "robot").items():
+        for (case,), same in sorted(grouped(own, "case").items()):
             found.append(_suite_summary(robot, case, same[0]["truth"], same))
         single = [row for row in own if row["case"] in SINGLE]
         if single:
