@@ -26,7 +26,7 @@ from selfmodel.errors import InputError
         ("--next-trial", "repairs", "did you mean repair?"),
         ("--only", "3/2", "--only needs i/n"),
         ("--only", "0/2", "--only needs i/n"),
-        ("--executor", "slrum", "unknown executor 'slrum': did you mean slurm?"),
+        ("--executor", "slrum", "unknown executor 'slrum'"),
         ("--executor-option", "partition", "--executor-option needs distinct names with values"),
         ("--executor-option", "a=1,a=2", "--executor-option needs distinct names with values"),
         ("--executor-option", "partition=cpu", "expected --executor-option with --executor slurm"),
