@@ -128,7 +128,7 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert f"clock: {late} late, {missing} missing" in told.stdout
     told = selfmodel("logs", "verify", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
     stopped = f"ok: trial.mcap: 70 steps, stopped ({log.reason})"
-    assert told.stdout == f"{stopped}; digest {verified.digest}\n"
+    assert told.stdout == f"{stopped}; SHA-256 {verified.digest}\n"
 
 
 @pytest.mark.process
