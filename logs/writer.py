@@ -44,8 +44,8 @@ from selfmodel.logs.records import (
 )
 from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
 from selfmodel.logs.viewers import urdf
-from selfmodel.physical.safety import (
-    cleanup,
+from selfmodel.physical.safety import cleanup
+from selfmodel.physical.stop_signals import (
     handle_stop_signals,
     hold_stop_signals,
     release_stop_signals,

@@ -57,12 +57,12 @@ logs = group(
         ),
         "import": (
             "selfmodel.cli.commands:ImportRecording",
-            "selfmodel.cli.logs:import_",
+            "selfmodel.cli.recordings:import_",
             "Import a recording as a log.",
         ),
         "export": (
             "selfmodel.cli.commands:ExportTable",
-            "selfmodel.cli.logs:export",
+            "selfmodel.cli.recordings:export",
             "Write a log's signals as a table.",
         ),
     },

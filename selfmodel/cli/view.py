@@ -6,7 +6,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from importlib.resources import as_file, files
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -18,6 +17,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.cli.commands import View
 from selfmodel.cli.film import Film, film_of
 from selfmodel.cli.inputs import check_folder
+from selfmodel.cli.logs import layout_path
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.replayed_log import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
@@ -99,12 +99,6 @@ def view(options: View) -> None:
         f"{layout}.",
         "The layout's plots of legs are of the quadruped: other robots need their own indices.",
     )
-
-
-def layout_path() -> Path:
-    """Returns the path of the installed layout for Foxglove and Lichtblick."""
-    with as_file(files("selfmodel.cli") / "foxglove-layout.json") as path:
-        return path
 
 
 def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:

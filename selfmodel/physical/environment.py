@@ -14,14 +14,8 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
-from selfmodel.physical.safety import (
-    HangError,
-    HeldIterator,
-    Limit,
-    Watchdog,
-    cleanup,
-    release_stop_signals,
-)
+from selfmodel.physical.safety import HangError, Limit, Watchdog, cleanup
+from selfmodel.physical.stop_signals import HeldIterator, release_stop_signals
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample, StepTiming

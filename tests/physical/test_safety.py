@@ -20,12 +20,11 @@ import selfmodel
 from selfmodel.errors import InputError, TrialError, WorkError, describe
 from selfmodel.logs.inspection import verify
 from selfmodel.physical.environment import EnvironmentRobot
-from selfmodel.physical.safety import (
+from selfmodel.physical.safety import Watchdog, cleanup
+from selfmodel.physical.stop_signals import (
     STOP_SIGNALS,
     HeldIterator,
     Terminated,
-    Watchdog,
-    cleanup,
     handle_stop_signals,
     hold_stop_signals,
     release_stop_signals,
@@ -116,7 +115,7 @@ def test_a_repetition_within_milliseconds_is_the_same_signal():
 def test_a_second_signal_ends_the_process_at_once(number: signal.Signals):
     code = (
         "import signal, time\n"
-        "from selfmodel.physical.safety import handle_stop_signals\n"
+        "from selfmodel.physical.stop_signals import handle_stop_signals\n"
         "with handle_stop_signals():\n"
         "    try:\n"
         f"        signal.raise_signal({number.value})\n"
