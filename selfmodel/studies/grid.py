@@ -17,6 +17,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, Self
 
@@ -352,6 +353,7 @@ class _Pool:
     def submit(self, folder: Path, cell: Cell) -> "Future[tuple[float, str | None]]":
         if self._pool is None:
             context = multiprocessing.get_context("spawn")
+            _start_resource_tracker()
             self._pool = ProcessPoolExecutor(self._workers, context, _begin_worker)
         try:
             return self._pool.submit(compute, folder, cell, dict(made_with(cell.function)))
@@ -369,6 +371,19 @@ class _Pool:
             return False
         self._pool = None
         return True
+
+
+def _start_resource_tracker() -> None:
+    """Starts Python's resource tracker so that a terminal that closes does not end it.
+
+    It ignores SIGINT and SIGTERM by itself; ended by SIGHUP, it is started again, and prints a
+    traceback for each semaphore that it does not know.
+    """
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _begin_worker() -> None:
