@@ -48,7 +48,7 @@ RESTORED_FROM = 0.8
 
 
 RECOVERY = ("robot", "comparator", "case", "seed")
-"""Columns that tell the trials of one recovery from those of others."""
+"""Columns by which the trials of one recovery differ from those of others."""
 
 
 @dataclass(frozen=True)

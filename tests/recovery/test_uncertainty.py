@@ -48,6 +48,7 @@ def fitted(robot: Robot, trial: Trial) -> tuple[Simulator, Calibration]:
     return Simulator(calibration.robot, 1), calibration
 
 
+@pytest.mark.search
 @pytest.mark.parametrize("level", [0.05, 0.1])
 def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
     quadruped: Robot, level: float, tmp_path: Path
@@ -66,6 +67,7 @@ def test_the_noise_of_the_readings_is_that_of_the_physical_robot(
     assert found.models.bodies.max() == BODIES
 
 
+@pytest.mark.search
 def test_contacts_are_uncertain_where_the_calibration_changed_them(
     quadruped: Robot, tmp_path: Path
 ):

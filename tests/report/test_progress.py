@@ -84,6 +84,7 @@ def test_a_damaged_file_is_named_and_a_folder_without_one_has_none(tmp_path: Pat
         read_searches(tmp_path)
 
 
+@pytest.mark.search
 def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -73,6 +73,7 @@ def fitted() -> Calibration:
     return calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=1)
 
 
+@pytest.mark.search
 def test_the_delay_is_found_exactly():
     assert fitted().parameters.delay == TRUE.delay
     assert fitted().robot.control_delay == TRUE.delay
@@ -258,6 +259,7 @@ def test_a_trial_with_no_stretch_of_all_of_it_is_refused():
         calibrate(QUADRUPED, [never_both], 1)
 
 
+@pytest.mark.search
 def test_factors_that_predict_left_out_segments_no_better_stay_nominal_to_the_bit():
     """A trial in the model's own physics, with noise: there is nothing to fit."""
     rng = np.random.default_rng(0)

@@ -11,7 +11,6 @@ from tests.helpers.command import selfmodel
         ("ablate", "--table"),
         ("suite", "run", "--table"),
         ("paper", "--table"),
-        ("baseline", "--table-format"),
         ("compare", "study", "--table"),
     ],
 )

@@ -26,6 +26,7 @@ def angles(most: float) -> st.SearchStrategy[float]:
 
 # The same examples in every run: a rare one leaves an error of 1.03e-5 m after the steps, from
 # the six digits of numbers in an MJCF, and the bound is 1e-5 m.
+@pytest.mark.search
 @settings(derandomize=True)
 @given(
     height=st.floats(2, 3),  # in the air: contacts are as soft as the reference pose makes them
