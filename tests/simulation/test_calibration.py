@@ -15,6 +15,7 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import fit
 from selfmodel.simulation.calibration import (
     EXACT_ERROR,
     Calibration,
@@ -91,8 +92,8 @@ def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
-    monkeypatch.setattr("selfmodel.simulation.fit.PRIOR_WEIGHT", 0.005)
-    monkeypatch.setattr("selfmodel.simulation.fit.MAX_ITERATIONS", 20)
+    weak = dataclasses.replace(fit.FLOATING, prior_weight=0.005, iterations=20)
+    monkeypatch.setattr(fit, "FLOATING", weak)
     found = calibrate(QUADRUPED, trials(with_parameters(QUADRUPED, TRUE)), threads=2)
     off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
 
