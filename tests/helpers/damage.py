@@ -1,25 +1,30 @@
-"""Damaged bytes, of any file, as a hypothesis strategy."""
+"""Damaged bytes, of any file: what disks, cables and crashes make of it."""
+
+import random
 
 from hypothesis import strategies as st
 
 KINDS = ("flips", "cut", "garbage", "zeros", "lost", "twice", "swapped")
 
 
-@st.composite
-def damaged(draw: st.DrawFn, data: bytes) -> bytes:
-    """Draws what disks, cables and crashes make of a file."""
-    place = st.integers(0, len(data) - 1)
-    kind = draw(st.sampled_from(KINDS))
+def damaged(data: bytes) -> st.SearchStrategy[bytes]:
+    """Returns a strategy of damaged forms of a file."""
+    return st.integers(0, 2**63).map(lambda seed: spoilt(data, random.Random(seed)))  # noqa: S311 - no secret
+
+
+def spoilt(data: bytes, rng: random.Random) -> bytes:
+    """Returns one damaged form of a file."""
+    kind = rng.choice(KINDS)
     if kind == "flips":
-        spoilt = bytearray(data)
-        for _ in range(draw(st.integers(1, 3))):
-            spoilt[draw(place)] ^= 1 << draw(st.integers(0, 7))
-        return bytes(spoilt)
-    first, second = sorted((draw(place), draw(place)))
-    end = min(first + draw(st.integers(1, 600)), second + 1)
+        content = bytearray(data)
+        for _ in range(rng.randint(1, 3)):
+            content[rng.randrange(len(data))] ^= 1 << rng.randint(0, 7)
+        return bytes(content)
+    first, second = sorted((rng.randrange(len(data)), rng.randrange(len(data))))
+    end = min(first + rng.randint(1, 600), second + 1)
     others = {
         "cut": b"",
-        "garbage": draw(st.binary(min_size=1, max_size=99)) + data[end:],
+        "garbage": rng.randbytes(rng.randint(1, 99)) + data[end:],
         "zeros": bytes(end - first) + data[end:],
         "lost": data[end:],
         "twice": data[first:end] + data[first:],
