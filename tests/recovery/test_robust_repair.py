@@ -37,6 +37,8 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable
 from tests.recovery.test_repertoire import ORIGIN
 
+pytestmark = pytest.mark.search
+
 NOISY_EA = partial(Evolution, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)

@@ -34,6 +34,8 @@ from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import lacking
 
+pytestmark = pytest.mark.search
+
 
 def healthy_trial(robot: Robot, gap: float, folder: Path, steps: int = 600) -> Trial:
     physical = selfmodel.simulated_robot(robot, gap=gap, seed=1)

@@ -39,6 +39,8 @@ from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, unstable
 from tests.helpers.robots.arms import robot_of as arm_of
 
+pytestmark = pytest.mark.search
+
 STEPS = 400
 LOGS_OF_0_1 = Path(__file__).parents[1] / "data" / "logs-0.1"
 QUADRUPED = ROBOTS["quadruped"].robot()
