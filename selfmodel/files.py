@@ -94,7 +94,7 @@ def new_file(path: Path, *, replace: bool = False) -> Iterator[IO[bytes]]:
             part.replace(path)
         else:
             give_name(part, path)
-    except BaseException:
+    except BaseException:  # Ctrl-C, too: no half of a file is left
         with suppress(OSError):  # the first error is the reason
             part.unlink(missing_ok=True)  # on a full disk, half a file takes space
         raise

@@ -273,7 +273,7 @@ def mp4(frames: Frames) -> bytes:
                     for frame in chain([first], frames):
                         encoder.stdin.write(frame.tobytes())  # type: ignore[union-attr]  # a pipe
                     encoder.stdin.close()  # type: ignore[union-attr]
-            except BaseException:
+            except BaseException:  # Ctrl-C, too: no encoder is left running
                 encoder.kill()
                 raise
         if encoder.returncode != 0 or not path.exists():
