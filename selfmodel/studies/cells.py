@@ -142,18 +142,17 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, s
             f"the worker on {os.uname().nodename} has {listed(own)}, the command has "
             f"{listed(made)}: a study is of one version of each; install the same there"
         )
-    begin = time.perf_counter()
-    place = folder / f"{cell.kind}/{_folder_name(cell.definition, made)}"
+    begin, place = time.perf_counter(), folder / cell.place
     if _is_complete(place):
         return 0.0, None
-    make_folder(folder / UNFINISHED / cell.kind)
     # A new name that nobody has: no link is followed, and no file is replaced.
-    own_folder = folder / UNFINISHED / cell.kind / f"{place.name}.{secrets.token_hex(8)}"
-    own_folder.mkdir()
+    unfinished = folder / UNFINISHED / cell.kind / f"{place.name}.{secrets.token_hex(8)}"
+    make_folder(unfinished.parent)
+    unfinished.mkdir()
     try:
-        error = _perform(folder, cell, own_folder, begin, made)
+        error = _perform(folder, cell, unfinished, begin)
         if error is None:
-            _publish(own_folder, place)
+            _publish(unfinished, place)
             (folder / ERRORS / f"{place.name}.txt").unlink(missing_ok=True)  # of an earlier failure
         return time.perf_counter() - begin, error
     except OSError as cause:
@@ -161,20 +160,18 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, s
             return 0.0, None
         raise OSError(str(cause)) from None  # errors with arguments of their own cannot be sent
     finally:
-        shutil.rmtree(own_folder, ignore_errors=True)
+        shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _perform(
-    folder: Path, cell: Cell, own: Path, begin: float, made: Mapping[str, str]
-) -> str | None:
+def _perform(folder: Path, cell: Cell, own: Path, begin: float) -> str | None:
     """Calls the function of a cell, and writes its ``cell.json`` or the reason of its failure."""
     module, _, name = cell.function.partition(":")
     try:
-        needs = {key: folder / need.place for key, need in cell.needs.items()}
         with warnings.catch_warnings():
             # A result contains whether a simulation diverged; raw text does not name the cell.
             warnings.simplefilter("ignore", RuntimeWarning)
             work: Work = getattr(importlib.import_module(module), name)
+            needs = {key: folder / need.place for key, need in cell.needs.items()}
             result = work(cell.parameters, needs, own)
         paths = sorted(path for path in own.rglob("*") if path.is_file())
         content = {
@@ -182,25 +179,19 @@ def _perform(
             "result": result,
             "files": [path.relative_to(own).as_posix() for path in paths],
             "seconds": time.perf_counter() - begin,
-            "made_with": dict(made),
+            "made_with": dict(made_with(cell.function)),
         }
         text = json.dumps({**content, "sha256": _digest(content)}, indent=1, allow_nan=False)
-    except OSError as cause:
-        if is_full(cause):
+    except (OSError, InputError, WorkError, MemoryError) as cause:
+        if isinstance(cause, OSError) and is_full(cause):
             raise not_written(cause.filename or own, cause) from cause
-        reason = text = str(cause) or type(cause).__name__
-    except (InputError, WorkError, MemoryError) as cause:
-        reason = text = str(cause) or type(cause).__name__
+        return keep_error(folder, cell.place, str(cause) or type(cause).__name__)
     except Exception as cause:  # noqa: BLE001  # a plug-in may raise any exception
-        line = " ".join(traceback.format_exception_only(cause)[-1].split())
-        text = "".join(traceback.format_exception(cause))
-        reason = f"an unexpected error, {line[:300]}"
-    else:
-        replace_file(own / CELL, f"{text}\n".encode())
-        return None
-    place = f"{cell.kind}/{_folder_name(cell.definition, made)}"
-    kept = keep_error(folder, place, text)
-    return kept if reason == text else f"{reason}; its traceback is in {folder / ERRORS}"
+        keep_error(folder, cell.place, "".join(traceback.format_exception(cause)))
+        line = " ".join(traceback.format_exception_only(cause)[-1].split())[:300]
+        return f"an unexpected error, {line}; its traceback is in {folder / ERRORS}"
+    replace_file(own / CELL, f"{text}\n".encode())
+    return None
 
 
 def keep_error(folder: Path, place: str, text: str) -> str:
@@ -223,9 +214,9 @@ def _publish(unfinished: Path, place: Path) -> None:
         if _is_complete(place):
             return
         # A cell without its result, or without files that are needed again.
-        place.rename(unfinished.with_name(f"{unfinished.name}.old"))
+        old = place.rename(unfinished.with_name(f"{unfinished.name}.old"))
         unfinished.rename(place)
-        shutil.rmtree(unfinished.with_name(f"{unfinished.name}.old"), ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
     sync_folder(place.parent)
 
 

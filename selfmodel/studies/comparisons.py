@@ -1,13 +1,8 @@
-"""Paired comparisons of the methods of a study, and their marginal means, by frames of outcomes.
-
-An outcome is the value that one method reached in one run. Outcomes with the same ``table``,
-``cell`` and ``seed`` are of the same physical robot and the same trials, so methods are compared by
-pairs.
-"""
+"""Paired comparisons of the methods of a study, and their marginal means, by frames of outcomes."""
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,8 +24,13 @@ from selfmodel.studies.statistics import (
     sign_flip_test,
 )
 
+LEVEL = 0.05
+"""Largest probability of any false "better" in a table."""
+
 OUTCOME = ("table", "method", "cell", "seed", "value", "measure")
-"""Columns of a frame of outcomes.
+"""Columns of a frame of outcomes, the values that one method reached in one run each. Those with
+the same ``table``, ``cell`` and ``seed`` are of the same physical robot and the same trials, so
+methods are compared by pairs.
 
 ``table``: names of what is compared apart from other outcomes, such as robot and number of trials,
 a tuple; methods are compared, and their number is corrected for, within one table. ``method``: name
@@ -39,9 +39,6 @@ of the method. ``cell``: names of the fixed conditions of the run, a tuple: gap 
 ``value``: 1 or 0 for right or wrong, or a finite number in the unit of the table. ``measure``:
 ``share`` for right and wrong, ``number`` for other values; one in a table.
 """
-
-LEVEL = 0.05
-"""Largest probability of any false "better" in a table."""
 
 
 def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
@@ -86,9 +83,10 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
             one["better"] = one["first"] if p < LEVEL else None
         found += pairs
     frame = pd.DataFrame(found)
-    if found:  # pandas' texts have no None
-        frame["better"] = pd.Series([one["better"] for one in found], dtype=object)
-    return frame
+    # pandas' texts have no None.
+    return (
+        frame.assign(better=np.array([one["better"] for one in found], object)) if found else frame
+    )
 
 
 def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
@@ -120,7 +118,6 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
         common = runs[runs.index.get_level_values("cell").map(cells)]
         for method in runs.columns:
             values = common[method].unstack("cell").dropna(how="all").to_numpy(dtype=float)  # noqa: PD010  # a pivot of one column
-            mean = _marginal(values, measure) if values.size else UNKNOWN
             found.append(
                 {
                     "table": table,
@@ -129,7 +126,7 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
                     "seeds": len(values),
                     "cells": int(cells.sum()),
                     "left_out": int(runs[method].notna().sum() - common[method].notna().sum()),
-                    **ends("mean", mean),
+                    **ends("mean", _marginal(values, measure) if values.size else UNKNOWN),
                 }
             )
     return pd.DataFrame(found)
@@ -140,13 +137,13 @@ def balance_warnings(outcomes: pd.DataFrame) -> tuple[str, ...]:
     tables: dict[str, list[str]] = {}
     for table, _, runs in _tables(outcomes):
         known = runs.notna()
-        per_cell = known.groupby(level="cell").sum()
-        if known.all(axis=None) and (per_cell.min() == per_cell.max()).all():
+        cells = known.groupby(level="cell").sum().agg(["min", "max"])
+        if known.all(axis=None) and cells.loc["min"].equals(cells.loc["max"]):
             continue
         counts = [
             f"{method} {known[method].sum()}"
             + ("" if low == high else f" ({low} to {high} per cell)")
-            for method, low, high in zip(known, per_cell.min(), per_cell.max(), strict=True)
+            for method, (low, high) in cells.items()
         ]
         if not known.all(axis=None) and known.sum().min() == known.sum().max():
             counts.append("not the same runs")
@@ -163,20 +160,18 @@ def ends(name: str, interval: Interval) -> dict[str, float]:
     return {name: interval.estimate, f"{name}_low": interval.low, f"{name}_high": interval.high}
 
 
-def _tables(outcomes: pd.DataFrame) -> list[tuple[tuple[str, ...], str, pd.DataFrame]]:
-    """Returns names, measure and values of each table, in the order of the first outcomes.
+def _tables(outcomes: pd.DataFrame) -> Iterator[tuple[tuple[str, ...], str, pd.DataFrame]]:
+    """Yields names, measure and values of each table, in the order of the first outcomes.
 
     The values have a row per run, by cell and seed, and a column per method; NaN for none.
     """
-    found = []
-    for table in dict.fromkeys(outcomes["table"] if len(outcomes) else ()):
+    for table in dict.fromkeys(outcomes["table"]):
         own = outcomes[[one == table for one in outcomes["table"]]]
-        named = ", ".join(table)
         measures = own["measure"].unique()
         if len(measures) > 1:
             raise InputError(
-                f"expected one measure in the table {named}, got {' and '.join(measures)}: name "
-                f"two tables"
+                f"expected one measure in the table {', '.join(table)}, got "
+                f"{' and '.join(measures)}: name two tables"
             )
         share = measures[0] == "share"
         allowed = own["value"].isin([0, 1]) if share else np.isfinite(own["value"])
@@ -192,8 +187,7 @@ def _tables(outcomes: pd.DataFrame) -> list[tuple[tuple[str, ...], str, pd.DataF
                     f"one study, each once, without runs that have no value"
                 )
         runs = own.pivot(index=["cell", "seed"], columns="method", values="value")  # noqa: PD010  # not to be aggregated
-        found.append((table, str(measures[0]), runs))
-    return found
+        yield table, str(measures[0]), runs
 
 
 def _compared(
@@ -217,10 +211,11 @@ def _compared(
     means = {name: float(np.mean(of_method)) for name, of_method in own.items()}
     first, second = sorted(own, key=lambda name: -means[name])  # stable: by name if equal
     differences, drawn = (own[first] - own[second]).tolist(), seeds[common].tolist()
+    only_first, only_second = [one > 0 for one in differences], [one < 0 for one in differences]
     rng = np.random.default_rng(seed)
     if measure == "share":
         difference = paired_proportion_interval(differences, drawn, rng)
-        p = exact_mcnemar([one > 0 for one in differences], [one < 0 for one in differences])
+        p = exact_mcnemar(only_first, only_second)
     else:
         difference = paired_interval(differences, drawn, rng)
         p = sign_flip_test(differences, rng)
@@ -232,8 +227,8 @@ def _compared(
         "first_mean": means[first],
         "second_mean": means[second],
         **ends("difference", difference),
-        "only_first": sum(one > 0 for one in differences),
-        "only_second": sum(one < 0 for one in differences),
+        "only_first": sum(only_first),
+        "only_second": sum(only_second),
         "p_runs": p,
         "p_seeds": seed_test(differences, drawn),
     }
@@ -254,16 +249,12 @@ def _marginal(values: FloatArray, measure: str) -> Interval:
         half = float(stats.t.ppf(TAIL, len(values) - 1)) * deviation / math.sqrt(len(values))
         low, high = mean - half, mean + half
     if measure == "share":
-        # The variance of a mean of cell means is that of this many runs in one cell.
+        # The variance of a mean of cell means is that of this many runs in one cell; Wilson's score
+        # interval allows a fraction of a run.
         runs = values.shape[1] ** 2 / float((1 / np.isfinite(values).sum(axis=0)).sum())
-        least, most = _wilson(mean, runs)
-        low, high = max(0.0, float(np.fmin(least, low))), min(1.0, float(np.fmax(most, high)))
+        middle = (mean + NORMAL**2 / (2 * runs)) / (1 + NORMAL**2 / runs)
+        root = math.sqrt(mean * (1 - mean) / runs + (NORMAL / (2 * runs)) ** 2)
+        half = NORMAL * root / (1 + NORMAL**2 / runs)
+        low = max(0.0, float(np.fmin(middle - half, low)))
+        high = min(1.0, float(np.fmax(middle + half, high)))
     return Interval(mean, low, high)
-
-
-def _wilson(share: float, runs: float) -> tuple[float, float]:
-    """Returns the ends of Wilson's score interval; the number of runs may be a fraction."""
-    middle = (share + NORMAL**2 / (2 * runs)) / (1 + NORMAL**2 / runs)
-    root = math.sqrt(share * (1 - share) / runs + (NORMAL / (2 * runs)) ** 2)
-    half = NORMAL * root / (1 + NORMAL**2 / runs)
-    return middle - half, middle + half

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -17,9 +18,10 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.files import make_folder
@@ -44,6 +46,9 @@ ATTEMPTS = 2
 
 CONNECT_SECONDS = 30
 """Longest wait for the scheduler of a cluster, s."""
+
+Answer = tuple[float, str | None]
+"""Wall time of a cell, s, and the reason of its failure."""
 
 
 @dataclass(frozen=True)
@@ -105,14 +110,14 @@ def run_grid(
         WorkError: The executor ended; all finished cells are kept.
     """
     wanted = _with_needs(cells)
-    left = _unfinished(cells, _finished_here(folder, cells))
+    left = _unfinished(cells, _finished_here(folder, wanted.values()))
     total, number = len(wanted), len(wanted) - len(left)
     on_progress(GridBegins(total, number))
     failures: list[CellEnds] = []
     if left:
         make_folder(folder)
     ordered = {place: cell for place, cell in wanted.items() if place in left}
-    for cell, seconds, error in _computed(folder, ordered, executor, workers):
+    for cell, (seconds, error) in _computed(folder, ordered, executor, workers):
         number += 1
         end = CellEnds(cell.name, number, total, seconds, error)
         failures += [end] if error is not None else []
@@ -178,13 +183,13 @@ def _with_needs(cells: Iterable[Cell]) -> dict[str, Cell]:
     return found
 
 
-def _finished_here(folder: Path, cells: Sequence[Cell]) -> dict[str, FinishedCell]:
+def _finished_here(folder: Path, wanted: Iterable[Cell]) -> dict[str, FinishedCell]:
     """Returns the finished cells in the folder of a study by their place.
 
     Raises:
         InputError: A cell is damaged, or was made by other code than this.
     """
-    made = [dict(made_with(cell.function)) for cell in _with_needs(cells).values()]
+    made = [dict(made_with(function)) for function in {cell.function for cell in wanted}]
     found: dict[str, FinishedCell] = {}
     for path in sorted(folder.glob(f"*/*/{CELL}")):
         cell = read_cell(path)
@@ -198,34 +203,27 @@ def _finished_here(folder: Path, cells: Sequence[Cell]) -> dict[str, FinishedCel
     return found
 
 
-def _unfinished(cells: Iterable[Cell], known: Mapping[str, FinishedCell]) -> dict[str, Cell]:
-    """Returns the cells to compute by their place.
+def _unfinished(cells: Iterable[Cell], known: Mapping[str, FinishedCell]) -> set[str]:
+    """Returns the places of the cells to compute.
 
     A cell that only finished ones need is not computed; one that others need, and that lacks files,
     is.
     """
-    left: dict[str, Cell] = {}
-
-    def add(cell: Cell) -> None:
-        left[cell.place] = cell
-        for need in cell.needs.values():
-            if need.place not in left and not (need.place in known and known[need.place].has_files):
-                add(need)
-
-    for cell in cells:
-        if cell.place not in known and cell.place not in left:
-            add(cell)
+    left: set[str] = set()
+    todo = [cell for cell in cells if cell.place not in known]
+    while todo:
+        cell = todo.pop()
+        is_there = cell.place in known and known[cell.place].has_files
+        if not is_there and cell.place not in left:
+            left.add(cell.place)
+            todo += cell.needs.values()
     return left
-
-
-End = tuple[Cell, float, str | None]
-"""A cell, its wall time in s, and the reason of its failure."""
 
 
 def _computed(
     folder: Path, cells: Mapping[str, Cell], given: Executor | None, workers: int
-) -> Iterator[End]:
-    """Yields the end of each cell, in order of completion.
+) -> Iterator[tuple[Cell, Answer]]:
+    """Yields each cell with its answer, in order of completion.
 
     Args:
         folder: Folder of the study.
@@ -234,70 +232,61 @@ def _computed(
         given: Executor of the caller; None for processes.
         workers: Number of the processes.
     """
-    missing = {
-        place: {need.place for need in cell.needs.values()} & cells.keys()
-        for place, cell in cells.items()
-    }
-    ready = [place for place in cells if not missing[place]]
-    running: dict[Future[tuple[float, str | None]], str] = {}
+    places = list(cells)
+    graph = TopologicalSorter(
+        {
+            place: {need.place for need in cell.needs.values()} & cells.keys()
+            for place, cell in cells.items()
+        }
+    )
+    graph.prepare()
+    number = {place: rank for rank, place in enumerate(places)}
+    ready: list[int] = []  # first cells first, so that an interrupted study has whole runs
     alone: list[str] = []
-    exits: dict[str, int] = {}
+    running: dict[Future[Answer], str] = {}
+    exits: Counter[str] = Counter()
+    failed: set[str] = set()
     with _Pool(given, min(workers, len(cells))) as pool:
-        while ready or running or alone:
+        while graph.is_active():
+            ready = sorted([*ready, *map(number.__getitem__, graph.get_ready())])
+            answers: dict[str, Answer] = {}
             while ready and len(running) < pool.at_once:
-                place = ready.pop(0)
+                place = places[ready.pop(0)]
+                needs = [need for need in cells[place].needs.values() if need.place in failed]
+                if needs:
+                    reason = f"not computed: it needs {needs[0].name}, which failed"
+                    answers[place] = 0.0, reason
+                    continue
                 running[pool.submit(folder, cells[place])] = place
             if alone and not running:
                 place = alone.pop(0)
                 running[pool.submit(folder, cells[place])] = place
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                if future not in running:
-                    continue  # a process exited, and with it all calls of the pool
-                if pool.is_broken_by(future):
-                    crashed = list(running.values())
+            for future in wait(running, return_when=FIRST_COMPLETED).done if not answers else ():
+                if pool.is_broken_by(future):  # and with it are all other calls
+                    exits.update(running.values())
+                    alone += [place for place in running.values() if exits[place] < ATTEMPTS]
+                    answers |= {
+                        place: _crashed(future, folder, place)
+                        for place in running.values()
+                        if exits[place] == ATTEMPTS
+                    }
                     running.clear()
-                    for place in crashed:
-                        exits[place] = exits.get(place, 0) + 1
-                    ended = [place for place in crashed if exits[place] == ATTEMPTS]
-                    alone += [place for place in crashed if place not in ended]
-                    reason = (
-                        f"its process ended in each of {ATTEMPTS} attempts: {future.exception()}"
-                    )
-                    ends: list[tuple[str, float, str | None]] = [
-                        (place, 0.0, keep_error(folder, place, reason)) for place in ended
-                    ]
-                else:
-                    place = running.pop(future)
-                    ends = [(place, *_answer(future, folder, place))]
-                for place, seconds, error in ends:
-                    yield cells[place], seconds, error
-                    yield from _after(place, error, cells, missing, ready)
+                    break
+                place = running.pop(future)
+                answers[place] = _answer(future, folder, place)
+            for place, answer in answers.items():
+                graph.done(place)
+                failed |= set() if answer[1] is None else {place}
+                yield cells[place], answer
 
 
-def _after(
-    place: str,
-    error: str | None,
-    cells: Mapping[str, Cell],
-    missing: dict[str, set[str]],
-    ready: list[str],
-) -> Iterator[End]:
-    """Makes the cells that need a finished one ready; yields those that need a failed one."""
-    for other in [other for other, needs in missing.items() if place in needs]:
-        if error is None:
-            missing[other].remove(place)
-            ready += [] if missing[other] else [other]
-        elif missing.pop(other, None) is not None:
-            reason = f"not computed: it needs {cells[place].name}, which failed"
-            yield cells[other], 0.0, reason
-            yield from _after(other, reason, cells, missing, ready)
-    # The first cells come first, so that an interrupted study has whole runs.
-    ready.sort(key=list(cells).index)
+def _crashed(future: "Future[Answer]", folder: Path, place: str) -> Answer:
+    reason = f"its process ended in each of {ATTEMPTS} attempts: {future.exception()}"
+    return 0.0, keep_error(folder, place, reason)
 
 
-def _answer(
-    future: "Future[tuple[float, str | None]]", folder: Path, place: str
-) -> tuple[float, str | None]:
-    """Returns the wall time and the failure of a call that has ended.
+def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
+    """Returns the answer of a call that has ended.
 
     Raises:
         InputError: The worker has other code than the command.
@@ -310,10 +299,10 @@ def _answer(
             "start it, and the same command continues"
         )
     error = future.exception()
-    if isinstance(error, InputError | OSError):
-        raise error
     if error is None:
         return future.result()
+    if isinstance(error, InputError | OSError):
+        raise error
     line = " ".join(f"{type(error).__name__}: {error}".split())[:1000]
     if isinstance(error, ImportError):
         raise InputError(
@@ -326,18 +315,13 @@ def _answer(
 class _Pool:
     """Processes, replaced when one exits, or the executor of the caller.
 
-    Args:
-        given: The executor of the caller; None for processes.
-        workers: Number of processes.
-
     Attributes:
         at_once: Number of cells to submit at a time.
     """
 
     def __init__(self, given: Executor | None, workers: int) -> None:
-        self._given, self._workers = given, workers
+        self._given, self._workers, self._pool = given, workers, given
         self.at_once = workers if given is None else AT_ONCE
-        self._pool: Executor | None = given
         self._others = set(multiprocessing.active_children())
 
     def __enter__(self) -> Self:
@@ -350,10 +334,10 @@ class _Pool:
         for process in set(multiprocessing.active_children()) - self._others:
             process.kill()  # a cell may take minutes, and its result would not be wanted
 
-    def submit(self, folder: Path, cell: Cell) -> "Future[tuple[float, str | None]]":
+    def submit(self, folder: Path, cell: Cell) -> "Future[Answer]":
         if self._pool is None:
-            context = multiprocessing.get_context("spawn")
             _start_resource_tracker()
+            context = multiprocessing.get_context("spawn")
             self._pool = ProcessPoolExecutor(self._workers, context, _begin_worker)
         try:
             return self._pool.submit(compute, folder, cell, dict(made_with(cell.function)))
@@ -363,7 +347,7 @@ class _Pool:
                 f"command continues"
             ) from error
 
-    def is_broken_by(self, future: "Future[Any]") -> bool:
+    def is_broken_by(self, future: "Future[Answer]") -> bool:
         """Returns whether a process of the pool exited; a new pool then takes its place."""
         if self._given is not None or future.cancelled():
             return False

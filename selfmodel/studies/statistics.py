@@ -29,13 +29,7 @@ FLIPS = 20_000
 
 @dataclass(frozen=True)
 class Interval:
-    """Estimate with its 95 % confidence interval.
-
-    Attributes:
-        estimate: The estimate; NaN without data.
-        low: Lower end of the interval.
-        high: Upper end of the interval.
-    """
+    """Estimate with the ends of its 95 % confidence interval; NaN where they are unknown."""
 
     estimate: float
     low: float
@@ -46,14 +40,10 @@ UNKNOWN = Interval(math.nan, math.nan, math.nan)
 
 
 def proportion(successes: int, trials: int) -> Interval:
-    """Returns a proportion of successes with Wilson's score interval.
+    """Returns a proportion of successes with Wilson's score interval; 0 to 1 of no trials.
 
     Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference*,
     JASA 22 (1927), without a correction for continuity.
-
-    Args:
-        successes: Number of successes.
-        trials: Number of trials; for 0 trials the estimate is NaN and the interval 0 to 1.
 
     Raises:
         ValueError: The number of successes is negative or above the number of trials.
@@ -70,16 +60,9 @@ def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interva
     """Returns the ratio of the means of pairs, with a percentile bootstrap interval.
 
     Pairs are resampled together, with the same seed in every call, so that the same numbers give
-    the same interval.
+    the same interval. It is NaN for one pair, and with the estimate without pairs.
 
     Source: B. Efron and R. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
-
-    Args:
-        numerators: One number per pair.
-        denominators: One number per pair, above 0.
-
-    Returns:
-        Estimate and interval; both are NaN without pairs, and the interval is NaN for one pair.
 
     Raises:
         ValueError: The lengths differ, or a denominator is not above 0.
@@ -105,7 +88,7 @@ def paired_interval(
 
     Seeds are drawn with all their runs. The ends are moved away from the mean by Student's quantile
     over the normal one and by the bias of a variance of few seeds, as a percentile bootstrap of
-    n < 30 units is too narrow.
+    n < 30 units is too narrow. With fewer than two seeds, the interval is NaN.
 
     Assumptions: the seeds are independent and drawn from one population; the cells are fixed, and
     every seed has nearly as many runs.
@@ -118,9 +101,6 @@ def paired_interval(
         differences: First minus second, one per run.
         seeds: Seed of each run.
         rng: Draws the seeds.
-
-    Returns:
-        Mean and interval; the interval is NaN with fewer than two seeds.
 
     Raises:
         ValueError: A difference is NaN or infinite, or there is no seed for it.
@@ -152,9 +132,6 @@ def paired_proportion_interval(
         differences: -1, 0 or 1: first minus second, one per run.
         seeds: Seed of each run.
         rng: Draws the seeds.
-
-    Returns:
-        Difference and interval; the interval is NaN with fewer than two seeds.
     """
     found = paired_interval(differences, seeds, rng)
     if math.isnan(found.low):
@@ -187,7 +164,7 @@ def matched_proportions(only_first: int, only_second: int, runs: int) -> Interva
 
 
 def exact_mcnemar(first: Sequence[bool], second: Sequence[bool]) -> float:
-    """Returns the two-sided p of the exact McNemar test.
+    """Returns the two-sided p of the exact McNemar test of who was right, run by run.
 
     The runs in which only one method is right are a fair coin's throws if both are equally good.
 
@@ -196,10 +173,6 @@ def exact_mcnemar(first: Sequence[bool], second: Sequence[bool]) -> float:
 
     Source: Q. McNemar, *Note on the sampling error of the difference between correlated
     proportions or percentages*, Psychometrika 12 (1947); the binomial test is exact.
-
-    Args:
-        first: Whether the first method was right, by run.
-        second: Whether the second method was right in the same runs.
     """
     only_first = sum(a and not b for a, b in zip(first, second, strict=True))
     only_second = sum(b and not a for a, b in zip(first, second, strict=True))
@@ -244,6 +217,8 @@ def sign_flip_test(differences: Sequence[float], rng: np.random.Generator) -> fl
 def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
     """Returns the two-sided p of Student's paired test over the means of the seeds.
 
+    It is 1 with fewer than two seeds, or if the mean of the means is 0.
+
     Assumption: the means of the seeds are independent and normal; runs of one seed may depend on
     each other. The means of few runs may be equal by chance, and p is then too small: a test over
     runs is needed too.
@@ -253,9 +228,6 @@ def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
     Args:
         differences: First minus second, one per run.
         seeds: Seed of each run.
-
-    Returns:
-        p; 1 with fewer than two seeds, or if the mean of the means is 0.
 
     Raises:
         ValueError: A difference is NaN or infinite.

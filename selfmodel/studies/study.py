@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from selfmodel.errors import InputError
-from selfmodel.studies.cells import Cell, FinishedCell, finished, made_with
+from selfmodel.studies.cells import REMEDY, Cell, finished, made_with
 from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
 
 RUNS = "runs"
@@ -19,9 +19,6 @@ RUNS = "runs"
 
 SHARED = "shared"
 """Parameter of each cell with what all points of a study share."""
-
-MAX_CLAUSE = 300
-"""Maximum characters of a difference in a message: values in a file may have megabytes."""
 
 Point = Mapping[str, Any]
 """A point of the grid: a value of each axis by its name, as JSON, the seed among them."""
@@ -101,11 +98,9 @@ class Study:
         places = {cell.name: cell.place for cell in cells}
         models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
         for run in finished(self.folder / RUNS):
-            there = run.parameters
-            model = models.get(there.get("robot"), there.get("model"))
-            where = _difference(there.get(SHARED), cells[0].parameters[SHARED]) or _difference(
-                there.get("model"), model, f"the model of {there.get('robot')}"
-            )
+            robot, model = run.parameters.get("robot"), run.parameters.get("model")
+            where = _difference(run.parameters.get(SHARED), cells[0].parameters[SHARED])
+            where = where or _difference(model, models.get(robot, model), f"the model of {robot}")
             if where:
                 raise InputError(
                     f"{self.folder} contains a study with other settings ({where}): choose another "
@@ -130,7 +125,21 @@ def rows_in(folder: Path, table: str | None = None) -> list[Row]:
     Raises:
         InputError: A cell is damaged, or has no rows.
     """
-    return [row for cell in finished(folder / RUNS) for row in _rows_of(cell, table)]
+    rows: list[Row] = []
+    for cell in finished(folder / RUNS):
+        axes = {
+            key: cell.parameters[key] for key in cell.parameters if key not in (SHARED, "model")
+        }
+        found = cell.result
+        if table and isinstance(found, dict):
+            found = found.get(table, [])
+        found = found if isinstance(found, list) else [found]
+        if not all(isinstance(row, dict) for row in found):
+            raise InputError(
+                f"{cell.path}: expected rows of a study, got {json.dumps(found)[:80]}; {REMEDY}"
+            )
+        rows += [{**axes, **row} for row in found]
+    return rows
 
 
 def study_in(folder: Path) -> str | None:
@@ -152,19 +161,6 @@ def file_name(text: str) -> str:
     return re.sub(r"[^\w.-]", "_", text, flags=re.ASCII).lstrip(".-") or "_"
 
 
-def _rows_of(cell: FinishedCell, table: str | None) -> list[Row]:
-    hidden = {SHARED, "model"}
-    axes = {name: value for name, value in cell.parameters.items() if name not in hidden}
-    found = cell.result.get(table, []) if table and isinstance(cell.result, dict) else cell.result
-    rows = found if isinstance(found, list) else [found]
-    if not all(isinstance(row, dict) for row in rows):
-        raise InputError(
-            f"{cell.path}: expected rows of a study, got {json.dumps(found)[:80]}; delete its "
-            f"folder, and the same command computes its cell again"
-        )
-    return [{**axes, **row} for row in rows]
-
-
 _ABSENT = object()
 """Value of a key that only the other object has; null is a value."""
 
@@ -172,14 +168,14 @@ _ABSENT = object()
 def _difference(there: Any, requested: Any, name: str = "") -> str | None:  # noqa: ANN401  # JSON
     """Returns the first difference of two JSON values as a clause; None if they are equal."""
     if isinstance(there, dict) and isinstance(requested, dict):
-        for key in sorted(there.keys() | requested.keys()):
-            values = there.get(key, _ABSENT), requested.get(key, _ABSENT)
-            inner = _difference(*values, f"{name}.{key}".lstrip("."))
-            if inner:
-                return inner
-        return None
+        inner = (
+            _difference(there.get(key, _ABSENT), requested.get(key, _ABSENT), f"{name}.{key}")
+            for key in sorted(there.keys() | requested.keys())
+        )
+        return next(filter(None, inner), None)
     if there == requested:
         return None
-    found = "absent" if there is _ABSENT else json.dumps(there)[:MAX_CLAUSE]
-    wanted = "none" if requested is _ABSENT else repr(requested)[:MAX_CLAUSE]
-    return f"{name[:MAX_CLAUSE]} is {found} there, requested is {wanted}"
+    found = "absent" if there is _ABSENT else json.dumps(there)
+    wanted = "none" if requested is _ABSENT else repr(requested)
+    # Values in a file may have megabytes.
+    return f"{name.lstrip('.')[:300]} is {found[:300]} there, requested is {wanted[:300]}"
