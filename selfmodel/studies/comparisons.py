@@ -83,10 +83,9 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
             one["better"] = one["first"] if p < LEVEL else None
         found += pairs
     frame = pd.DataFrame(found)
-    # pandas' texts have no None.
-    return (
-        frame.assign(better=np.array([one["better"] for one in found], object)) if found else frame
-    )
+    if found:  # pandas' texts have no None
+        frame["better"] = pd.Series([one["better"] for one in found], dtype=object)
+    return frame
 
 
 def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:

@@ -315,7 +315,9 @@ def _parsed(texts: pd.Series) -> pd.Series:
 
 
 def _typed(frame: pd.DataFrame) -> pd.DataFrame:
-    whole_numbers = [name for name in INTEGERS if name in frame and len(frame)]
+    counts = {name: frame[name].astype(float) for name in INTEGERS if name in frame and len(frame)}
+    # A median of counts may have a half.
+    whole_numbers = [name for name, one in counts.items() if (one.dropna() % 1 == 0).all()]
     return frame.astype(dict.fromkeys(whole_numbers, "Int64"))
 
 

@@ -67,6 +67,7 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     rows = [recovery(), recovery(case=7, correct=False), recovery(robot="hexapod", case=7)]
+    rows += [recovery(robot="hexapod", case=7, seed=1, distinct_hypotheses=51)]
     given = results(rows, trials([2.0, 0.0, 1.0, 3.0]), evolution([1.0]))
     monkeypatch.setattr(sys.modules[write_results.__module__], "collect", lambda _folder: given)
     _, files = write_results(tmp_path)
@@ -93,4 +94,10 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     assert [csv_bytes(table.records) for table in tables_of(given)][1] == (
         tmp_path / "table-2.csv"
     ).read_bytes()
+    with (tmp_path / "table-2.csv").open() as file:
+        assert [row["distinct_hypotheses"] for row in csv.DictReader(file)] == [
+            "50.0",
+            "50.0",
+            "50.5",
+        ]
     assert "figure-6" not in page(results(rows))
