@@ -12,6 +12,7 @@ from sphinx.util.typing import ExtensionMetadata
 from typer.core import TyperGroup
 
 from selfmodel.cli import app
+from selfmodel.cli.groups import LazyCommand
 
 
 class CommandLine(SphinxDirective):
@@ -28,7 +29,8 @@ def _lines(command: Any, context: typer.Context) -> Iterator[str]:  # noqa: ANN4
     if isinstance(command, TyperGroup):
         for name in command.list_commands(context):
             child = command.get_command(context, name)
-            if child is not None and not child.hidden:
+            if isinstance(child, LazyCommand):
+                child = child.imported()
                 yield from _lines(child, typer.Context(child, info_name=name, parent=context))
         return
     path = context.command_path

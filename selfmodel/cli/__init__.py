@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from selfmodel.cli.lazy import Interrupted, group
+from selfmodel.cli.groups import Interrupted, group
 from selfmodel.cli.output.library_warnings import counted_warnings
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_lines, print_notes
@@ -14,77 +14,55 @@ from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.physical.stop_signals import handle_stop_signals, status_of
 
-COMMANDS = {
-    "robots": (
-        "selfmodel.cli.commands:Robots",
-        "selfmodel.cli.robots:robots",
-        "List the robots, or the parts of one.",
-    ),
-    "recover": (
-        "selfmodel.cli.commands:Recover",
-        "selfmodel.cli.recover:recover",
-        "Diagnose a failure and evolve a new gait.",
-    ),
-    "trial": (
-        "selfmodel.cli.commands:RunTrial",
-        "selfmodel.cli.trial:trial",
-        "Run and log one trial of the simulated robot.",
-    ),
-    "calibrate": (
-        "selfmodel.cli.commands:Calibrate",
-        "selfmodel.cli.calibrate:calibrate",
-        "Fit the self-model to logged trials.",
-    ),
-    "diagnose": (
-        "selfmodel.cli.commands:Diagnose",
-        "selfmodel.cli.diagnose:diagnose",
-        "Rank the hypotheses that explain logs.",
-    ),
-    "replay": (
-        "selfmodel.cli.commands:ReplayTrial",
-        "selfmodel.cli.replay:replay",
-        "Simulate a logged trial again, and compare.",
-    ),
-    "render": (
-        "selfmodel.cli.commands:Render",
-        "selfmodel.cli.render:render",
-        "Draw a logged trial beside its simulation.",
-    ),
-    "view": (
-        "selfmodel.cli.commands:View",
-        "selfmodel.cli.view:view",
-        "Open a logged trial and its simulation in Rerun.",
-    ),
-    "report": (
-        "selfmodel.cli.commands:MakeReport",
-        "selfmodel.cli.report:report",
-        "Write a run, logs or a campaign as one HTML page.",
-    ),
-    "ablate": (
-        "selfmodel.cli.study_commands:Ablate",
-        "selfmodel.cli.studies:ablate",
-        "Compare comparators on the same trials.",
-    ),
-    "suite": ("selfmodel.cli.groups:suite", "", "Recover the bodies of dm_control's suite."),
-    "paper": (
-        "selfmodel.cli.study_commands:RepeatPaper",
-        "selfmodel.cli.studies:paper",
-        "Repeat the paper's experiment on its robots.",
-    ),
-    "compare": (
-        "selfmodel.cli.study_commands:Compare",
-        "selfmodel.cli.compare:compare",
-        "Compare the methods of a study by pairs.",
-    ),
-    "repertoire": ("selfmodel.cli.groups:repertoire", "", "Make a repertoire of a robot's gaits."),
-    "logs": ("selfmodel.cli.groups:logs", "", "Inspect, verify, salvage and import trial logs."),
-}
-"""Options, work and one-line help per command; see ``group``."""
-
+SUITE = group(
+    "suite",
+    "Fail and recover the bodies of dm_control's suite, selfmodel's robots and your own.",
+    {
+        "list": ("List the domains and their cases.", "studies:list_bodies", "ListSuite"),
+        "run": ("Run a study: bodies x cases x seeds.", "studies:run_suite", "RunSuite"),
+    },
+)
+REPERTOIRE = group(
+    "repertoire",
+    "Make a repertoire of diverse gaits of a robot, once, before it fails.",
+    {
+        "make": ("Search for diverse gaits, and keep them.", "repertoire:make", "MakeRepertoire"),
+        "info": ("Show what a repertoire contains.", "repertoire:info", "RepertoireInfo"),
+    },
+)
+LOGS = group(
+    "logs",
+    "Inspect and verify trial logs, salvage damaged ones, import recordings, export tables.",
+    {
+        "info": ("Show what logs contain.", "logs:info", "LogInfo"),
+        "verify": ("Check every checksum, count and digest.", "logs:verify", "Verify"),
+        "salvage": ("Save the good steps of a bad log.", "logs:salvage", "SalvageLog"),
+        "import": ("Import a recording as a log.", "recordings:import_", "ImportRecording"),
+        "export": ("Write a log's signals as a table.", "recordings:export", "ExportTable"),
+    },
+)
 app = group(
     "selfmodel",
     "Diagnose what changed in a legged robot from a few logged trials, and recover its gait.",
-    COMMANDS,
+    {
+        "robots": ("List the robots, or the parts of one.", "robots:robots", "Robots"),
+        "recover": ("Diagnose a failure and evolve a new gait.", "recover:recover", "Recover"),
+        "trial": ("Run and log one trial of the simulated robot.", "trial:trial", "RunTrial"),
+        "calibrate": ("Fit the self-model to logged trials.", "calibrate:calibrate", "Calibrate"),
+        "diagnose": ("Rank the hypotheses that explain logs.", "diagnose:diagnose", "Diagnose"),
+        "replay": ("Simulate a logged trial again, and compare.", "replay:replay", "ReplayTrial"),
+        "render": ("Draw a logged trial beside its simulation.", "render:render", "Render"),
+        "view": ("Open a logged trial and its simulation in Rerun.", "view:view", "View"),
+        "report": (
+            *("Write a run, logs or a campaign as one HTML page.", "report:report", "MakeReport"),
+        ),
+        "ablate": ("Compare comparators on the same trials.", "studies:ablate", "Ablate"),
+        "suite": ("Recover the bodies of dm_control's suite.", SUITE),
+        "paper": ("Repeat the paper's experiment on its robots.", "studies:paper", "RepeatPaper"),
+        "compare": ("Compare the methods of a study by pairs.", "compare:compare", "Compare"),
+        "repertoire": ("Make a repertoire of a robot's gaits.", REPERTOIRE),
+        "logs": ("Inspect, verify, salvage and import trial logs.", LOGS),
+    },
     completion=True,
 )
 

@@ -27,8 +27,8 @@ def calibrate(options: Calibrate) -> None:
     check_folder(options.out)
     refuse_existing(options.out)
     logs = arguments.read_logs(options.files)
-    before = arguments.robot_of_logs(logs, options.robot)
-    _refuse_assets(before, options.robot or str(options.files[0]))
+    before = arguments.robot_of_logs(logs, options.self_model)
+    _refuse_assets(before, options.self_model or str(options.files[0]))
     trials = [log.trial for log in logs]
     fit = fit_to(before, trials, thread_count(options.threads))
     with create_file(options.out) as file:

@@ -1,138 +1,165 @@
-"""The options of each command: the fields of a dataclass, whose docstring is the command's help."""
+"""The options of each command: the fields of a dataclass, whose docstring is the command's help.
+
+``options`` has the help of each field. A class that several commands inherit from is what the
+functions that they share take.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import ClassVar
 
-import typer
+from selfmodel.cli import options
+from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
+from selfmodel.settings import Settings
 
-from selfmodel.cli.options import (
-    DEFAULT_KIND_NAMES,
-    SEARCH,
-    Calibrated,
-    Case,
-    ComparatorName,
-    ControllerKind,
-    ControllerSource,
-    Damage,
-    GapLevel,
-    Generations,
-    HypothesisText,
-    Json,
-    KindNames,
-    LogFile,
-    LogFiles,
-    LoggedGenerations,
-    LoggedPopulation,
-    LoggedSeed,
-    MaxJointSpeed,
-    MaxJointTorque,
-    MaxSelfCollision,
-    ModelSettings,
-    NamedKinds,
-    Neurons,
-    NewLog,
-    NextTrialName,
-    Population,
-    RecoveryScore,
-    Reference,
-    RepairName,
-    RepertoireFile,
-    RobotName,
-    SearchName,
-    Seed,
-    SelfModel,
-    StageName,
-    Steps,
-    Threads,
-    Trials,
-)
+DEFAULT_KIND_NAMES = ",".join(kind.name for kind in DEFAULT_KINDS)
+PAPER_KIND_NAMES = ",".join(kind.name for kind in PAPER_KINDS)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Robots:
+class Command:
+    """Options of every command."""
+
+    as_json: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot(Command):
+    """A robot, and the settings of its file."""
+
+    robot: str
+    model_settings: list[str] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Notation(Command):
+    """Fault kinds that notation may name."""
+
+    kinds: str = "all"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulated(Notation):
+    """A logged trial, and what it is simulated with."""
+
+    file: Path
+    hypothesis: str = "intact"
+    self_model: str | None = None
+    threads: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FromLogs(Command):
+    """A diagnosis of logs."""
+
+    self_model: str | None = None
+    comparator: str = "auto"
+    kinds: str = DEFAULT_KIND_NAMES
+    calibrate: bool = True
+    population: int | None = None
+    generations: int | None = None
+    seed: int | None = None
+    threads: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(Command):
+    """A study: its folder, its size, and where it is computed."""
+
+    out: Path
+    cases: str = "all"
+    seeds: int = 1
+    seed: int = 0
+    steps: int | None = Settings.steps
+    trials: int = Settings.trials
+    population: int = Settings.population
+    generations: int = Settings.generations
+    workers: int = 0
+    executor: str = "processes"
+    scheduler: str | None = None
+    table: str | None = None
+
+    @property
+    def settings(self) -> Settings:
+        """The parameters of each recovery."""
+        return settings_of(self, self.steps or Settings.steps)
+
+    @property
+    def every_seed(self) -> range:
+        """The seeds of the study."""
+        return range(self.seed, self.seed + self.seeds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repair(Command):
+    """The repair of a study's recoveries."""
+
+    repair: str = "paper"
+    search: str | None = None
+    score: str | None = None
+    only: str = "1/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robots(Command):
     """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
 
-    robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="Name of a robot, or path of an MJCF or URDF file."),
-    ] = None
-    model_settings: ModelSettings = None
-    as_json: Json = False
+    robot: str | None = None
+    model_settings: list[str] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recover:
+class Recover(Robot):
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
 
     The physical robot is a simulated one with the failure of --case or --damage, which the
     algorithm does not read. Every physical trial becomes a log in the folder of the run.
     """
 
-    robot: RobotName
-    case: Case = None
-    damage: Damage = None
-    model_settings: ModelSettings = None
-    comparator: ComparatorName = "auto"
-    calibrate: Calibrated = True
-    gap: GapLevel = 0.0
-    kinds: KindNames = DEFAULT_KIND_NAMES
-    next_trial: NextTrialName = "repair"
-    controller: ControllerKind = "network"
-    neurons: Neurons = None
-    repair: RepairName = "robust"
-    search: SearchName = None
-    repertoire: RepertoireFile = None
-    score: RecoveryScore = None
-    reference: Reference = None
-    max_joint_speed: MaxJointSpeed = None
-    max_joint_torque: MaxJointTorque = None
-    max_self_collision: MaxSelfCollision = None
-    seed: Seed = 0
-    steps: Steps = 1000
-    trials: Trials = 3
-    population: Population = 100
-    generations: Generations = 30
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="DIR",
-            help="Folder of the run, new or empty.",
-            show_default="a new one in runs",
-        ),
-    ] = None
-    threads: Threads = 0
-    report: Annotated[
-        bool,
-        typer.Option(
-            "--report",
-            help="Write report.html in the folder of the run, anew after each trial.",
-        ),
-    ] = False
-    as_json: Json = False
+    case: int | None = None
+    damage: str | None = None
+    comparator: str = "auto"
+    calibrate: bool = True
+    gap: float = 0.0
+    kinds: str = DEFAULT_KIND_NAMES
+    next_trial: str = "repair"
+    controller: str = "network"
+    neurons: int | None = None
+    repair: str = "robust"
+    search: str | None = None
+    repertoire: Path | None = None
+    score: str | None = None
+    reference: Path | None = None
+    max_joint_speed: float | None = None
+    max_joint_torque: float | None = None
+    max_self_collision: float | None = None
+    seed: int = 0
+    steps: int = Settings.steps
+    trials: int = Settings.trials
+    population: int = Settings.population
+    generations: int = Settings.generations
+    out: Path | None = None
+    threads: int = 0
+    report: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunTrial:
+class RunTrial(Robot, Notation):
     """Run one trial of the simulated physical robot and write its log."""
 
-    robot: RobotName
-    out: NewLog
-    damage: Damage = None
-    kinds: NamedKinds = "all"
-    model_settings: ModelSettings = None
-    controller: ControllerSource = None
-    neurons: Neurons = None
-    gap: GapLevel = 0.0
-    steps: Steps = 1000
-    stage: StageName = "single"
-    seed: Seed = 0
-    as_json: Json = False
+    PANELS: ClassVar = (options.FAILURE, options.CONTROLLER, options.PHYSICAL)
+    out: Path
+    damage: str | None = None
+    controller: str | None = None
+    neurons: int | None = None
+    gap: float = 0.0
+    steps: int = Settings.steps
+    stage: str = "single"
+    seed: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibrate:
+class Calibrate(Command):
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
 
     Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
@@ -141,138 +168,59 @@ class Calibrate:
     that read logs take the new model as --robot MODEL.xml.
     """
 
-    files: LogFiles
-    out: Annotated[
-        Path,
-        typer.Option(
-            *("--out", "-o"), metavar="MODEL.xml", help="MJCF file to write; it must not exist."
-        ),
-    ]
-    robot: SelfModel = None
-    threads: Threads = 0
-    as_json: Json = False
+    files: list[Path]
+    out: Path
+    self_model: str | None = None
+    threads: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnose:
+class Diagnose(FromLogs):
     """Rank hypotheses by how well they predict logged trials, without a robot.
 
     Give the logs in the order in which the trials were run. The self-model is fitted to the
     trials from before the failure, and the hypotheses predict all others.
     """
 
-    files: LogFiles
-    robot: SelfModel = None
-    comparator: ComparatorName = "auto"
-    kinds: KindNames = DEFAULT_KIND_NAMES
-    calibrate: Calibrated = True
-    population: LoggedPopulation = None
-    generations: LoggedGenerations = None
-    seed: LoggedSeed = None
-    threads: Threads = 0
-    as_json: Json = False
+    files: list[Path]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReplayTrial:
+class ReplayTrial(Simulated):
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
 
-    file: LogFile
-    hypothesis: HypothesisText = "intact"
-    kinds: NamedKinds = "all"
-    model: SelfModel = None
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"), metavar="FIGURE.png", help="Figure of the error: .png, .svg or .pdf."
-        ),
-    ] = None
-    threads: Threads = 0
-    as_json: Json = False
+    out: Path | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Render:
+class Render(Simulated):
     """Draw a logged trial beside a simulation of the same controller.
 
     The logged motion is on the left or above, the simulation of the hypothesis beside or below
     it. In both, a limb that the hypothesis detaches is pale and a jammed part is red.
     """
 
-    file: LogFile
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="PICTURE",
-            help="Film (.gif, .mp4) or strip of stick figures (.png, .svg, .pdf) to write.",
-            show_default="beside the log, .gif",
-        ),
-    ] = None
-    hypothesis: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NOTATION",
-            help="Hypothesis to simulate, such as break:front_left_knee.",
-            show_default="intact",
-        ),
-    ] = None
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="Simulate the best hypothesis of a diagnosis: the result.json of a recovery, or "
-            "the output of `selfmodel diagnose --json`.",
-        ),
-    ] = None
-    kinds: NamedKinds = "all"
-    model: SelfModel = None
-    stick: Annotated[
-        bool,
-        typer.Option("--stick", help="Draw the film with stick figures, which needs no OpenGL."),
-    ] = False
-    pictures: Annotated[
-        int, typer.Option(min=2, max=50, metavar="N", help="Pictures of a strip.")
-    ] = 6
-    threads: Threads = 0
-    as_json: Json = False
+    out: Path | None = None
+    hypothesis: str = ""
+    diagnosis: Path | None = None
+    stick: bool = False
+    pictures: int = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class View(Simulated):
     """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis.
 
     Beside the bodies are the joint positions of both, and the errors over time. The command also
     prints how to open the same log in Foxglove.
     """
 
-    file: LogFile
-    hypothesis: HypothesisText = "intact"
-    kinds: NamedKinds = "all"
-    model: SelfModel = None
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="NEW.rrd",
-            help="File of Rerun to write, instead of opening its viewer.",
-        ),
-    ] = None
-    port: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=65535,
-            metavar="N",
-            help="Port of Rerun's viewer on this computer; a viewer that has it is used.",
-        ),
-    ] = 9876
-    threads: Threads = 0
-    as_json: Json = False
+    out: Path | None = None
+    port: int = 9876
 
 
 @dataclass(frozen=True, kw_only=True)
-class MakeReport:
+class MakeReport(FromLogs):
     """Write a report of a run, of logs or of a campaign: one HTML file, which needs no network.
 
     A run is reported with the diagnosis in its folder, logs with that of --diagnosis. Without it,
@@ -281,166 +229,151 @@ class MakeReport:
     a file names, and to one of --diagnosis also --robot.
     """
 
-    sources: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN|LOG...|CAMPAIGN",
-            help="Folder of a recovery, trial logs, or folder of a campaign.",
-        ),
-    ]
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="FILE.html",
-            help="File to write.",
-            show_default="report.html, in the folder of the run or campaign",
-        ),
-    ] = None
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="Report this diagnosis of the logs, which `selfmodel diagnose --json` printed, or "
-            "the result.json of a recovery, instead of a new one.",
-        ),
-    ] = None
-    robot: SelfModel = None
-    comparator: ComparatorName = "auto"
-    kinds: KindNames = DEFAULT_KIND_NAMES
-    calibrate: Calibrated = True
-    population: LoggedPopulation = None
-    generations: LoggedGenerations = None
-    seed: LoggedSeed = None
-    threads: Threads = 0
-    as_json: Json = False
+    sources: list[Path]
+    out: Path | None = None
+    diagnosis: Path | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class MakeRepertoire:
+class MakeRepertoire(Robot):
     """Search for gaits with diverse duty factors of the feet, and keep the best of each cell.
 
     Gaits that fall or do not move forward are left out.
     """
 
-    robot: RobotName
-    out: Annotated[
-        Path,
-        typer.Option(*("--out", "-o"), metavar="NEW.npz", help="File to write; must not exist."),
-    ]
-    model_settings: ModelSettings = None
-    controller: ControllerKind = "network"
-    neurons: Neurons = None
-    evaluations: Annotated[
-        int,
-        typer.Option(
-            min=1, max=10**8, metavar="N", help="Gaits to evaluate.", rich_help_panel=SEARCH
-        ),
-    ] = 60_000
-    levels: Annotated[
-        int | None,
-        typer.Option(
-            min=2,
-            max=1000,
-            metavar="N",
-            help="Cells along each axis, the duty factor of a foot.",
-            show_default="20 for four feet, 5 for six",
-            rich_help_panel=SEARCH,
-        ),
-    ] = None
-    steps: Steps = 1000
-    seed: Seed = 0
-    threads: Threads = 0
-    as_json: Json = False
+    out: Path
+    controller: str = "network"
+    neurons: int | None = None
+    evaluations: int = 60_000
+    levels: int | None = None
+    steps: int = Settings.steps
+    seed: int = 0
+    threads: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class RepertoireInfo:
+class RepertoireInfo(Command):
     """Verify a repertoire file, and show its robot, its gaits and how it was made."""
 
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Repertoire, NAME.npz.")]
-    as_json: Json = False
+    file: Path
 
 
 @dataclass(frozen=True, kw_only=True)
-class LogInfo:
+class LogInfo(Command):
     """Show what logs contain, and how to open them in a viewer.
 
     The exit status is 1 if a log is damaged.
     """
 
-    files: LogFiles
-    as_json: Json = False
+    files: list[Path]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verify:
+class Verify(Command):
     """Verify checksums, counts, digests, layout, times, names and the model of logs.
 
     The exit status is 0 if every log is good, otherwise 1.
     """
 
-    files: LogFiles
-    expect: Annotated[
-        str,
-        typer.Option(
-            metavar="SHA256", help="SHA-256 that the one file must have, as from `logs verify`."
-        ),
-    ] = ""
-    as_json: Json = False
+    files: list[Path]
+    expect: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SalvageLog:
+class SalvageLog(Command):
     """Save the steps before the first damage of a log in a new, valid one."""
 
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Damaged log, or NAME.mcap.part.")]
-    out: NewLog
-    as_json: Json = False
+    file: Path
+    out: Path
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImportRecording:
+class ImportRecording(Command):
     """Import a recording of a robot as a trial log: a bag of ROS, without ROS, or a table."""
 
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RECORDING",
-            help="A bag of ROS (folder, .mcap, .db3, .bag) or a table (.csv, .npz, .parquet).",
-        ),
-    ]
-    out: Annotated[
-        Path | None,
-        typer.Option(*("--out", "-o"), metavar="NEW.mcap", help="Log to write; it must not exist."),
-    ] = None
-    mapping: Annotated[
-        Path | None,
-        typer.Option(metavar="MAP.toml", help="Topics or columns per signal and joint."),
-    ] = None
-    suggest: Annotated[
-        bool, typer.Option("--suggest", help="Print a mapping to edit, and import nothing.")
-    ] = False
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT", help="Robot of --suggest: a robot's name, or its MJCF or URDF."
-        ),
-    ] = None
-    as_json: Json = False
+    recording: Path
+    out: Path | None = None
+    mapping: Path | None = None
+    suggest: bool = False
+    robot: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExportTable:
+class ExportTable(Command):
     """Write the signals of a trial log as a table: one row per control step."""
 
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a trial.")]
-    out: Annotated[
-        Path,
-        typer.Option(
-            *("--out", "-o"),
-            metavar="FILE",
-            help="Table to write, .csv, .npz or .parquet; it must not exist.",
-        ),
-    ]
-    as_json: Json = False
+    log: Path
+    out: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ablate(Study, Repair):
+    """Compare comparators on the same trials: robots x cases x gaps x seeds.
+
+    The results are the rates of correct diagnoses, with 95 % intervals. An interrupted ablation
+    is continued by the same command.
+    """
+
+    robots: str = "all"
+    damages: str = ""
+    kinds: str = DEFAULT_KIND_NAMES
+    comparators: str = "all"
+    gaps: str = "0"
+    next_trial: str = "bank"
+    bank: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListSuite(Command):
+    """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSuite(Study, Repair):
+    """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
+
+    An interrupted study is continued by the same command.
+    """
+
+    PANELS: ClassVar = (
+        *(options.STUDY, options.PHYSICAL, options.SEARCH, options.CONTROLLER, options.DIAGNOSIS),
+    )
+    domains: str = "all"
+    tasks: str | None = None
+    gap: float = 0.0
+    controller: str = "network"
+    neurons: int | None = None
+    comparator: str = "segment-prediction"
+    kinds: str = PAPER_KIND_NAMES
+    steps: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatPaper(Study):
+    """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown.
+
+    Each case is recovered with each comparator, and by evolution on the robot, the paper's
+    control. An interrupted experiment is continued by the same command.
+    """
+
+    robots: str = "all"
+    comparators: str = "forward-displacement,auto"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare(Command):
+    """Compare the methods of a study by pairs: tests, intervals, marginal means, figures.
+
+    Two methods are compared on the physical robots and trials that both had. The p values are
+    corrected for the number of pairs in a table by Holm's method. Nothing is run.
+    """
+
+    study: Path
+    out: Path | None = None
+    table: str = "csv"
+
+
+def settings_of(options: Study | Recover, steps: int) -> Settings:
+    """Returns the parameters of a recovery in trials of that many steps."""
+    small = Settings(steps=steps, trials=options.trials, generations=options.generations)
+    return small.scaled(options.population)

@@ -5,9 +5,9 @@ from typing import Any
 
 import pandas as pd
 
+from selfmodel.cli.commands import Compare
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
-from selfmodel.cli.study_commands import Compare
 from selfmodel.errors import InputError
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import LEVEL

@@ -43,7 +43,7 @@ def diagnose(options: Diagnose) -> None:
     considered = plugins.kinds(options.kinds)
     made = diagnose_logs(
         options.files,
-        robot=options.robot,
+        robot=options.self_model,
         choose_comparator=comparator_choice(options.comparator),
         kinds=considered,
         calibrate=options.calibrate,

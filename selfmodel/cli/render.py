@@ -72,7 +72,7 @@ def render(options: Render) -> None:
     out = options.file.with_suffix(".gif") if out is None else out
     kind = out.suffix.lower()
     _check_name(out, kind, stick=options.stick)
-    if options.hypothesis is not None and options.diagnosis is not None:
+    if options.hypothesis and options.diagnosis is not None:
         raise InputError("expected --hypothesis or --diagnosis, got both: leave one out")
     if kind == ".mp4":
         ffmpeg()  # a missing program is an error before any work is done
@@ -88,7 +88,7 @@ def render(options: Render) -> None:
         if options.diagnosis is None
         else best_hypothesis(options.diagnosis)
     )
-    given = replayed_log(options.file, notation, kinds=options.kinds, model=options.model)
+    given = replayed_log(options.file, notation, kinds=options.kinds, model=options.self_model)
     film, facts = _film(given, options.pictures if kind in STRIPS else None, options.threads)
     print_notes(*(f"note: {note}" for note in facts["notes"]))
     if library is None:
@@ -107,7 +107,7 @@ def render(options: Render) -> None:
         told = {
             "log": str(options.file),
             "robot": given.robot.name,
-            "model": options.model,
+            "model": options.self_model,
             **facts,
         }
         told |= {"out": str(out), "frames": len(film.time), "bytes": len(data)}

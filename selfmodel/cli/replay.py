@@ -38,7 +38,9 @@ def replay(options: ReplayTrial) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if options.out is not None:
         check_figure(options.out)
-    given = replayed_log(options.file, options.hypothesis, kinds=options.kinds, model=options.model)
+    given = replayed_log(
+        options.file, options.hypothesis, kinds=options.kinds, model=options.self_model
+    )
     log, robot, assumed = given.log, given.robot, given.hypothesis
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
@@ -53,7 +55,7 @@ def replay(options: ReplayTrial) -> None:
     result = {
         "log": str(options.file),
         "robot": robot.name,
-        "model": options.model,
+        "model": options.self_model,
         "hypothesis": str(assumed),
         "steps": log.trial.behaviour.steps,
         "identical": found.identical,

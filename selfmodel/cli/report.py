@@ -46,7 +46,7 @@ def report(options: MakeReport) -> None:
         subject = subject_of_logs(
             options.sources,
             options.diagnosis,
-            robot=options.robot,
+            robot=options.self_model,
             threads=options.threads,
             comparator=options.comparator,
             kinds=searched,
@@ -55,7 +55,7 @@ def report(options: MakeReport) -> None:
     else:
         found = diagnose_logs(
             options.sources,
-            robot=options.robot,
+            robot=options.self_model,
             choose_comparator=comparator_choice(options.comparator),
             kinds=searched,
             calibrate=options.calibrate,

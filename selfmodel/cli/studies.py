@@ -10,10 +10,17 @@ import pandas as pd
 
 from selfmodel.arguments import robot_entry
 from selfmodel.cli import inputs
+from selfmodel.cli.commands import (
+    Ablate,
+    ListSuite,
+    RepeatPaper,
+    RunSuite,
+    Study as StudyOptions,
+    settings_of,
+)
 from selfmodel.cli.output.grid_display import as_objects, end, run_shown
 from selfmodel.cli.output.printing import print_json, print_lines, print_notes
 from selfmodel.cli.output.tables import show
-from selfmodel.cli.study_commands import Ablate, ListSuite, RepeatPaper, RunSuite
 from selfmodel.comparators import COMPARATORS
 from selfmodel.faults.registry import kind_names
 from selfmodel.robot.designs import network_for
@@ -52,10 +59,8 @@ def ablate(options: Ablate) -> None:
         kinds=kind_names(options.kinds),
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", options.gaps),
-        seeds=range(options.seed, options.seed + options.seeds),
-        settings=Settings(
-            steps=options.steps, trials=options.trials, generations=options.generations
-        ).scaled(options.population),
+        seeds=options.every_seed,
+        settings=options.settings,
         next_trial=options.next_trial,
         bank=options.bank,
         score=options.score,
@@ -63,9 +68,7 @@ def ablate(options: Ablate) -> None:
         search=options.search,
         only=inputs.share("--only", options.only),
     )
-    failed = run_shown(
-        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
-    )
+    failed = run_shown(study, options)
     rows = study_rows(study.name, options.out)
     scores = ablation_scores(rows)
     ends = {one["trials"] for one in scores}
@@ -77,8 +80,7 @@ def ablate(options: Ablate) -> None:
         results_files(study.name, rows, "scores", scores) | figures_of(rows, scores),
         [_score_table(scores)],
         {"rows": rows, "scores": scores},
-        table=options.table,
-        as_json=options.as_json,
+        options=options,
         shown=_score_table(shown),
         legend="With 95 % intervals; time as a multiple of the paper's comparator's.",
         notes=[f"warning: {note}" for note in notes],
@@ -102,17 +104,13 @@ def run_suite(options: RunSuite) -> None:
     )
     bodies = plans.bodies_of(names, wanted)
     # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
-    length = (
-        options.steps if options.steps is not None else 1001 if options.score == "return" else 1000
-    )
+    length = options.steps or (1001 if options.score == "return" else Settings.steps)
     study = plans.suite(
         options.out,
         bodies=bodies,
         cases=inputs.whole_numbers("--case", options.cases, plans.known_cases(bodies)),
-        seeds=range(options.seed, options.seed + options.seeds),
-        settings=Settings(
-            steps=length, trials=options.trials, generations=options.generations
-        ).scaled(options.population),
+        seeds=options.every_seed,
+        settings=settings_of(options, length),
         score=options.score,
         controller=options.controller,
         comparator=options.comparator,
@@ -123,9 +121,7 @@ def run_suite(options: RunSuite) -> None:
         search=options.search,
         only=inputs.share("--only", options.only),
     )
-    failed = run_shown(
-        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
-    )
+    failed = run_shown(study, options)
     rows = study_rows(study.name, options.out)
     summaries = suite_summaries(rows)
     found = summary_table("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
@@ -135,8 +131,7 @@ def run_suite(options: RunSuite) -> None:
         results_files(study.name, rows, "summaries", summaries),
         [found],
         {"rows": rows, "summaries": summaries},
-        table=options.table,
-        as_json=options.as_json,
+        options=options,
         shown=found,
         legend="Medians over the runs; right with its 95 % interval, %.",
     )
@@ -172,15 +167,11 @@ def paper(options: RepeatPaper) -> None:
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
         cases=inputs.whole_numbers("--case", options.cases, plans.TABLE_ONE),
-        seeds=range(options.seed, options.seed + options.seeds),
+        seeds=options.every_seed,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
-        settings=Settings(
-            steps=options.steps, trials=options.trials, generations=options.generations
-        ).scaled(options.population),
+        settings=options.settings,
     )
-    failed = run_shown(
-        study, executor=options.executor, scheduler=options.scheduler, workers=options.workers
-    )
+    failed = run_shown(study, options)
     results, files = write_results(options.out)
     tables = tables_of(results)
     _finish(
@@ -189,8 +180,7 @@ def paper(options: RepeatPaper) -> None:
         {},
         tables,
         results.as_dict(),
-        table=options.table,
-        as_json=options.as_json,
+        options=options,
         shown=tables[1],
         legend="Medians over the runs, m; the paper: whether it reports the case as restored.",
         written=files,
@@ -204,8 +194,7 @@ def _finish(
     tables: Sequence[Table],
     facts: Mapping[str, Any],
     *,
-    table: str | None,
-    as_json: bool,
+    options: StudyOptions,
     shown: Table,
     legend: str,
     notes: Sequence[str] = (),
@@ -219,18 +208,17 @@ def _finish(
         results: Content of its files by path in its folder.
         tables: Its tables, for the chosen format.
         facts: What ``--json`` prints.
-        table: Format of the tables; None for no files.
-        as_json: Whether one JSON object is printed.
+        options: Options of the study.
         shown: The table for readers.
         legend: Line below it.
         notes: Lines on standard error.
         written: Files that were written before.
     """
     paths = [*written, *write_files(study.folder, results)]
-    if table is not None:
-        paths += write_files(study.folder / "tables", table_files(tables, table))
+    if options.table is not None:
+        paths += write_files(study.folder / "tables", table_files(tables, options.table))
     files = [str(path) for path in paths]
-    if as_json:
+    if options.as_json:
         print_json(json_of({**facts, "failures": as_objects(failed), "files": files}), indent=1)
     else:
         if len(shown.shown):

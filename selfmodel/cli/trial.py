@@ -23,7 +23,7 @@ from selfmodel.trials.trial import TrialPlan
 
 def trial(options: RunTrial) -> None:
     """Run one trial of the simulated physical robot and write its log."""
-    kind = "network" if options.controller is None else str(options.controller)
+    kind = "network" if options.controller is None else options.controller
     made = arguments.robot_entry(options.robot, options.model_settings or ()).robot()
     inputs.check_log_name(options.out)
     hidden = HypothesisSpace(made.anatomy, plugins.kinds(options.kinds)).parse(

@@ -68,7 +68,9 @@ def view(options: View) -> None:
         check_folder(options.out)
         refuse_existing(options.out)
     import_rerun()  # a missing package is an error before any work is done
-    given = replayed_log(options.file, options.hypothesis, kinds=options.kinds, model=options.model)
+    given = replayed_log(
+        options.file, options.hypothesis, kinds=options.kinds, model=options.self_model
+    )
     found = given.replayed(options.threads)
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")

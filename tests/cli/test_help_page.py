@@ -8,10 +8,10 @@ import pytest
 import typer
 
 from selfmodel import __version__, cli
-from selfmodel.cli.groups import logs, repertoire, suite
 from tests.helpers.command import selfmodel, selfmodel_process
 
-GROUPS = {(): cli.app, ("logs",): logs, ("suite",): suite, ("repertoire",): repertoire}
+GROUPS = {(): cli.app, ("logs",): cli.LOGS, ("suite",): cli.SUITE}
+GROUPS[("repertoire",)] = cli.REPERTOIRE
 
 
 def commands() -> Iterator[tuple[str, ...]]:

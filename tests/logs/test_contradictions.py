@@ -7,7 +7,7 @@ import pytest
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from typer.testing import CliRunner
 
-from selfmodel.cli.groups import logs as app
+from selfmodel.cli import LOGS
 from selfmodel.logs import (
     CorruptError,
     IncompleteError,
@@ -205,7 +205,7 @@ def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):
     rewritten(log, says(SOFTWARE, **{evil: evil}), more=more)
     assert read_log(log).trial.robot == evil
     for command in ("info", "verify"):
-        result = CliRunner().invoke(app, [command, str(log)])
+        result = CliRunner().invoke(LOGS, [command, str(log)])
         assert result.exit_code == 0
         assert all(char.isprintable() or char == "\n" for char in result.output)
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]

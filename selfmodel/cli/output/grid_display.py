@@ -16,6 +16,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from selfmodel.cli.commands import Study as StudyOptions
 from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_notes
@@ -113,23 +114,20 @@ def _line(event: CellEnds) -> str:
     return f"[{event.number}/{event.total}] {event.name}: {what}"
 
 
-def run_shown(
-    study: Study, *, executor: str, scheduler: str | None, workers: int
-) -> Sequence[CellEnds]:
+def run_shown(study: Study, options: StudyOptions) -> Sequence[CellEnds]:
     """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.
 
     Args:
         study: The study.
-        executor: ``processes`` or ``dask``.
-        scheduler: Address of Dask's scheduler.
-        workers: Number of processes; 0 for one per processor.
+        options: Options of the study.
 
     Raises:
         InputError: The executor is unknown, the scheduler is missing or does not answer, or the
             folder contains another study.
     """
+    executor, scheduler = options.executor, options.scheduler
     if executor not in EXECUTORS:
         raise unknown_name("executor", executor, EXECUTORS)
     if (scheduler is None) == (executor == DASK):
@@ -140,7 +138,8 @@ def run_shown(
     opened = nullcontext() if scheduler is None else dask_executor(scheduler)
     with opened as given, grid_display() as on_event:
         try:
-            return study.run(executor=given, workers=thread_count(workers), on_progress=on_event)
+            workers = thread_count(options.workers)
+            return study.run(executor=given, workers=workers, on_progress=on_event)
         except KeyboardInterrupt as interruption:
             interruption.add_note(
                 f"{on_event.done} of {on_event.total} are done and kept in {study.folder}; the "
