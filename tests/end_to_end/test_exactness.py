@@ -5,8 +5,9 @@ position and a quaternion, so the joint positions of the base are those of the t
 rounding.
 """
 
+import dataclasses
 import itertools
-from pathlib import Path
+from functools import cache
 
 import pytest
 
@@ -15,20 +16,19 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
-from tests.helpers.exactness import Exactness, exactness, prediction_error, with_options
-from tests.helpers.robots.arms import arm_mjcf
+from tests.helpers.exactness import exactness, prediction_error, with_options
+from tests.helpers.robots.arms import arm_mjcf, robot_of
 from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
-STEPS = 40
+STEPS, SHORT = 40, 18
 ROUNDING = 1e-9
 """Largest error of the prediction of a planar robot, in the units of the signals."""
 
@@ -43,73 +43,59 @@ BODIES = {
     },
 }
 PLANAR = (
-    "walker2d",
-    "half_cheetah",
-    "suite-walker",
-    "suite-cheetah",
-    "suite-hopper",
-    "suite-swimmer",
+    *("walker2d", "half_cheetah"),
+    *("suite-walker", "suite-cheetah", "suite-hopper", "suite-swimmer"),
 )
-
-SOLVERS = ("PGS", "CG", "Newton")
-ITERATIONS = ("1", "4", "100")
-CONES = ("pyramidal", "elliptic")
-INTEGRATORS = ("Euler", "implicitfast", "implicit", "RK4")
-
-PAIRS = [
-    (SOLVERS[s], ITERATIONS[(s + g) % 3], CONES[(s + g) % 2], INTEGRATORS[g])
-    for s in range(3)
-    for g in range(4)
-]
-"""Every pair of two options' values, in 12 combinations of the 72."""
-
-ALL = list(itertools.product(SOLVERS, ITERATIONS, CONES, INTEGRATORS))
-
-Options = tuple[str, str, str, str]
+SUITE = (
+    *("quadruped-walk", "walker-walk", "cheetah-run", "hopper-hop", "humanoid-walk"),
+    *("humanoid_CMU-walk", "dog-walk", "swimmer-swimmer6", "fish-swim"),
+)
+OPTIONS = tuple(
+    itertools.product(
+        ("PGS", "CG", "Newton"),
+        ("pyramidal", "elliptic"),
+        ("Euler", "implicitfast", "implicit", "RK4"),
+    )
+)
+"""Every solver with every cone and integrator."""
 
 
-def loaded(name: str, options: Options, folder: Path) -> Robot:
-    names = ("solver", "iterations", "cone", "integrator")
-    path = folder / f"{name.replace(' ', '_')}.xml"
-    options_by_name = dict(zip(names, options, strict=True))
-    path.write_text(with_options(BODIES[name], **options_by_name), encoding="utf-8")
-    return load_mjcf(path)
+@cache
+def loaded(name: str, iterations: int) -> Robot:
+    """The robot of a file whose solver has so many iterations."""
+    return robot_of(with_options(BODIES[name], iterations=str(iterations)))
 
 
-def measured(robot: Robot, hypothesis: Hypothesis = INTACT) -> Exactness:
-    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
-    return exactness(robot, hypothesis, driver, STEPS)
+def configured(name: str, iterations: int, options: tuple[str, str, str]) -> Robot:
+    robot = loaded(name, iterations)
+    named = dict(zip(("solver", "cone", "integrator"), options, strict=True))
+    return dataclasses.replace(robot, mjcf=with_options(robot.mjcf, **named))
 
 
-def check(name: str, found: Exactness) -> None:
-    bound = ROUNDING if name.startswith(PLANAR) else 0.0
-    assert found.prediction <= bound, (name, found)
-    assert found.displacement == 0.0, (name, found)
+def check(name: str, robot: Robot, hypothesis: Hypothesis = INTACT, steps: int = STEPS) -> None:
+    driver = played_back(robot.anatomy.motors, random_motion(robot, steps))
+    prediction, displacement = exactness(robot, hypothesis, driver, steps)
+
+    assert prediction <= (ROUNDING if name.startswith(PLANAR) else 0.0), name
+    assert displacement == 0.0, name
 
 
-def test_the_combinations_have_every_pair_of_options():
-    for one, other in itertools.combinations(range(4), 2):
-        pairs = {(row[one], row[other]) for row in PAIRS}
-        assert pairs == {(row[one], row[other]) for row in ALL}
-
-
-@pytest.mark.parametrize("options", PAIRS, ids="-".join)
-def test_prediction_is_exact_with_every_solver_and_integrator(options: Options, tmp_path: Path):
-    for name in ("go1", list(BODIES)[1 + PAIRS.index(options) % (len(BODIES) - 1)]):
-        check(name, measured(loaded(name, options, tmp_path)))
+@pytest.mark.parametrize("iterations", [1, 4, 100])
+def test_prediction_is_exact_with_every_solver_and_integrator(iterations: int):
+    for options in OPTIONS[:: 1 if iterations == 1 else 5]:
+        check("go1", configured("go1", iterations, options))
 
 
 @pytest.mark.search
 @pytest.mark.parametrize("name", BODIES)
-def test_prediction_is_exact_with_every_combination_of_options(name: str, tmp_path: Path):
-    for options in ALL:
-        check(name, measured(loaded(name, options, tmp_path)))
+def test_prediction_is_exact_for_every_body_with_every_combination_of_options(name: str):
+    for number, options in enumerate(OPTIONS):
+        steps = SHORT if number else STEPS
+        check(name, configured(name, (1, 4)[number % 2], options), steps=steps)
 
 
-def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit(tmp_path: Path):
-    path = tmp_path / "go1.xml"
-    path.write_text(go1(), encoding="utf-8")  # one iteration, as MJX's models have
-    robot = load_mjcf(path)
+def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit():
+    robot = loaded("go1", 1)  # as MJX's models have
     driver = trot(robot, STEPS)
     log = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, STEPS))
     plan = TrialPlan("before", "before", driver, STEPS, 0)
@@ -120,34 +106,21 @@ def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit(tmp_path: Path):
 
 
 @pytest.mark.parametrize("truth", ["break:FR_calf_joint", "motor:RL_hip_joint=0.5", "wind=20.0"])
-def test_prediction_is_exact_under_a_fault(truth: str, tmp_path: Path):
-    robot = loaded("go1", PAIRS[0], tmp_path)
+def test_prediction_is_exact_under_a_fault(truth: str):
+    robot = loaded("go1", 1)
 
-    check(truth, measured(robot, parse(truth, robot.anatomy)))
+    check(truth, robot, parse(truth, robot.anatomy))
 
 
 @pytest.mark.bodies
-@pytest.mark.parametrize(
-    "name",
-    [
-        "suite-quadruped-walk",
-        "suite-walker-walk",
-        "suite-cheetah-run",
-        "suite-hopper-hop",
-        "suite-humanoid-walk",
-        "suite-humanoid_CMU-walk",
-        "suite-dog-walk",
-        "suite-swimmer-swimmer6",
-        "suite-fish-swim",
-    ],
-)
+@pytest.mark.parametrize("name", SUITE)
 def test_prediction_is_exact_for_a_body_of_the_suite_in_its_own_environment(name: str):
-    entry = arguments.robot_entry(name)
+    entry = arguments.robot_entry(f"suite-{name}")
     robot = entry.robot()
-    check(name, measured(robot))
+    check(f"suite-{name}", robot, steps=SHORT)
 
-    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
+    driver = played_back(robot.anatomy.motors, random_motion(robot, SHORT))
     assert entry.physical is not None
-    log = collect(robot.anatomy.names, entry.physical(robot, INTACT).run(driver, STEPS))
+    log = collect(robot.anatomy.names, entry.physical(robot, INTACT).run(driver, SHORT))
     error = prediction_error(Simulator(robot, 1), INTACT, log)
-    assert error <= (ROUNDING if name.startswith(PLANAR) else 0.0)
+    assert error <= (ROUNDING if f"suite-{name}".startswith(PLANAR) else 0.0)

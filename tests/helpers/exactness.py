@@ -1,6 +1,6 @@
 """Measures of exactness: a log of a robot without a gap against the robot's own self-model."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -20,22 +20,15 @@ HORIZON = 12
 """Control steps of a segment, as in ``segment-prediction``."""
 
 
-@dataclass(frozen=True)
-class Exactness:
-    """Differences between a run of a physical robot without a gap and its self-model.
-
-    Attributes:
-        prediction: Largest difference of a predicted state from the logged state, over segments
-            that begin in logged states.
-        displacement: Difference of the simulated from the physical displacement, m.
-    """
+class Exactness(NamedTuple):
+    """Largest error of a predicted state, and error of the simulated displacement, m."""
 
     prediction: float
     displacement: float
 
 
 def exactness(robot: Robot, hypothesis: Hypothesis, driver: CommandSource, steps: int) -> Exactness:
-    """Returns the exactness of a robot's predictions and simulations under the truth.
+    """Returns the errors of a robot's predictions and simulations under the truth.
 
     Args:
         robot: The robot.
@@ -46,8 +39,8 @@ def exactness(robot: Robot, hypothesis: Hypothesis, driver: CommandSource, steps
     log = collect(robot.anatomy.names, SimulatedRobot(robot, hypothesis).run(driver, steps))
     simulator = Simulator(robot, 1)
     run = simulator.run([(hypothesis, driver)], steps, ("base_position",)).behaviour
-    apart = run["base_position"][0, -1] - log["base_position"][-1]
-    return Exactness(prediction_error(simulator, hypothesis, log), float(np.abs(apart).max()))
+    difference = run["base_position"][0, -1] - log["base_position"][-1]
+    return Exactness(prediction_error(simulator, hypothesis, log), np.abs(difference).max())
 
 
 def prediction_error(simulator: Simulator, hypothesis: Hypothesis, log: Behaviour) -> float:
