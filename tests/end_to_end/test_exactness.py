@@ -28,7 +28,7 @@ from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
-STEPS, SHORT = 40, 18
+STEPS = 40
 ROUNDING = 1e-9
 """Largest error of the prediction of a planar robot, in the units of the signals."""
 
@@ -72,9 +72,9 @@ def configured(name: str, iterations: int, options: tuple[str, str, str]) -> Rob
     return dataclasses.replace(robot, mjcf=with_options(robot.mjcf, **named))
 
 
-def check(name: str, robot: Robot, hypothesis: Hypothesis = INTACT, steps: int = STEPS) -> None:
-    driver = played_back(robot.anatomy.motors, random_motion(robot, steps))
-    prediction, displacement = exactness(robot, hypothesis, driver, steps)
+def check(name: str, robot: Robot, hypothesis: Hypothesis = INTACT) -> None:
+    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
+    prediction, displacement = exactness(robot, hypothesis, driver, STEPS)
 
     assert prediction <= (ROUNDING if name.startswith(PLANAR) else 0.0), name
     assert displacement == 0.0, name
@@ -90,8 +90,7 @@ def test_prediction_is_exact_with_every_solver_and_integrator(iterations: int):
 @pytest.mark.parametrize("name", BODIES)
 def test_prediction_is_exact_for_every_body_with_every_combination_of_options(name: str):
     for number, options in enumerate(OPTIONS):
-        steps = SHORT if number else STEPS
-        check(name, configured(name, (1, 4)[number % 2], options), steps=steps)
+        check(name, configured(name, (1, 4)[number % 2], options))
 
 
 def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit():
@@ -117,10 +116,10 @@ def test_prediction_is_exact_under_a_fault(truth: str):
 def test_prediction_is_exact_for_a_body_of_the_suite_in_its_own_environment(name: str):
     entry = arguments.robot_entry(f"suite-{name}")
     robot = entry.robot()
-    check(f"suite-{name}", robot, steps=SHORT)
+    check(f"suite-{name}", robot)
 
-    driver = played_back(robot.anatomy.motors, random_motion(robot, SHORT))
+    driver = played_back(robot.anatomy.motors, random_motion(robot, STEPS))
     assert entry.physical is not None
-    log = collect(robot.anatomy.names, entry.physical(robot, INTACT).run(driver, SHORT))
+    log = collect(robot.anatomy.names, entry.physical(robot, INTACT).run(driver, STEPS))
     error = prediction_error(Simulator(robot, 1), INTACT, log)
     assert error <= (ROUNDING if f"suite-{name}".startswith(PLANAR) else 0.0)
