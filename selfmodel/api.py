@@ -50,8 +50,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.studies.scores import check_motion

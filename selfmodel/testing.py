@@ -139,38 +139,16 @@ def shown(request: Request, trial: Trial) -> Behaviour:
 
     Returns:
         The requested signals, with a leading axis of one run.
-
-    Raises:
-        ValueError: The trial does not contain the beginning of a segment.
     """
     behaviour, time = trial.behaviour, trial.behaviour.time
     rows: IndexArray = np.arange(behaviour.steps)
     if isinstance(request, Segments):
-        rows = _starts(request, behaviour)[:, np.newaxis] + np.arange(request.horizon + 1)
+        rows = request.starts[:, np.newaxis] + np.arange(request.horizon + 1)
         time = time[: request.horizon + 1]
     elif isinstance(request, Ensemble):
         rows = np.tile(rows, (request.members, 1))
     signals = {signal: behaviour[signal][rows][np.newaxis] for signal in request.record}
     return Behaviour(behaviour.names, time, signals)
-
-
-def _starts(request: Segments, behaviour: Behaviour) -> IndexArray:
-    """Returns the step of the trial at which each segment begins."""
-    horizon = request.horizon
-    steps = np.arange(behaviour.steps - horizon)
-    fits = np.ones((len(request.commands), len(steps)), dtype=bool)
-    for signal, values in request.states.items():
-        fits &= (values[:, np.newaxis] == behaviour[signal][steps]).all(axis=2)
-    ahead = behaviour["commands"][steps[:, np.newaxis] + np.arange(horizon)]
-    for segment, commands in enumerate(request.commands[:, request.lead :]):
-        fits[segment] &= (ahead == commands).all(axis=(1, 2))
-    if not fits.any(axis=1).all():
-        raise ValueError(
-            f"the trial has no step at which segment {int(np.argmin(fits.any(axis=1)))} could "
-            f"begin, with the segment's states and commands and {horizon} later steps: cut the "
-            f"segments from the trial, and give a trial without noise"
-        )
-    return np.asarray(fits.argmax(axis=1))
 
 
 def _check_request(request: Request, trial: Trial) -> None:
@@ -194,25 +172,27 @@ def _check_request(request: Request, trial: Trial) -> None:
 
 
 def _check_segments(request: Segments, trial: Trial) -> None:
-    names, commands = trial.behaviour.names, request.commands
-    if commands.ndim != 3 or commands.shape[2] != len(names.motors) or not len(commands):
+    behaviour, starts, horizon = trial.behaviour, request.starts, request.horizon
+    names, expected = behaviour.names, behaviour["commands"].shape
+    if request.commands.shape != expected:
         raise ValueError(
-            f"the commands of segments must have shape (segments, lead + horizon, motors) = "
-            f"(1 or more, ..., {len(names.motors)}), got {commands.shape}"
+            f"the commands of segments must be those of the trial, of shape (steps, motors) = "
+            f"{expected}, got {request.commands.shape}"
         )
-    if not 0 <= request.lead < commands.shape[1]:
+    last = behaviour.steps - 1 - horizon
+    if horizon < 1 or not starts.size or not ((starts >= 0) & (starts <= last)).all():
         raise ValueError(
-            f"segments need a lead of at least 0 and a horizon of at least 1 step, got a lead of "
-            f"{request.lead} in {commands.shape[1]} rows of commands"
+            f"segments need a horizon of at least 1 step, got {horizon}, and at least one start, "
+            f"from 0 to {last}, got {starts.tolist()}"
         )
     for signal, values in request.states.items():
-        expected = (len(commands), names.width(signal))
+        expected = (len(starts), names.width(signal))
         if values.shape != expected:
             raise ValueError(
                 f"the states of {signal} must have shape (segments, width) = {expected}, got "
                 f"{values.shape}"
             )
-    if not np.isfinite(commands).all():
+    if not np.isfinite(request.commands[starts[:, np.newaxis] + np.arange(horizon)]).all():
         raise ValueError("the commands of segments must be finite")
     for signal, values in request.states.items():
         wrong = np.isinf(values) if signal in JOINTS else ~np.isfinite(values)
@@ -226,8 +206,9 @@ def _check_segments(request: Segments, trial: Trial) -> None:
 def _is_same_request(one: Request, other: Request) -> bool:
     if isinstance(one, Segments) and isinstance(other, Segments):
         return (
-            (one.lead, one.record) == (other.lead, other.record)
-            and np.array_equal(one.commands, other.commands)
+            (one.horizon, one.record) == (other.horizon, other.record)
+            and np.array_equal(one.starts, other.starts)
+            and np.array_equal(one.commands, other.commands, equal_nan=True)
             and one.states.keys() == other.states.keys()
             and all(np.array_equal(one.states[key], other.states[key]) for key in one.states)
         )
@@ -238,7 +219,7 @@ def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behav
     """Returns the requested signals of a simulation, after a check of their shapes."""
     lengths: tuple[int, ...] = (trial.behaviour.steps,)
     if isinstance(request, Segments):
-        lengths = (len(request.commands), request.horizon + 1)
+        lengths = (len(request.starts), request.horizon + 1)
     elif isinstance(request, Ensemble):
         lengths = (request.members, trial.behaviour.steps)
     for signal in request.record:

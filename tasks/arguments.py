@@ -10,7 +10,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.simulation.initial_pose import ANGLE_DEVIATION
+from selfmodel.simulation.domain import ANGLE_DEVIATION
 
 NAMES = ("hypothesis", "time_limit", "random", "gap", "start_noise")
 """Arguments of every task."""

@@ -29,7 +29,7 @@ from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import current_value, observed_fields, signal_fields, state_writer
-from selfmodel.simulation.activations import activations_since_rest
+from selfmodel.simulation.prediction import activations
 from selfmodel.tasks.entry import Entry
 from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -295,11 +295,11 @@ def _sum(robot: Robot, physics: "Physics", task: "Task", behaviour: Behaviour, r
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
     state_writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
-    activations = activations_since_rest(robot, commands)
+    activation = activations(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):
         data.qpos[:], data.qvel[:] = fields["qpos"][k], fields["qvel"][k]
-        data.act[:] = activations[k]
+        data.act[:] = activation[k]
         data.ctrl[:] = commands[k - 1]
         mujoco.mj_forward(model.ptr, data.ptr)
         total += float(task.get_reward(physics))

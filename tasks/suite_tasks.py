@@ -19,7 +19,7 @@ from selfmodel.robot.anatomy_reader import read_anatomy
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
-from selfmodel.simulation.initial_pose import randomize_joint_angles, start_spread
+from selfmodel.simulation.domain import randomize_joint_angles, start_spread
 from selfmodel.simulation.reality_gap import draw_gap_of, perturbed_model
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.arguments import (

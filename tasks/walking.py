@@ -21,7 +21,7 @@ from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import current_value, observed_fields
-from selfmodel.simulation.initial_pose import randomize_initial_pose, start_spread
+from selfmodel.simulation.domain import randomize_initial_pose, start_spread
 from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.tasks.arguments import (
     Seed,

@@ -19,8 +19,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields, state_writer
-from selfmodel.simulation.factor_sets import MAX_LOG_FACTOR
 from selfmodel.simulation.model_factors import (
+    MAX_LOG_FACTOR,
     Parameters,
     factor_names,
     from_factors,

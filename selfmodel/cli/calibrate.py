@@ -14,9 +14,9 @@ from selfmodel.errors import InputError
 from selfmodel.logs.files import create_file, refuse_existing
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
-from selfmodel.simulation.factor_sets import FACTORS
 from selfmodel.simulation.fit import NOMINAL
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.model_factors import FACTORS
+from selfmodel.simulation.simulator import thread_count
 
 
 def calibrate(options: Calibrate) -> None:

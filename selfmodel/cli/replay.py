@@ -13,8 +13,7 @@ from selfmodel.cli.output.tables import show
 from selfmodel.cli.replayed_log import replayed_log
 from selfmodel.errors import InputError
 from selfmodel.logs import TrialLog
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
 from selfmodel.trials.signals import SIGNALS, Signal
 

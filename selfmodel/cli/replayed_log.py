@@ -9,8 +9,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
 from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay, replay
 from selfmodel.trials.trial import check_magnitudes
 

@@ -17,7 +17,7 @@ from selfmodel.report.charts import Report
 from selfmodel.report.content import report_of
 from selfmodel.report.page import REPORT, html_of
 from selfmodel.report.subject import Subject, is_run, subject_of_logs, subject_of_run
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import thread_count
 from selfmodel.trials.trial import trial_names
 
 

@@ -21,8 +21,8 @@ from selfmodel.diagnosis.comparator import (
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.batch import SimulationResult, largest_batch
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.trial import Trial, TrialPart, whole

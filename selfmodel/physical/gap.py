@@ -1,7 +1,7 @@
 """Reality gap of a physical robot: its draw, and the noise of measurements.
 
 ``simulation.reality_gap`` has the model with the factors of a gap, which ensembles of self-models
-share, and ``simulation.initial_pose`` the random initial poses.
+share, and ``simulation.domain`` the random initial poses.
 """
 
 import numpy as np
@@ -10,8 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.robot.anatomy_reader import joint_limits
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.domain import dead_sensors
-from selfmodel.simulation.initial_pose import rotated_by_vector
+from selfmodel.simulation.domain import dead_sensors, rotated_by_vector
 from selfmodel.simulation.reality_gap import RealityGap, draw_gap_of
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, Signal
 

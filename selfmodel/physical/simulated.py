@@ -16,7 +16,7 @@ from selfmodel.physical.gap import Measurement, NoisyMeasurement
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS
-from selfmodel.simulation.initial_pose import randomize_initial_pose, start_spread
+from selfmodel.simulation.domain import randomize_initial_pose, start_spread
 from selfmodel.simulation.reality_gap import DEBRIS_PREFIX, RealityGap, perturbed_model
 from selfmodel.simulation.rollout import Rollout
 from selfmodel.trials.behaviour import Sample

@@ -21,9 +21,8 @@ from selfmodel.recovery.falls import first_falls
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
 from selfmodel.recovery.repair import mutants
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import SimulationResult
-from selfmodel.simulation.cache import Cache
-from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.rollout import SimulationResult
+from selfmodel.simulation.simulator import Cache, Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, difference
 

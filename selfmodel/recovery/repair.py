@@ -15,9 +15,8 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores import DISPLACEMENT, Score, scores_of
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
-from selfmodel.simulation.cache import Cache
 from selfmodel.simulation.domain import DomainDistribution
-from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.simulation.simulator import Cache, Run, Simulator
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.falls import falls_of, first_lasting, steps_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.self_collision import penetration_depths
-from selfmodel.simulation.batch import SimulationResult
+from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial

@@ -19,11 +19,16 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import batch_bytes
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
-from selfmodel.simulation.domain import DomainDistribution, DomainSample, draw_samples
-from selfmodel.simulation.initial_pose import StartSpread, start_spread
+from selfmodel.simulation.domain import (
+    DomainDistribution,
+    DomainSample,
+    StartSpread,
+    draw_samples,
+    start_spread,
+)
 from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
+from selfmodel.simulation.rollout import batch_bytes
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import encoder_noise

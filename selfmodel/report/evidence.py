@@ -198,9 +198,8 @@ def sensor_errors(subject: Subject, trial: Trial, hypothesis: Hypothesis) -> Sen
     result = simulate(subject.simulator, request, trial, [hypothesis])
     if result.diverged.any():
         return None
-    if isinstance(request, Segments) and request.past is not None:
-        starts = request.past.starts
-        rows = starts[:, np.newaxis] + np.arange(request.horizon + 1)
+    if isinstance(request, Segments):
+        rows = request.starts[:, np.newaxis] + np.arange(request.horizon + 1)
     elif isinstance(request, ClosedLoop):
         count = min(WINDOWS, behaviour.steps)
         rows = np.arange(behaviour.steps // count * count).reshape(count, -1)

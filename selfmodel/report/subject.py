@@ -41,8 +41,7 @@ from selfmodel.report.recorded import (
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.trials.trial import Trial, trial_names
 
 WHAT, REMEDY = (

@@ -13,26 +13,22 @@ from threadpoolctl import threadpool_limits
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.batch import SimulationStats
-from selfmodel.simulation.factor_sets import FACTORS, JOINT_PRIOR_DEVIATIONS, prior_deviations
-from selfmodel.simulation.fit import (
-    NOMINAL,
-    Fit,
-    is_determined,
-    nested_fits,
-)
+from selfmodel.simulation.fit import NOMINAL, Fit, is_determined, nested_fits
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import (
-    JOINT_QUANTITIES,
+    FACTORS,
+    JOINT_FIELDS,
+    JOINT_PRIOR_DEVIATIONS,
     SHARED,
     Parameters,
     factor_names,
     joint_values,
     nominal,
+    prior_deviations,
     with_parameters,
 )
-from selfmodel.simulation.segment_errors import SegmentErrors, root_mean_square
-from selfmodel.simulation.segments import observed_segments
+from selfmodel.simulation.rollout import SimulationStats
+from selfmodel.simulation.segments import SegmentErrors, observed_segments, root_mean_square
 from selfmodel.trials.trial import Trial
 
 EXACT_ERROR = 0.01
@@ -67,13 +63,12 @@ class JointCalibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values."""
+        pairs = {"error": self.errors, "held_out_error": self.held_out_errors}
         return {
             "set": self.chosen,
             "delay": self.delay,
-            "error_before": self.errors[0],
-            "error": self.errors[1],
-            "held_out_error_before": self.held_out_errors[0],
-            "held_out_error": self.held_out_errors[1],
+            **{f"{name}_before": before for name, (before, _) in pairs.items()},
+            **{name: after for name, (_, after) in pairs.items()},
             "worst_joint": self.worst_joint[0],
             "worst_joint_error": self.worst_joint[1],
             "parameters": list(self.rows),
@@ -130,11 +125,12 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
-        parts = (*JOINT_QUANTITIES, "body_mass", "body_inertia")
+        parts = (*JOINT_FIELDS, "body_mass", "body_inertia")
         factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
-        return ({} if self.joints is None else {"joints": self.joints.to_dict()}) | {
+        return {
+            **({} if self.joints is None else {"joints": self.joints.to_dict()}),
             **factors,
-            "deviations": [float(deviation) for deviation in self.deviations],
+            "deviations": self.deviations.tolist(),
             "error_before": self.error_before,
             "error": self.error,
             "set": self.chosen,
@@ -162,25 +158,18 @@ class Calibration:
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the fitted factors that the trials do not determine; none without a fit."""
-        if not self.determined:
-            return ()
-        return tuple(row["name"] for row in self.rows() if not row["determined"])
+        rows = self.rows() if self.determined else []
+        return tuple(row["name"] for row in rows if not row["determined"])
 
     def rows(self) -> list[dict[str, Any]]:
         """Returns name, factor, deviation and whether the trials determine it, of each factor."""
-        names, factors = factor_names(self.robot), self.parameters.factors
-        known = self.determined or (False,) * len(names)
-        return [
-            {
-                "name": name,
-                "factor": float(factor),
-                "deviation": float(deviation),
-                "determined": own,
-            }
-            for name, factor, deviation, own in zip(
-                names, factors, self.deviations, known, strict=True
-            )
-        ]
+        names = factor_names(self.robot)
+        columns = (
+            *(names, self.parameters.factors.tolist(), self.deviations.tolist()),
+            self.determined or (False,) * len(names),
+        )
+        keys = ("name", "factor", "deviation", "determined")
+        return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
@@ -224,27 +213,23 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
                 f"remained finite, before and after the fit: check the model and the units of the "
                 f"log"
             )
-        best = fits[-1]
+        best, is_checked = fits[-1], not (is_exact or robot.has_fixed_base)
         deviations, known = (
             np.concatenate([own[quantity] for quantity in (*SHARED, "motor_gains")])
             for own in (best.deviations, prior)
         )
-        held_out, held_out_before = (
-            float(segments.losses(own.held_out).mean()) for own in (best, fits[0])
-        )
+        loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, fits[0]))
         return Calibration(
             robot=robot if best.name == NOMINAL else with_parameters(robot, best.parameters),
             parameters=best.parameters,
             deviations=deviations,
             error_before=root_mean_square(before),
             error=root_mean_square(best.errors),
-            joints=_joints(segments, fits) if robot.has_fixed_base else None,
+            joints=_joints(segments, fits[0], best) if robot.has_fixed_base else None,
             chosen=best.name,
             determined=tuple(is_determined(deviations, known).tolist()) if best.is_fitted else (),
-            held_out_gain=0.0 if is_exact else 1 - held_out / held_out_before,
-            suspicion=None
-            if is_exact or robot.has_fixed_base
-            else suspicion(segments, best.parameters, best.errors),
+            held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
+            suspicion=suspicion(segments, best.parameters, best.errors) if is_checked else None,
         )
 
 
@@ -270,24 +255,35 @@ def _segment_errors(robot: Robot, trials: Sequence[Trial], threads: int) -> Segm
     return SegmentErrors(robot, [observed_segments(robot, trial) for trial in trials], threads)
 
 
-def _joints(segments: SegmentErrors, fits: Sequence[Fit]) -> JointCalibration:
-    robot, first, best = segments.robot, fits[0], fits[-1]
-    rows = []
+_QUANTITY_NAMES = {
+    "motor_gains": "gain",
+    "joint_damping": "damping",
+    "dry_friction": "dry friction",
+    "armature": "armature",
+}
+"""Names of quantities in JSON."""
+
+
+def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> JointCalibration:
+    robot, rows = segments.robot, list[dict[str, Any]]()
     for quantity, prior in JOINT_PRIOR_DEVIATIONS.items():
-        if quantity == "motor_gains":
+        if quantity in JOINT_FIELDS:
+            names = robot.anatomy.hinges
+            before, values = (
+                joint_values(robot, own.parameters, quantity) for own in (first, best)
+            )
+        else:
             names, before = robot.anatomy.motors, np.ones(robot.model.nu)
             values = np.array(best.parameters.motor_gains)
-        else:
-            names, before = robot.anatomy.hinges, joint_values(robot, first.parameters, quantity)
-            values = joint_values(robot, best.parameters, quantity)
-        known = best.is_fitted & is_determined(best.deviations[quantity], np.array(prior))
+        deviations = best.deviations[quantity]
+        known = best.is_fitted & is_determined(deviations, np.array(prior))
         rows += [
             {
                 "name": name,
                 "quantity": _QUANTITY_NAMES[quantity],
                 "before": float(before[k]),
                 "value": float(values[k]),
-                "deviation": float(best.deviations[quantity][k]),
+                "deviation": float(deviations[k]),
                 "determined": bool(known[k]),
             }
             for k, name in enumerate(names)
@@ -302,8 +298,3 @@ def _joints(segments: SegmentErrors, fits: Sequence[Fit]) -> JointCalibration:
         held_out_errors=(root_mean_square(first.held_out), root_mean_square(best.held_out)),
         worst_joint=(robot.anatomy.hinges[worst], float(sizes[worst])),
     )
-
-
-_QUANTITY_NAMES = {"motor_gains": "gain", "joint_damping": "damping"}
-_QUANTITY_NAMES |= {"dry_friction": "dry friction", "armature": "armature"}
-"""Names of quantities in JSON."""

@@ -19,14 +19,41 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.initial_pose import StartSpread, randomize_initial_pose
+from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
 from selfmodel.simulation.model_factors import (
     ModelDistribution,
     Parameters,
     model_with_parameters,
 )
 
+ANGLE_DEVIATION = 0.2
+"""Standard deviation of the initial joint angles, rad, at a gap level of 1."""
+
+TILT_DEVIATION = 0.1
+"""Standard deviation of the initial roll and pitch of the base, rad, at a gap level of 1."""
+
 _SEEDS = 2**63
+
+
+@dataclass(frozen=True)
+class StartSpread:
+    """Random deviation of initial poses from the reference pose of a model.
+
+    Attributes:
+        angles: Standard deviation of the joint angles, rad.
+        tilt: Standard deviation of the roll and of the pitch of the base, rad.
+    """
+
+    angles: float
+    tilt: float
+
+
+NO_SPREAD = StartSpread(0.0, 0.0)
+
+
+def start_spread(level: float) -> StartSpread:
+    """Returns the spread of the initial poses of a physical robot at a level of the gap."""
+    return StartSpread(level * ANGLE_DEVIATION, level * TILT_DEVIATION)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +81,6 @@ class DomainDistribution:
         """Whether all runs equal those of the self-model."""
         noise = self.reading_noise.any() or self.wrong_touches.any() or self.start != NO_SPREAD
         return self.models.is_exact and not noise and self.delays == (0,)
-
-
-NO_SPREAD = StartSpread(0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +159,88 @@ def initial_positions(
     return np.array(poses)
 
 
+def randomize_initial_pose(
+    robot: Robot,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    spread: StartSpread,
+    rng: np.random.Generator,
+) -> None:
+    """Moves a robot from its reference pose to a random pose nearby, above the ground.
+
+    Joint angles stay within their limits. Welded joints and the heading are unchanged, and so are
+    degrees of freedom that the base does not have, such as the tilt of a planar base.
+
+    Args:
+        robot: The robot as its model describes it.
+        model: Compiled model of the robot, with its faults.
+        data: State of the model in the reference pose; it is changed.
+        spread: Standard deviations of the pose.
+        rng: Random numbers of the pose.
+    """
+    fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
+    reference_depth = _penetration_depth(robot, model, data)
+    randomize_joint_angles(robot.anatomy, model, data, spread.angles, rng)
+    tilt = np.append(spread.tilt * rng.standard_normal(2), 0.0)
+    base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
+    write({"base_orientation": base[np.newaxis]})
+    # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
+    depth = _penetration_depth(robot, model, data)
+    lift = [0.0, 0.0, max(0.0, depth - reference_depth)]
+    write({"base_position": (current_value(fields["base_position"], data) + lift)[np.newaxis]})
+
+
+def randomize_joint_angles(
+    anatomy: Anatomy,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    deviation: float,
+    rng: np.random.Generator,
+) -> None:
+    """Adds normal noise to the joint angles of a robot, within their limits.
+
+    Args:
+        anatomy: Parts of the robot.
+        model: Compiled model of the robot; its welded joints keep their angles.
+        data: State of the model; it is changed.
+        deviation: Standard deviation of the angles, rad.
+        rng: Random numbers of the angles.
+    """
+    angles = deviation * rng.standard_normal(len(anatomy.hinges))
+    for name, angle in zip(anatomy.hinges, angles, strict=True):
+        hinge = model.joint(name)
+        if _is_welded(model, name):
+            continue
+        moved = data.qpos[hinge.qposadr[0]] + angle
+        data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
+
+
+def _is_welded(model: mujoco.MjModel, hinge: str) -> bool:
+    return bool(model.dof_armature[model.joint(hinge).dofadr[0]] == WELD_ARMATURE)
+
+
+def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the depth of the robot's deepest contact with the world, m.
+
+    The depth is negative for a contact within its margin, and 0 without a contact.
+    """
+    mujoco.mj_fwdPosition(model, data)
+    root = model.body(robot.root).id
+    roots = model.body_rootid[model.geom_bodyid[data.contact.geom]]
+    # The world and the robot, in either order.
+    depths = -data.contact.dist[(roots == root).any(axis=1) & (roots == 0).any(axis=1)]
+    return float(depths.max()) if len(depths) else 0.0
+
+
+def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray:
+    """Returns an orientation (w x y z) rotated by a rotation vector in the body frame, rad."""
+    rotation, result = np.array([1.0, 0, 0, 0]), np.empty(4)
+    mujoco.mju_quatIntegrate(rotation, vector, 1.0)
+    mujoco.mju_mulQuat(result, orientation, rotation)
+    mujoco.mju_normalize4(result)
+    return result
+
+
 class ReadingNoise:
     """Adds noise to the readings of a batch of runs, by condition, step by step.
 
@@ -154,7 +260,7 @@ class ReadingNoise:
         conditions: Sequence[DomainSample],
         uncertainty: DomainDistribution,
     ) -> None:
-        silent = np.array([dead_sensors(anatomy, own) for own in embodiments])
+        silent = np.array([dead_sensors(anatomy, embodiment) for embodiment in embodiments])
         self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
         self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
         self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
@@ -175,10 +281,8 @@ def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
 
     The sensor of a joint that is welded at 0 reads 0 too, but is not dead.
     """
-    model = embodiment.model
     welded = [
-        bool(sensor.hinge)
-        and bool(model.dof_armature[model.joint(sensor.hinge).dofadr[0]] == WELD_ARMATURE)
+        bool(sensor.hinge) and _is_welded(embodiment.model, sensor.hinge)
         for sensor in anatomy.sensors
     ]
     silent = (embodiment.gain == 0) & (embodiment.offset == 0)

@@ -20,15 +20,15 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, as_delay
-from selfmodel.simulation.batch import SimulationStats
-from selfmodel.simulation.factor_sets import Basis, bases, prior_deviations
-from selfmodel.simulation.model_factors import Parameters, nominal
-from selfmodel.simulation.segment_errors import (
-    SegmentErrors,
-    is_better,
-    pseudo_huber,
-    root_mean_square,
+from selfmodel.simulation.model_factors import (
+    Basis,
+    Parameters,
+    bases,
+    nominal,
+    prior_deviations,
 )
+from selfmodel.simulation.rollout import SimulationStats
+from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
 
 NOMINAL, DELAY, CONTACTS = "nominal", "delay", "contacts"
 """Names of the nested sets of parameters before those of factors."""
@@ -68,8 +68,9 @@ class Method:
         prior_weight: Weight of the prior relative to the data. All errors together count as
             1 / prior_weight**2 independent errors, whatever their number: errors of neighbouring
             steps and columns are strongly correlated.
-        step: Step of the finite differences of a logarithm, relative to the prior's deviation;
-            None for ``CONTACT_STEP``.
+        step: Step of the finite differences of a logarithm.
+        is_central: Whether the solver's differences are central, with that step; otherwise they are
+            forward, and the step is relative to the deviation of the prior.
         iterations: Largest number of iterations of the least-squares solver.
         delay_iterations: As ``iterations``, for each neighbouring delay; 0 to keep the delay.
         regularizers: Smallest and largest regularizer of the solver, and the factor from one to the
@@ -77,18 +78,18 @@ class Method:
     """
 
     prior_weight: float
-    step: float | None
+    step: float
+    is_central: bool
     iterations: int
     delay_iterations: int
     regularizers: Mapping[str, float]
 
 
-CONTACT_STEP = 0.1
-"""Step of the central differences of a logarithm where there are contacts. Smaller steps are
-dominated by noise: a parameter changes the time at which a foot makes contact."""
+FLOATING = Method(0.05, 0.1, True, 3, 0, {})
+"""Where there are contacts, smaller steps are dominated by noise: a parameter changes the time at
+which a foot makes contact."""
 
-FLOATING = Method(0.05, None, 3, 0, {})
-FIXED = Method(0.01, 0.05, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
+FIXED = Method(0.01, 0.05, False, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
 """Long simulations without contacts have errors far below their unit, so their prior weighs less
 than that of short predictions."""
 
@@ -132,78 +133,64 @@ def nested_fits(segments: SegmentErrors, before: FloatArray, stats: SimulationSt
         The nominal set, then each set that was chosen; the last is the best.
     """
     robot, folds = segments.robot, segments.folds(FOLDS)
-    start, prior = nominal(robot), prior_deviations(robot)
-    chosen = [Fit(NOMINAL, start, prior, before, before)]
+    best, prior = nominal(robot), prior_deviations(robot)
+    chosen = [Fit(NOMINAL, best, prior, before, before)]
 
-    def is_chosen(fit: Fit, min_z: float) -> bool:
-        own, other = (segments.losses(one.held_out) for one in (fit, chosen[-1]))
-        better = is_better(own, other, min_z)
+    def choose(fit: Fit, min_z: float) -> bool:
+        losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
+        better = is_better(losses, others, min_z)
         if better:
             chosen.append(fit)
         return better
 
-    best = start
+    def best_of(name: str, candidates: list[Parameters], errors: FloatArray) -> Fit:
+        """Returns the fit by the best candidate, given the errors of the best one so far."""
+        new = [own for own in candidates if own != best]
+        known = {best: errors, **dict(zip(new, segments.of(new).T, strict=True))}
+        return _best_candidate(name, segments, known, folds, prior)
+
     if not robot.has_fixed_base:
-        delays = {own: segments.of([own])[:, 0] for own in _with_delays(start) if own != start}
-        delays[start] = before
-        best, held_out = _best(segments, delays, folds)
-        is_chosen(Fit(DELAY, best, prior, delays[best], held_out), MIN_Z)
-        contacts = _contacts(segments, best, delays[best])
-        found, held_out = _best(segments, contacts, folds)
-        contact_fit = Fit(CONTACTS, found, prior, contacts[found], held_out)
-        if is_chosen(contact_fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
-            best = found
+        delays = [replace(best, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
+        fit = best_of(DELAY, delays, before)
+        choose(fit, MIN_Z)
+        best = fit.parameters
+        contacts = [
+            replace(best, contact_stiffness=stiffness, contact_damping=damping)
+            for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
+        ]
+        fit = best_of(CONTACTS, contacts, fit.errors)
+        if choose(fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
+            best = fit.parameters
     for number, (name, basis) in enumerate(bases(robot)):
         fitter = _Fitter(segments, basis, FIXED if robot.has_fixed_base else FLOATING)
         if robot.has_fixed_base and not number:
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
-        point = best
-        errors = segments.of([point], stats)[:, 0]
-        if root_mean_square(pseudo_huber(errors)) >= root_mean_square(
-            pseudo_huber(chosen[-1].errors)
-        ):
-            continue
-        # Independent segments: long simulations are chaotic, so their derivatives are meaningless.
-        slopes = fitter.slopes(point, x, errors)
-        parts = folds[segments.segment_of_error]
-        left_out = [slopes.without(parts == part) for part in range(FOLDS)]
-        every = segments.of([basis.applied(point, logarithms) for logarithms in left_out])
-        held_out = every[np.arange(len(parts)), parts]
-        deviations = prior | basis.by_quantity(
-            slopes.deviations_of_segments(segments.segment_of_error)
-            if robot.has_fixed_base
-            else slopes.deviations()
-        )
-        is_chosen(Fit(name, point, deviations, errors, held_out, is_fitted=True), MIN_Z)
+        errors = segments.of([best], stats)[:, 0]
+        if _cost(errors) < _cost(chosen[-1].errors):
+            slopes = fitter.slopes(best, x, errors)
+            parts = folds[segments.segment_of_error]
+            left_out = [slopes.without(parts == part) for part in range(FOLDS)]
+            every = segments.of([basis.applied(best, own) for own in left_out])
+            held_out = every[np.arange(len(parts)), parts]
+            deviations = prior | basis.by_quantity(slopes.deviations())
+            choose(Fit(name, best, deviations, errors, held_out, is_fitted=True), MIN_Z)
     return chosen
-
-
-def _with_delays(start: Parameters) -> list[Parameters]:
-    return [replace(start, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
 
 
 def _cost(errors: FloatArray) -> float:
     return float(np.sum(pseudo_huber(errors) ** 2))
 
 
-def _contacts(
-    segments: SegmentErrors, start: Parameters, errors: FloatArray
-) -> dict[Parameters, FloatArray]:
-    """Returns the errors with each candidate of stiffness and damping, given those of the start."""
-    candidates = [
-        replace(start, contact_stiffness=stiffness, contact_damping=damping)
-        for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
-    ]
-    new = [candidate for candidate in candidates if candidate != start]
-    return {start: errors, **dict(zip(new, segments.of(new).T, strict=True))}
-
-
-def _best(
-    segments: SegmentErrors, candidates: Mapping[Parameters, FloatArray], folds: IndexArray
-) -> tuple[Parameters, FloatArray]:
-    """Returns the best candidate, and the errors of each part by the best one without it."""
+def _best_candidate(
+    name: str,
+    segments: SegmentErrors,
+    candidates: Mapping[Parameters, FloatArray],
+    folds: IndexArray,
+    prior: Mapping[str, FloatArray],
+) -> Fit:
+    """Returns the best candidate, with the errors of each part by the best one without it."""
     losses = {own: segments.losses(errors) for own, errors in candidates.items()}
     best = min(candidates, key=lambda own: _cost(candidates[own]))
     parts = folds[segments.segment_of_error]
@@ -212,7 +199,7 @@ def _best(
         kept = folds != part
         without = min(losses, key=lambda own: float(losses[own][kept].sum()))
         held_out[parts == part] = candidates[without][parts == part]
-    return best, held_out
+    return Fit(name, best, prior, candidates[best], held_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,9 +219,8 @@ class _Fitter:
     @property
     def steps(self) -> FloatArray:
         """Steps of the finite differences, ``(coordinates, coordinates)``: a diagonal."""
-        prior = self.basis.prior
-        step = self.method.step
-        return np.diag(np.full(len(prior), CONTACT_STEP) if step is None else step * prior)
+        prior, method = self.basis.prior, self.method
+        return np.diag(method.step * (np.ones_like(prior) if method.is_central else prior))
 
     def solved(
         self, start: Parameters, iterations: int | None = None
@@ -254,7 +240,7 @@ class _Fitter:
             return np.concatenate([pseudo_huber(errors), weight[:, np.newaxis] * rows])
 
         def jacobian(x: FloatArray, at: FloatArray) -> FloatArray:
-            if self.method.step is None:
+            if self.method.is_central:
                 return np.asarray((residual(x + steps) - residual(x - steps)) / (2 * width))
             return np.asarray((residual(x + steps) - at) / width)
 
@@ -294,12 +280,6 @@ class _Fitter:
             step //= 2
         return solved[best][1]
 
-    @property
-    def _delay_parts(self) -> int:
-        """Parts of a control step of which a delay is a multiple."""
-        robot = self.segments.robot
-        return 1 if robot.model.na else robot.substeps
-
     def with_near_delay(self, start: Parameters, x: FloatArray) -> tuple[Parameters, FloatArray]:
         """Returns the fit with the best delay around that of a fit, and its coordinates.
 
@@ -310,10 +290,11 @@ class _Fitter:
             return start, x
         best, least = (start, x), _cost(self.segments.of([start]))
         for direction in (-1, 1):
-            while True:
-                delay = round(best[0].delay * parts) + direction
-                if not 0 <= delay <= MAX_CONTROL_DELAY * parts:
-                    break
+            while (
+                0
+                <= (delay := round(best[0].delay * parts) + direction)
+                <= (MAX_CONTROL_DELAY * parts)
+            ):
                 moved = self.solved(replace(best[0], delay=as_delay(delay, parts)), iterations)
                 cost = _cost(self.segments.of(moved[:1]))
                 if not cost < least:
@@ -321,15 +302,24 @@ class _Fitter:
                 best, least = moved, cost
         return best
 
+    @property
+    def _delay_parts(self) -> int:
+        """Parts of a control step of which a delay is a multiple."""
+        robot = self.segments.robot
+        return 1 if robot.model.na else robot.substeps
+
     def slopes(self, point: Parameters, x: FloatArray, errors: FloatArray) -> "_Slopes":
-        """Returns the residuals around a fit, given its coordinates and its errors."""
-        independent = self.segments.with_estimated_states(point)
-        steps = self.steps
+        """Returns the residuals around a fit, given its coordinates and its errors.
+
+        Segments are made independent: long simulations are chaotic, so that their derivatives would
+        be meaningless.
+        """
+        independent, steps = self.segments.with_estimated_states(point), self.steps
         moved = [self.basis.applied(point, own) for own in np.concatenate([x + steps, x - steps])]
         residuals = pseudo_huber(errors)
         change = pseudo_huber(independent.of(moved)) - residuals[:, np.newaxis]
         ahead, behind = np.split(change / np.tile(np.diag(steps), 2), 2, axis=1)
-        return _Slopes(self.basis, self.method, x, residuals, ahead, -behind)
+        return _Slopes(self, x, residuals, ahead, -behind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,16 +327,14 @@ class _Slopes:
     """The residuals of the data around a fit, without those of the prior.
 
     Attributes:
-        basis: Coordinates of the fit.
-        method: Numbers of the fit.
+        fitter: The method, and the coordinates of the fit.
         x: Fitted coordinates, ``(coordinates,)``.
         residuals: Residuals of the fit, ``(residuals,)``.
         ahead: Forward differences of the residuals, ``(residuals, coordinates)``.
         behind: Backward differences.
     """
 
-    basis: Basis
-    method: Method
+    fitter: _Fitter
     x: FloatArray
     residuals: FloatArray
     ahead: FloatArray
@@ -360,39 +348,36 @@ class _Slopes:
         Args:
             left_out: Mask of the residuals, ``(residuals,)``.
         """
+        bounds = self.fitter.basis.bounds
         step = self._step(~left_out) - self._step(np.ones_like(left_out))
-        return np.asarray(np.clip(self.x + step, -self.basis.bounds, self.basis.bounds))
+        return np.asarray(np.clip(self.x + step, -bounds, bounds))
 
     def _step(self, used: BoolArray) -> FloatArray:
         slopes, residuals = (self.ahead + self.behind)[used] / 2, self.residuals[used]
-        weight = 1 / (max(len(residuals), 1) * self.method.prior_weight**2)
-        prior = self.basis.prior**-2
+        weight = 1 / (max(len(residuals), 1) * self.fitter.method.prior_weight**2)
+        prior = self.fitter.basis.prior**-2
         gradient = slopes.T @ residuals * weight + prior * self.x
         return np.asarray(-np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient))
 
     def deviations(self) -> FloatArray:
-        """Returns the posterior standard deviation of each coordinate where there are contacts."""
-        weight = INDEPENDENT_ERRORS / len(self.residuals)
-        information = consistent_information(self.ahead, self.behind) * weight
-        return np.asarray(
-            np.sqrt(np.diag(np.linalg.inv(np.diag(self.basis.prior**-2) + information)))
-        )
+        """Returns the posterior standard deviation of each coordinate.
 
-    def deviations_of_segments(self, segment: IndexArray) -> FloatArray:
-        """Returns the posterior standard deviation of each coordinate without contacts.
-
-        The variance of the data is that of the segments' gradients (Huber 1967, White 1980), which
-        includes model error and the correlation of neighbouring steps; that of the prior is added.
-
-        Args:
-            segment: Number of the segment of each residual, ``(residuals,)``.
+        Without contacts, the variance of the data is that of the segments' gradients (Huber 1967,
+        White 1980), which includes model error and the correlation of neighbouring steps; that of
+        the prior is added.
         """
-        slopes, prior = (self.ahead + self.behind) / 2, self.basis.prior
+        prior = self.fitter.basis.prior
+        if not self.fitter.segments.robot.has_fixed_base:
+            weight = INDEPENDENT_ERRORS / len(self.residuals)
+            information = consistent_information(self.ahead, self.behind) * weight
+            variance = np.diag(np.linalg.inv(np.diag(prior**-2) + information))
+            return np.asarray(np.sqrt(variance))
+        slopes, segment = (self.ahead + self.behind) / 2, self.fitter.segments.segment_of_error
         used = np.unique(segment)
         scores = slopes * self.residuals[:, np.newaxis]
         gradients = np.array([scores[segment == number].sum(axis=0) for number in used])
         spread = len(used) / max(len(used) - 1, 1) * gradients.T @ gradients
-        weight = len(self.residuals) * self.method.prior_weight**2
+        weight = len(self.residuals) * self.fitter.method.prior_weight**2
         inverse = np.linalg.inv(slopes.T @ slopes + np.diag(weight * prior**-2))
         variance = np.diag(inverse @ (spread + np.diag(weight**2 * prior**-2)) @ inverse)
         return np.asarray(np.minimum(np.sqrt(variance), prior))

@@ -5,7 +5,7 @@ than no motion at all, or off to one side. Then the same model predicts the tria
 the order of the columns corrected, and the best correction names the joint.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -15,8 +15,7 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import Parameters, joint_of_motor
-from selfmodel.simulation.segment_errors import SegmentErrors, is_better
-from selfmodel.simulation.segments import ObservedSegments
+from selfmodel.simulation.segments import ObservedSegments, SegmentErrors, is_better
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import Signal
 
@@ -78,9 +77,9 @@ def suspicion(
     biases = predicted.mean(axis=0)
     worst, leaning = int(np.argmax(ratios)), int(np.argmax(np.abs(biases)))
     if ratios[worst] > MAX_RATIO or abs(biases[leaning]) > MAX_BIAS:
-        corrected = _best_correction(segments, parameters, errors, np.argsort(-ratios)[:WORST])
-        if corrected is not None:
-            return corrected
+        correction = _best_correction(segments, parameters, errors, np.argsort(-ratios)[:WORST])
+        if correction is not None:
+            return correction
     if ratios[worst] > MAX_RATIO and abs(biases[worst]) <= MAX_BIAS:
         times = f"its error is {ratios[worst]:.1f} times that of no motion"
         return Suspicion(hinges[worst], times)
@@ -103,7 +102,7 @@ def _motion(data: Sequence[ObservedSegments]) -> FloatArray:
 
     The motion of an unknown hinge is 0.
     """
-    name: Signal = "joint_positions"
+    name = JOINTS[0]
     motion = [
         (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.valid] for own in data
     ]
@@ -111,47 +110,45 @@ def _motion(data: Sequence[ObservedSegments]) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Correction:
-    """A change of the columns of joints and motors.
+class _Columns:
+    """The column that each column is to be read from, and its sign, ``(columns,)`` each."""
 
-    Attributes:
-        joint: The joint that it is about.
-        cause: The change as text.
-        order: Column that each hinge is read from, ``(hinges,)``.
-        signs: Sign of each hinge, ``(hinges,)``.
-        motor_order: Column that each motor is read from, ``(motors,)``.
-        motor_signs: Sign of each motor, ``(motors,)``.
-    """
-
-    joint: str
-    cause: str
     order: IndexArray
     signs: FloatArray
-    motor_order: IndexArray
-    motor_signs: FloatArray
+
+    @classmethod
+    def of(
+        cls, count: int, *, flipped: IndexArray | int | None = None, swapped: Sequence[int] = ()
+    ) -> "_Columns":
+        order, signs = np.arange(count), np.ones(count)
+        if flipped is not None:
+            signs[flipped] = -1.0
+        order[list(swapped)] = swapped[::-1]
+        return cls(order, signs)
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        return np.asarray(values[..., self.order] * self.signs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Correction:
+    """A change of the columns of joints and motors, and the joint that it is about."""
+
+    suspicion: Suspicion
+    hinges: _Columns
+    motors: _Columns
 
     def of(self, own: ObservedSegments) -> ObservedSegments:
         """Returns segments with the change."""
+
+        def joints(signals: Mapping[Signal, FloatArray]) -> dict[Signal, FloatArray]:
+            return {**signals, **{name: self.hinges(signals[name]) for name in JOINTS}}
+
         segments = own.segments
-
-        def joints(signals: dict[Signal, FloatArray]) -> dict[Signal, FloatArray]:
-            changed = {name: signals[name][..., self.order] * self.signs for name in JOINTS}
-            return {**signals, **changed}
-
-        def motors(commands: FloatArray) -> FloatArray:
-            return np.asarray(commands[..., self.motor_order] * self.motor_signs)
-
-        past = segments.past
-        return replace(
-            own,
-            segments=replace(
-                segments,
-                states=joints(dict(segments.states)),
-                commands=motors(segments.commands),
-                past=past if past is None else replace(past, commands=motors(past.commands)),
-            ),
-            observed=joints(dict(own.observed)),
+        changed = replace(
+            segments, states=joints(segments.states), commands=self.motors(segments.commands)
         )
+        return replace(own, segments=changed, observed=joints(own.observed))
 
 
 def _best_correction(
@@ -164,33 +161,35 @@ def _best_correction(
         changed = replace(segments, data=[each.of(own) for own in segments.data])
         own = changed.losses(changed.of([parameters])[:, 0])
         if own.mean() < least.mean() and is_better(own, losses, MIN_Z):
-            best, least = each, own
-    return None if best is None else Suspicion(best.joint, best.cause)
+            best, least = each.suspicion, own
+    return best
 
 
 def _corrections(robot: Robot, worst: IndexArray) -> Iterator[_Correction]:
     """Yields a change of each sign, and exchanges with a joint of ``worst``."""
-    hinges, motors = robot.anatomy.hinges, np.arange(robot.model.nu)
-    hinge_of_motor = joint_of_motor(robot)
-    order, ahead = np.arange(len(hinges)), np.ones(len(motors))
-    for number, hinge in enumerate(hinges):
-        signs = np.where(order == number, -1.0, 1.0)
-        cause = "with the other sign of its angle"
-        yield _Correction(hinge, f"{cause} it is predicted better", order, signs, motors, ahead)
-        commands = np.where(hinge_of_motor == number, -1.0, 1.0)
-        cause += " and command"
-        yield _Correction(hinge, f"{cause} it is predicted better", order, signs, motors, commands)
-    for one, other in combinations(range(len(hinges)), 2):
-        if one not in worst and other not in worst:
+    hinges, joints, motors = robot.anatomy.hinges, len(robot.anatomy.hinges), robot.model.nu
+    motors_of = [np.flatnonzero(joint_of_motor(robot) == number) for number in range(joints)]
+
+    def correction(
+        hinge: int, change: str, of_hinges: _Columns, of_motors: _Columns
+    ) -> _Correction:
+        cause = Suspicion(hinges[hinge], f"with {change} it is predicted better")
+        return _Correction(cause, of_hinges, of_motors)
+
+    same = _Columns.of(motors)
+    for number in range(joints):
+        flipped, sign = _Columns.of(joints, flipped=number), "the other sign of its angle"
+        yield correction(number, sign, flipped, same)
+        commands = _Columns.of(motors, flipped=motors_of[number])
+        yield correction(number, f"{sign} and command", flipped, commands)
+    for pair in combinations(range(joints), 2):
+        if not set(pair) & set(worst.tolist()):
             continue
-        first, second = (one, other) if one in worst else (other, one)
-        exchanged, straight = order.copy(), np.ones(len(hinges))
-        exchanged[[one, other]] = exchanged[[other, one]]
-        cause = f"with the angles of {hinges[second]} it is predicted better"
-        yield _Correction(hinges[first], cause, exchanged, straight, motors, ahead)
-        owns = [np.flatnonzero(hinge_of_motor == number) for number in (one, other)]
-        if all(len(own) == 1 for own in owns):
-            both = motors.copy()
-            both[np.concatenate(owns)] = both[np.concatenate(owns[::-1])]
-            cause = f"with the angles and commands of {hinges[second]} it is predicted better"
-            yield _Correction(hinges[first], cause, exchanged, straight, both, ahead)
+        first, second = pair if pair[0] in worst else pair[::-1]
+        swapped = _Columns.of(joints, swapped=pair)
+        yield correction(first, f"the angles of {hinges[second]}", swapped, same)
+        driven = [motors_of[number] for number in pair]
+        if all(len(own) == 1 for own in driven):
+            commands = _Columns.of(motors, swapped=np.concatenate(driven).tolist())
+            change = f"the angles and commands of {hinges[second]}"
+            yield correction(first, change, swapped, commands)

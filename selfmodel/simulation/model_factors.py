@@ -1,13 +1,14 @@
 """Model factors: one named vector of what may differ between a robot and its model.
 
 Every quantity is a factor of the value in the robot's own model, except where that value is 0.
-Calibration fits some of them, the robust repair draws them, and a calibrated MJCF contains them.
+Calibration fits nested sets of them (``bases``) with a Gaussian prior on their logarithms, the
+robust repair draws them, and a calibrated MJCF contains them.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,17 +22,15 @@ from selfmodel.robot.scaling import scale_contacts, scale_model
 SHARED = ("root_mass", "limb_mass", "friction", "damping")
 """Quantities with one factor for the whole robot."""
 
-JOINT_QUANTITIES = ("joint_damping", "dry_friction", "armature")
+JOINT_FIELDS = {
+    "joint_damping": ("dof_damping", 1.0),
+    "dry_friction": ("dof_frictionloss", 1.0),
+    "armature": ("dof_armature", 0.1),
+}
 """Quantities of each joint: viscous damping, N m s/rad; dry friction, N m; reflected rotor inertia,
-kg m^2."""
-
-_REFERENCES = {"joint_damping": 1.0, "dry_friction": 1.0, "armature": 0.1}
-"""Unit of a joint's quantity that is 0 in the model, relative to the joint's inertia: the damping
-that stops the joint within about 1 s, the friction that slows it by 1 rad/s^2, a tenth of its
-inertia."""
-
-_FIELDS = {"joint_damping": "dof_damping", "dry_friction": "dof_frictionloss"}
-_FIELDS |= {"armature": "dof_armature"}
+kg m^2. Each has its field of the model, and the unit of a value that is 0 in the model, relative to
+the joint's inertia: the damping that stops the joint within about 1 s, the friction that slows it
+by 1 rad/s^2, a tenth of its inertia."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Parameters:
         contact_stiffness: Factor of the stiffness of all contacts.
         contact_damping: Factor of their damping.
         joint_damping: Factor of the damping of each hinge. A value that is 0 in the model is
-            increased by its reference (``_REFERENCES``) times the factor minus one.
+            increased by its unit (``JOINT_FIELDS``) times the factor minus one.
         dry_friction: Factor of the dry friction of each hinge, in the same way.
         armature: Factor of the armature of each hinge, in the same way.
         body_mass: Further factor of the mass of each body.
@@ -84,9 +83,8 @@ class Parameters:
     @property
     def differs(self) -> bool:
         """Whether the model differs from the nominal one; the control delay does not count."""
-        parts = (*self.joint_damping, *self.dry_friction, *self.armature)
-        every = (*self.factors.tolist(), *parts, *self.body_mass, *self.body_inertia)
-        return self.has_other_contacts or any(factor != 1 for factor in every)
+        every = dataclasses.astuple(dataclasses.replace(self, delay=1))
+        return any(np.any(np.array(factors) != 1) for factors in every)
 
 
 def factor_names(robot: Robot) -> tuple[str, ...]:
@@ -101,13 +99,8 @@ def nominal(robot: Robot) -> Parameters:
 
 
 def from_factors(factors: FloatArray, delay: float) -> Parameters:
-    """Returns parameters from their factors.
-
-    Args:
-        factors: ``(4 + motors,)``, in the order of ``Parameters.factors``.
-        delay: Control delay, in control steps.
-    """
-    root, limbs, friction, damping, *motors = (float(factor) for factor in factors)
+    """Returns parameters from ``Parameters.factors`` and a control delay, in control steps."""
+    root, limbs, friction, damping, *motors = factors.tolist()
     return Parameters(root, limbs, friction, damping, tuple(motors), delay)
 
 
@@ -134,30 +127,26 @@ def model_with_parameters(
         motor_gains=np.array(parameters.motor_gains),
     )
     scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
-    further = False
-    for quantity in JOINT_QUANTITIES:
-        if getattr(parameters, quantity):
-            getattr(scaled, _FIELDS[quantity])[_dofs(robot)] = joint_values(
-                robot, parameters, quantity
-            )
-            further = True
+    further = [quantity for quantity in JOINT_FIELDS if getattr(parameters, quantity)]
+    for quantity in further:
+        values = joint_values(robot, parameters, quantity)
+        getattr(scaled, JOINT_FIELDS[quantity][0])[_dofs(robot)] = values
     if parameters.body_mass:
         scaled.body_mass *= np.array(parameters.body_mass)
         scaled.body_inertia *= np.array(parameters.body_inertia)[:, np.newaxis]
-        further = True
-    if further:
+    if further or parameters.body_mass:
         mujoco.mj_setConst(scaled, mujoco.MjData(scaled))
     return scaled
 
 
 def joint_values(robot: Robot, parameters: Parameters, quantity: str) -> FloatArray:
-    """Returns the values of a quantity of ``JOINT_QUANTITIES``, ``(hinges,)``, in its unit.
+    """Returns the values of a quantity of ``JOINT_FIELDS``, ``(hinges,)``, in its unit.
 
     A factor of 1 gives the robot's own value, to the bit.
     """
-    dofs = _dofs(robot)
-    own = getattr(robot.model, _FIELDS[quantity])[dofs]
-    unit = np.where(own > 0, own, _REFERENCES[quantity] * robot.model.dof_M0[dofs])
+    dofs, (field, unit_at_zero) = _dofs(robot), JOINT_FIELDS[quantity]
+    own = getattr(robot.model, field)[dofs]
+    unit = np.where(own > 0, own, unit_at_zero * robot.model.dof_M0[dofs])
     factors = np.array(getattr(parameters, quantity) or (1.0,) * len(dofs))
     return np.asarray(np.maximum(own + unit * (factors - 1), 0.0))
 
@@ -189,7 +178,8 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     spec.compile()  # assigns the ids of the parts
     compiler = spec.compiler
     # Settings with which the compiler would change the explicit masses.
-    compiler.settotalmass, compiler.inertiafromgeom = -1.0, _EXPLICIT_OR_FROM_GEOMS
+    compiler.settotalmass = -1.0
+    compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     compiler.boundmass = compiler.boundinertia = 0.0
     for body in spec.bodies[1:]:
         body.explicitinertial = True
@@ -197,11 +187,9 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
         body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
         body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
     for geom in spec.geoms:
-        geom.friction = model.geom_friction[geom.id]
-        geom.solref = model.geom_solref[geom.id]
+        geom.friction, geom.solref = model.geom_friction[geom.id], model.geom_solref[geom.id]
     for pair in spec.pairs:
-        pair.friction = model.pair_friction[pair.id]
-        pair.solref = model.pair_solref[pair.id]
+        pair.friction, pair.solref = model.pair_friction[pair.id], model.pair_solref[pair.id]
     for joint in spec.joints:
         dof = model.jnt_dofadr[joint.id]
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
@@ -217,21 +205,16 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     return dataclasses.replace(robot, mjcf=spec.to_xml())
 
 
-_EXPLICIT_OR_FROM_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-
-
 def kinds_of_joints(robot: Robot) -> IndexArray:
     """Returns the number of the kind of each hinge, ``(hinges,)``.
 
     Hinges are of one kind if the masses of their body and of all that it carries are equal to a
     thousandth, and so is the inertia about the hinge: left and right, front and rear.
     """
-    model, joints = robot.model, [robot.model.joint(name).id for name in robot.anatomy.hinges]
-    bodies, dofs = model.jnt_bodyid[joints], _dofs(robot)
-    numbers = zip(
-        model.body_mass[bodies], model.body_subtreemass[bodies], model.dof_M0[dofs], strict=True
-    )
-    keys = [tuple(f"{number:.3g}" for number in row) for row in numbers]
+    model, dofs = robot.model, _dofs(robot)
+    bodies = model.dof_bodyid[dofs]
+    numbers = (model.body_mass[bodies], model.body_subtreemass[bodies], model.dof_M0[dofs])
+    keys = [tuple(f"{number:.3g}" for number in row) for row in zip(*numbers, strict=True)]
     first = list(dict.fromkeys(keys))
     return np.array([first.index(key) for key in keys], dtype=np.intp)
 
@@ -245,22 +228,8 @@ def joint_of_motor(robot: Robot) -> IndexArray:
 
 
 def _dofs(robot: Robot) -> IndexArray:
-    return np.array(
-        [int(robot.model.joint(name).dofadr[0]) for name in robot.anatomy.hinges], dtype=np.intp
-    )
-
-
-class ModelDistribution(Protocol):
-    """Distribution of a model's parameters."""
-
-    @property
-    def is_exact(self) -> bool:
-        """Whether all draws are the self-model."""
-        ...
-
-    def draw(self, rng: np.random.Generator) -> Parameters:
-        """Returns random parameters."""
-        ...
+    addresses = [int(robot.model.joint(name).dofadr[0]) for name in robot.anatomy.hinges]
+    return np.array(addresses, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,19 +257,19 @@ class LogNormal:
     def draw(self, rng: np.random.Generator) -> Parameters:
         """Returns random parameters."""
 
-        def drawn(deviations: FloatArray) -> FloatArray:
-            return np.exp(deviations * rng.standard_normal(len(deviations)))
+        def drawn(deviations: FloatArray) -> tuple[float, ...]:
+            return tuple(np.exp(deviations * rng.standard_normal(len(deviations))).tolist())
 
-        factors = from_factors(drawn(self.factors), 0)
-        masses, inertias = (tuple(drawn(self.bodies).tolist()) for _ in range(2))
+        factors = from_factors(np.array(drawn(self.factors)), 0)
+        masses, inertias = drawn(self.bodies), drawn(self.bodies)
         # Contacts that are known take no random numbers.
-        contacts = drawn(np.full(2, self.contacts)).tolist() if self.contacts else (1.0, 1.0)
+        stiffness, damping = drawn(np.full(2, self.contacts)) if self.contacts else (1.0, 1.0)
         return dataclasses.replace(
             factors,
             body_mass=masses,
             body_inertia=inertias,
-            contact_stiffness=contacts[0],
-            contact_damping=contacts[1],
+            contact_stiffness=stiffness,
+            contact_damping=damping,
         )
 
 
@@ -326,6 +295,119 @@ class Weighted:
         return self.models[int(rng.choice(len(self.models), p=self.weights))]
 
 
+ModelDistribution = LogNormal | Weighted
+"""Distribution of a model's parameters."""
+
+
 def exact(robot: Robot) -> LogNormal:
     """Returns the distribution of a robot whose parameters are those of its self-model."""
     return LogNormal(np.zeros(4 + robot.model.nu), np.zeros(robot.model.nbody))
+
+
+FACTORS = "factors"
+"""Name of the set of factors of a robot with a floating base."""
+
+JOINT_SETS = ("shared", "kinds", "joints")
+"""Names of the nested sets of factors of a robot with a fixed base: one per quantity, one per
+quantity and kind of joint, one per quantity and joint."""
+
+PRIOR_DEVIATIONS = {
+    "root_mass": 0.15,
+    "limb_mass": 0.15,
+    "friction": 0.3,
+    "damping": 0.3,
+    "motor_gains": 0.15,
+}
+"""Standard deviation of the prior on the logarithm of a factor. That of friction and of damping is
+larger: models often contain guesses of them."""
+
+JOINT_PRIOR_DEVIATIONS = {
+    "motor_gains": 0.3,
+    "joint_damping": 0.5,
+    "dry_friction": 1.0,
+    "armature": 1.0,
+}
+"""As ``PRIOR_DEVIATIONS``, of a robot with a fixed base. Data sheets state gains; models often
+contain guesses of friction and armature. The gains include the unknown masses."""
+
+MAX_LOG_FACTOR, MAX_JOINT_LOG_FACTOR = 1.2, 3.0
+"""Bound on the absolute logarithm of a factor, 0.3 to 3.3; and of damping, dry friction and
+armature of a joint, 0.05 to 20."""
+
+
+def prior_deviations(robot: Robot) -> dict[str, FloatArray]:
+    """Returns the standard deviation of the prior of each factor's logarithm, by quantity."""
+    sizes = {"motor_gains": robot.model.nu} | dict.fromkeys(JOINT_FIELDS, len(_dofs(robot)))
+    prior = PRIOR_DEVIATIONS | (JOINT_PRIOR_DEVIATIONS if robot.has_fixed_base else {})
+    return {name: np.full(sizes.get(name, 1), deviation) for name, deviation in prior.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Coordinates of a set of factors: each is shared by a group of motors or hinges.
+
+    Attributes:
+        groups: For each quantity the coordinate of each of its factors.
+        prior: Standard deviation of the prior of each coordinate, ``(coordinates,)``.
+        bounds: Bound on the absolute value of each coordinate, ``(coordinates,)``.
+    """
+
+    groups: dict[str, IndexArray]
+    prior: FloatArray
+    bounds: FloatArray
+
+    def by_quantity(self, coordinates: FloatArray) -> dict[str, FloatArray]:
+        """Returns the value of each factor by quantity, given that of each coordinate."""
+        return {quantity: coordinates[groups] for quantity, groups in self.groups.items()}
+
+    def applied(self, start: Parameters, logarithms: FloatArray) -> Parameters:
+        """Returns parameters with the factors of some logarithms; all else is the start's."""
+        factors: dict[str, Any] = {
+            quantity: tuple(values.tolist()) if quantity not in SHARED else float(values[0])
+            for quantity, values in self.by_quantity(np.exp(logarithms)).items()
+        }
+        return dataclasses.replace(start, **factors)
+
+    def coordinates(self, parameters: Parameters) -> FloatArray:
+        """Returns the mean logarithm of each group, ``(coordinates,)``."""
+        sums, counts = np.zeros((2, len(self.prior)))
+        for quantity, groups in self.groups.items():
+            factors = getattr(parameters, quantity) or (1.0,) * len(groups)
+            np.add.at(sums, groups, np.log(factors))
+            np.add.at(counts, groups, 1.0)
+        return np.asarray(sums / counts)
+
+
+def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
+    """Yields the name and the coordinates of each set of factors of a robot.
+
+    Those of a fixed base grow; one that is no larger than the set before, because all joints are of
+    one kind or each is of its own, is left out.
+    """
+    if not robot.has_fixed_base:
+        order = {quantity: np.arange(1) for quantity in SHARED}
+        order["motor_gains"] = np.arange(robot.model.nu)
+        yield FACTORS, _basis(order, PRIOR_DEVIATIONS)
+        return
+    hinges, joint = np.arange(len(robot.anatomy.hinges)), joint_of_motor(robot)
+    size = 0
+    for name, kind in zip(
+        JOINT_SETS, (np.zeros_like(hinges), kinds_of_joints(robot), hinges), strict=True
+    ):
+        by_joint = dict.fromkeys(JOINT_FIELDS, kind)
+        basis = _basis({"motor_gains": kind[joint]} | by_joint, JOINT_PRIOR_DEVIATIONS)
+        if len(basis.prior) > size:
+            size = len(basis.prior)
+            yield name, basis
+
+
+def _basis(kinds: dict[str, IndexArray], deviations: dict[str, float]) -> Basis:
+    """Returns the coordinates of quantities, of which factors of one kind share one."""
+    groups, prior, bounds = {}, list[float](), list[float]()
+    for quantity, kind in kinds.items():
+        values, group = np.unique(kind, return_inverse=True)
+        groups[quantity] = len(prior) + group
+        prior += [deviations[quantity]] * len(values)
+        bound = MAX_JOINT_LOG_FACTOR if quantity in JOINT_FIELDS else MAX_LOG_FACTOR
+        bounds += [bound] * len(values)
+    return Basis(groups, np.array(prior), np.array(bounds))

@@ -1,29 +1,28 @@
 """Short predictions from logged states under logged commands."""
 
-from collections.abc import Mapping, Sequence
-from time import perf_counter
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.errors import InputError
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, added_steps, split_delay
+from selfmodel.arrays import FloatArray, IndexArray, held
+from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
 from selfmodel.robot.state import state_writer
-from selfmodel.simulation.activations import initial_activations
-from selfmodel.simulation.batch import (
-    LiveBatch,
+from selfmodel.simulation.requests import Segments
+from selfmodel.simulation.rollout import (
+    RobotBatch,
     SimulationResult,
     SimulationStats,
     live_signals,
-    new_batch,
 )
-from selfmodel.simulation.requests import Segments
 from selfmodel.trials.behaviour import Behaviour
+
+CHUNK_BYTES = 2**25
+"""Memory of the fields that are recorded in every physics step before they are read, bytes."""
 
 
 @uncounted_warnings()
@@ -61,216 +60,162 @@ def predict(
     Returns:
         Signals of ``(n, segments, horizon + 1, width)``; a run has diverged if any of its segments
         has.
-
-    Raises:
-        InputError: The segments do not include all commands that are in the delay line.
     """
-    lag, substeps = robot.control_delay if delay is None else delay, robot.substeps
-    delay_steps, part = split_delay(lag, substeps)
-    n, count, horizon = len(embodiments), len(segments.commands), segments.horizon
+    n, count, horizon = len(embodiments), len(segments.starts), segments.horizon
     simulated, source_of = np.unique(
         np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
         return_inverse=True,
     )
     moving = [embodiments[i] for i in simulated]
-    added = _added_steps(moving, segments, lag)
-    stages: list[IndexArray] = np.split(np.arange(count), 1 if segments.independent else count)
-    together = len(stages[0])
-    bodies = _repeated(moving, together)
-    batch = new_batch(robot.model, bodies, threads)
-    current = _CurrentFields(batch)
-    qpos, sensordata = current.bind("qpos"), current.bind("sensordata")
+    lag = robot.control_delay if delay is None else delay
+    batch = _OpenLoop(robot, moving, segments, lag, threads, stats)
+    together = batch.together
+    qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
     reader = SensorReader(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
-    live = live_signals(robot, current.bind, bodies, segments.record)
+    live = live_signals(robot, batch.bind, batch.models, segments.record)
     kept = {
         signal: np.empty((n, count, horizon + 1, robot.anatomy.names.width(signal)))
         for signal in segments.record
     }
-    inputs = _BatchInputs(robot, batch, moving, segments, delay_steps + added)
-    # After all bindings: a field that is bound later remains zero until the next step.
-    alive = LiveBatch(batch)
-    alive.reset(mujoco.mjtStage.mjSTAGE_POS)
-
-    def keep(stage: IndexArray, k: int) -> None:
+    for stage, k in batch.steps():
         if "sensors" in kept:
             reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
             kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
         for signal, read in live.items():
             kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
-
-    chunk = max(1, CHUNK_BYTES // (substeps * current.bytes))
-    for stage in stages:
-        inputs.write_states(stage)
-        clock = perf_counter()
-        alive.forward()
-        stats.physics_seconds += perf_counter() - clock
-        current.read()
-        keep(stage, 0)
-        for first in range(0, horizon, chunk):
-            steps = range(first, min(first + chunk, horizon))
-            commands = inputs.commands(stage, steps, part, substeps)
-            clock = perf_counter()
-            recorded = alive.rollout(commands, current.names)
-            stats.physics_seconds += perf_counter() - clock
-            for number, k in enumerate(steps, 1):
-                current.set({name: own[:, number * substeps - 1] for name, own in recorded.items()})
-                keep(stage, k + 1)
-    diverged: BoolArray = np.any(alive.diverged()[batch_rows].reshape(n, together), axis=1)
+    diverged = np.any(batch.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n
     stats.steps += len(moving) * count * horizon
     stats.diverged += int(diverged.sum())
-    time = np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep
-    addresses = [int(robot.model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]
-    welded = [np.isin(addresses, [address for address, _, _ in own.welded]) for own in embodiments]
-    detached = [[name in own.detached for name in robot.anatomy.hinges] for own in embodiments]
+    hinges = robot.anatomy.hinges
+    addresses = [int(robot.model.joint(name).qposadr[0]) for name in hinges]
     predicted = Behaviour(
-        robot.anatomy.names, time, kept, welded=np.array(welded), detached=np.array(detached)
+        robot.anatomy.names,
+        np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep,
+        kept,
+        welded=np.array(
+            [np.isin(addresses, [address for address, _, _ in own.welded]) for own in embodiments]
+        ),
+        detached=np.array([[name in own.detached for name in hinges] for own in embodiments]),
     )
     return SimulationResult(predicted, diverged)
 
 
-def _added_steps(moving: Sequence[Embodiment], segments: Segments, lag: float) -> IndexArray:
-    """Returns the control delay that the faults of each embodiment add, control steps.
-
-    Raises:
-        InputError: The segments do not include all commands that are in the delay line.
-    """
-    added = [added_steps(lag, float(embodiment.added_delay[0])) for embodiment in moving]
-    longest = lag + max(added)
-    if segments.lead < longest:
-        raise InputError(
-            f"the robot's commands take effect {longest} steps late, and segments have a lead "
-            f"of {segments.lead}: a comparator needs a lead of {MAX_CONTROL_DELAY}"
-        )
-    return np.array(added, dtype=np.intp)
-
-
-CHUNK_BYTES = 2**25
-"""Memory of the fields that are recorded in every physics step before they are read, bytes."""
-
-
-class _CurrentFields:
-    """Values of some fields of a batch at one step, ``(simulations, width)`` each.
-
-    Args:
-        batch: The batch.
-    """
-
-    def __init__(self, batch: mujoco.batch.Batch) -> None:
-        self._batch = batch
-        self._live: dict[str, FloatArray] = {}
-        self._values: dict[str, FloatArray] = {}
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the fields."""
-        return list(self._values)
-
-    @property
-    def bytes(self) -> int:
-        """Size of the values."""
-        return sum(values.nbytes for values in self._values.values())
-
-    def bind(self, name: str) -> FloatArray:
-        """Returns the array of the values of a field."""
-        self._live[name] = self._batch.bind(name)
-        return self._values.setdefault(name, np.zeros_like(self._live[name]))
-
-    def read(self) -> None:
-        """Sets all values to those of the batch."""
-        self.set(self._live)
-
-    def set(self, values: Mapping[str, FloatArray]) -> None:
-        """Sets all values, by name."""
-        for name, own in values.items():
-            self._values[name][:] = own
-
-
-def _repeated(embodiments: Sequence[Embodiment], times: int) -> list[Embodiment]:
-    return [embodiment for embodiment in embodiments for _ in range(times)]
-
-
-class _BatchInputs:
-    """Writes logged states and commands into a batch, for every embodiment by its delay.
+class _OpenLoop(RobotBatch):
+    """A batch that follows the commands of segments, for every embodiment by its control delay.
 
     Args:
         robot: The healthy robot.
-        batch: The batch; its state is written.
-        embodiments: Embodiments of the batch, each in adjacent rows.
+        moving: The embodiments, each in adjacent rows, one per segment that is simulated together.
         segments: Initial states and commands.
-        delays: Control delay of each embodiment, whole control steps, ``(embodiments,)``.
+        lag: Control delay without faults, control steps.
+        threads: Threads of the physics.
+        stats: Statistics of the time of the physics.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0917  # as ``predict``
         self,
         robot: Robot,
-        batch: mujoco.batch.Batch,
-        embodiments: Sequence[Embodiment],
+        moving: Sequence[Embodiment],
         segments: Segments,
-        delays: IndexArray,
+        lag: float,
+        threads: int,
+        stats: SimulationStats,
     ) -> None:
-        self._segments = segments
-        self._first = segments.lead - delays
+        self._segments, self._stats = segments, stats
+        self._stages: list[IndexArray] = np.split(
+            np.arange(len(segments.starts)), 1 if segments.independent else len(segments.starts)
+        )
+        self.together = len(self._stages[0])
+        self.models = [own for own in moving for _ in range(self.together)]
+        super().__init__(robot.model, self.models, threads)
+        # Before the first step, after which a field that is bound remains zero.
+        self._live = {name: self.bind(name) for name in ("qpos", "qvel", "act")}
+        self._bind_live, self.bind = self.bind, self._bind_copy
+        self._fields: dict[str, FloatArray] = {}
+        self._substeps = robot.substeps
+        whole, self._part = split_delay(lag, robot.substeps)
+        added = [added_steps(lag, float(own.added_delay[0])) for own in moving]
+        self._delays = whole + np.array(added, dtype=np.intp)
+        # The last row, at -1, is that of every step before the trial.
+        self._commands = np.concatenate(
+            [segments.commands, np.zeros((1, segments.commands.shape[1]))]
+        )
+        self._write = state_writer(robot, self._bind_live, *(own.model for own in self.models))
         by_delay = {
-            delay: initial_activations(robot, segments, delay) for delay in set(delays.tolist())
+            delay: activations(robot, segments.commands, delay)[segments.starts]
+            for delay in set(self._delays.tolist())
         }
-        self._activations = np.array([by_delay[delay] for delay in delays.tolist()])
-        self._n = len(embodiments)
-        models = [own.model for own in embodiments for _ in range(batch.nsim // len(embodiments))]
-        self._write = state_writer(robot, batch.bind, *models)
-        self._act = batch.bind("act")
-        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._offsets = np.array([own.encoder_offset for own in embodiments])
-        median = _median_angles(robot, segments)
+        self._activations = np.array([by_delay[delay] for delay in self._delays.tolist()])
+        self._offsets = np.array([own.encoder_offset for own in self.models])
+        resting = _resting_hinges(robot, segments)
         self._constant_angles = [
             (number, *constant)
-            for number, own in enumerate(embodiments)
-            for constant in (*own.welded, *(median[name] for name in own.detached & median.keys()))
-        ]
-
-    def write_states(self, stage: IndexArray) -> None:
-        """Writes the initial states of some segments, given by their indices."""
-        states = self._segments.states
-        logged = {signal: self._for_all(values[stage]) for signal, values in states.items()}
-        if "joint_positions" in logged and self._offsets.any():
-            logged["joint_positions"] -= np.repeat(self._offsets, len(stage), axis=0)
-        self._write(logged)
-        self._act[:] = self._activations[:, stage].reshape(self._act.shape)
-        for number, position, velocity, angle in self._constant_angles:
-            rows = slice(number * len(stage), (number + 1) * len(stage))
-            self._qpos[rows, position] = angle
-            self._qvel[rows, velocity] = 0.0
-
-    def commands(self, stage: IndexArray, steps: range, part: int, substeps: int) -> FloatArray:
-        """Returns the commands of each physics step, ``(simulations, physics steps, motors)``.
-
-        Args:
-            stage: Indices of the segments.
-            steps: Control steps of the segments.
-            part: Physics steps of a control step at which the command before it still holds.
-            substeps: Physics steps of a control step.
-        """
-        arriving = [
-            self._segments.commands[stage, (self._first + k)[:, np.newaxis]].reshape(
-                len(self._qpos), -1
+            for number, own in enumerate(moving)
+            for constant in (
+                *own.welded,
+                *(resting[name] for name in own.detached & resting.keys()),
             )
-            for k in range(steps.start - 1, steps.stop)
         ]
-        rows = np.stack(arriving, axis=1)[:, :, np.newaxis]
-        before = np.repeat(rows[:, :-1], part, axis=2)
-        after = np.repeat(rows[:, 1:], substeps - part, axis=2)
-        return np.concatenate([before, after], axis=2).reshape(len(rows), -1, rows.shape[-1])
 
-    def _for_all(self, values: FloatArray) -> FloatArray:
-        return np.tile(values, (self._n, 1))
+    def _bind_copy(self, name: str) -> FloatArray:
+        """Returns the array of a field at the step that ``steps`` yields."""
+        self._live[name] = self._bind_live(name)
+        return self._fields.setdefault(name, np.zeros_like(self._live[name]))
+
+    def steps(self) -> Iterator[tuple[IndexArray, int]]:
+        """Yields the segments and the step within them at which the bound fields are."""
+        self.reset(mujoco.mjtStage.mjSTAGE_POS)
+        row_bytes = sum(values.nbytes for values in self._fields.values())
+        chunk = max(1, CHUNK_BYTES // (self._substeps * row_bytes))
+        for stage in self._stages:
+            self._write_states(stage)
+            with self._stats.physics():
+                self.forward()
+            for name, values in self._fields.items():
+                values[:] = self._live[name]
+            yield stage, 0
+            for first in range(0, self._segments.horizon, chunk):
+                steps = np.arange(first, min(first + chunk, self._segments.horizon))
+                commands, running = self._arriving(stage, steps), self.running
+                with self._stats.physics():
+                    recorded = self.rollout(commands, list(self._fields))
+                for number, k in enumerate(steps.tolist(), 1):
+                    for name, values in recorded.items():
+                        self._fields[name][running] = values[:, number * self._substeps - 1]
+                    yield stage, k + 1
+
+    def _write_states(self, stage: IndexArray) -> None:
+        copies = len(self._delays)
+        states = {
+            signal: np.tile(values[stage], (copies, 1))
+            for signal, values in self._segments.states.items()
+        }
+        if "joint_positions" in states and self._offsets.any():
+            states["joint_positions"] -= self._offsets
+        self._write(states)
+        qpos, qvel, act = (self._live[name] for name in ("qpos", "qvel", "act"))
+        act[:] = self._activations[:, stage].reshape(act.shape)
+        for number, position, velocity, angle in self._constant_angles:
+            rows = slice(number * self.together, (number + 1) * self.together)
+            qpos[rows, position] = angle
+            qvel[rows, velocity] = 0.0
+
+    def _arriving(self, stage: IndexArray, steps: IndexArray) -> FloatArray:
+        """Returns the commands at each physics step, ``(simulations, physics steps, motors)``."""
+        # Of a delay of a part of a step, the command before holds in the first physics steps.
+        before = np.arange(self._substeps) < self._part
+        sent = (steps[:, np.newaxis] - before).ravel() - self._delays[:, np.newaxis, np.newaxis]
+        rows = np.maximum(self._segments.starts[stage][:, np.newaxis] + sent, -1)
+        return self._commands[rows].reshape(len(self.models), len(steps) * self._substeps, -1)
 
 
-def _median_angles(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
-    """Returns the ``qpos`` and ``qvel`` index and the median angle of each hinge, by name.
+def _resting_hinges(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
+    """Returns the ``qpos`` and ``qvel`` index and the resting angle of each hinge, by name.
 
     A hinge without a known angle has that of the initial pose. The result is empty for segments
     without joint positions.
@@ -287,3 +232,58 @@ def _median_angles(robot: Robot, segments: Segments) -> dict[str, tuple[int, int
         )
         for hinge, angle in zip(hinges, angles.tolist(), strict=True)
     }
+
+
+_SAME_OPTIONS = ("timestep", "integrator", "disableflags", "disableactuator")
+_SAME_MOTORS = ("dynprm", "ctrllimited", "ctrlrange", "actlimited", "actrange", "group")
+
+
+def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArray:
+    """Returns the activations of the motors (MuJoCo's ``act``) before each command of a trial.
+
+    Activations are not logged. That of a motor with the ``dyntype`` filter follows its command with
+    a time constant, and that of an integrator is the sum of its commands. Both are zero at the
+    start of a trial, so they follow from the commands since. MuJoCo computes them, on a model that
+    has only motors, so that they are those of the robot's own model to the bit: where a solver
+    switches its active constraints, a rounding error has visible effects.
+
+    Args:
+        robot: The healthy robot: no fault changes the activation dynamics.
+        commands: Commands since the start of the trial, ``(steps, motors)``; an unknown one (NaN)
+            is taken as the one before it.
+        delay: Control delay, control steps.
+
+    Returns:
+        ``(steps, na)``.
+    """
+    states = np.zeros((len(commands), robot.model.na))
+    if not robot.model.na:
+        return states
+    model = _motors_only(robot.model)
+    data = mujoco.MjData(model)
+    arriving = held(np.concatenate([np.zeros((delay + 1, model.nu)), commands]))[1:]
+    for after, command in zip(states[1:], arriving[: len(commands) - 1], strict=True):
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, robot.substeps)
+        after[:] = data.act
+    return states
+
+
+def _motors_only(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Returns a model with as many motors, of the same dynamics, that move nothing."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0])
+    body.add_joint(name="joint")
+    for kind in model.actuator_dyntype:
+        spec.add_actuator(
+            dyntype=mujoco.mjtDyn(int(kind)),
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target="joint",
+            gainprm=np.zeros(10),
+        )
+    motors = spec.compile()
+    for name in _SAME_OPTIONS:
+        setattr(motors.opt, name, getattr(model.opt, name))
+    for name in _SAME_MOTORS:
+        getattr(motors, f"actuator_{name}")[:] = getattr(model, f"actuator_{name}")
+    return motors

@@ -1,11 +1,11 @@
-"""Simulation requests: closed-loop rollouts, segments and ensembles."""
+"""Requests for simulations: closed-loop rollouts, segments and ensembles."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.arrays import FloatArray, IndexArray, median_of_known
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -14,7 +14,7 @@ END = 1 / 3
 """Last part of a trial that shows the encoders of a failed joint: it may fail during the trial."""
 
 LEAD = MAX_CONTROL_DELAY
-"""Commands before a segment that ``cut_segments`` includes: enough for every control delay."""
+"""Steps before a segment whose commands may take effect within it, by any control delay."""
 
 
 @dataclass(frozen=True)
@@ -29,46 +29,26 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
-    """Commands before segments, for motors with activation dynamics.
-
-    Attributes:
-        commands: Commands of the whole trial, ``(steps, motors)``; NaN where unknown.
-        starts: Step of the trial at which each segment begins, ``(segments,)``.
-    """
-
-    commands: FloatArray
-    starts: IndexArray
-
-
-@dataclass(frozen=True, eq=False)
 class Segments:
-    """A request for short predictions, each from a logged state under logged commands.
+    """A request for short predictions, each from a logged state under the logged commands.
 
     Attributes:
         states: State at the beginning of each segment, ``(segments, width)`` for each signal of
             the joints' and the base's positions and velocities. NaN for the hinges whose state is
             unknown.
-        commands: Logged commands, ``(segments, lead + horizon, motors)``: the first ``lead`` rows
-            precede the segment, for models with a control delay.
-        lead: Rows of ``commands`` before the segment: at least the robot's control delay, which is
-            at most ``control_delay.MAX_CONTROL_DELAY``.
+        commands: Logged commands of the whole trial, ``(steps, motors)``: control delays and the
+            activation of motors depend on those before a segment. Before the trial they are 0.
+        starts: Step of the trial at which each segment begins, ``(segments,)``.
+        horizon: Control steps of a segment.
         record: The signals to record, ``(n, segments, horizon + 1, width)`` each; row 0 is the
             beginning. Any signal but ``commands``, which are inputs.
-        past: Commands since the beginning of the trial, for motors with a state of their own, such
-            as a filter; None if only ``commands`` are known.
     """
 
     states: Mapping[Signal, FloatArray]
     commands: FloatArray
-    lead: int
+    starts: IndexArray
+    horizon: int
     record: tuple[Signal, ...]
-    past: Past | None = None
-
-    @property
-    def horizon(self) -> int:
-        """Control steps of a segment."""
-        return int(self.commands.shape[1]) - self.lead
 
     @property
     def resting_angles(self) -> FloatArray | None:
@@ -81,9 +61,7 @@ class Segments:
         angles = self.states.get("joint_positions")
         if angles is None:
             return None
-        last = angles[round((1 - END) * len(angles)) :]
-        known = (column[~np.isnan(column)] for column in last.T)
-        return np.array([np.median(own) if len(own) else np.nan for own in known])
+        return median_of_known(angles[round((1 - END) * len(angles)) :])
 
     @property
     def independent(self) -> bool:
@@ -118,17 +96,14 @@ Request = ClosedLoop | Segments | Ensemble
 
 
 def recordable(request: Request) -> tuple[Signal, ...]:
-    """Returns the signals that a request can record.
-
-    The commands of a segment are inputs, so they cannot be recorded.
-    """
+    """Returns the signals that a request can record: those of a segment exclude its commands."""
     if isinstance(request, Segments):
         return tuple(signal for signal in SIGNALS if signal != "commands")
     return SIGNALS
 
 
 def command_steps(starts: IndexArray, horizon: int) -> IndexArray:
-    """Returns the steps whose commands a segment includes.
+    """Returns the steps whose commands may take effect in each segment.
 
     Args:
         starts: Step at which each segment begins, ``(segments,)``.
@@ -147,7 +122,7 @@ def cut_segments(
     horizon: int,
     record: tuple[Signal, ...],
 ) -> Segments:
-    """Returns segments of a trial, with ``LEAD`` commands before each.
+    """Returns segments of a trial.
 
     Args:
         behaviour: The logged behaviour of the trial.
@@ -156,12 +131,5 @@ def cut_segments(
         horizon: Control steps of a segment.
         record: The signals to record.
     """
-    commands, steps = behaviour["commands"], command_steps(starts, horizon)
-    return Segments(
-        states={signal: values[starts] for signal, values in states.items()},
-        # Before the trial the motors hold 0.
-        commands=np.where(steps[..., np.newaxis] < 0, 0.0, commands[np.maximum(steps, 0)]),
-        lead=LEAD,
-        record=record,
-        past=Past(commands, starts),
-    )
+    at_starts = {signal: values[starts] for signal, values in states.items()}
+    return Segments(at_starts, behaviour["commands"], starts, horizon, record)

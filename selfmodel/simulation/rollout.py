@@ -1,23 +1,176 @@
-"""Closed-loop rollouts of a robot, one control step at a time.
+"""Batches of MuJoCo simulations, closed-loop rollouts on them, and their memory.
 
 The simulator and the simulated physical robot step the same rollout, so that the robot equals the
 simulator's to the bit.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from time import perf_counter
 
 import mujoco
 import numpy as np
+from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
+from selfmodel.isolation import available_memory
+from selfmodel.robot.base import Bind, Reader
 from selfmodel.robot.control_delay import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.sensing import SensorReader
-from selfmodel.simulation.batch import LiveBatch, SimulationStats, live_signals, new_batch
+from selfmodel.robot.state import observed_fields
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
+
+
+@dataclass
+class SimulationStats:
+    """Cumulative statistics of a simulator.
+
+    Attributes:
+        runs: Number of simulations.
+        steps: Number of control steps, over all simulations.
+        diverged: Number of simulations that diverged or had a MuJoCo warning.
+        physics_seconds: Wall time of MuJoCo's steps, s.
+    """
+
+    runs: int = 0
+    steps: int = 0
+    diverged: int = 0
+    physics_seconds: float = 0.0
+
+    @contextmanager
+    def physics(self) -> Iterator[None]:
+        """Adds the time of a block to ``physics_seconds``."""
+        clock = perf_counter()
+        yield
+        self.physics_seconds += perf_counter() - clock
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationResult:
+    """Result of a batch of runs.
+
+    Attributes:
+        behaviour: The recorded signals, with a leading axis of ``n``.
+        diverged: Mask of the runs that diverged, ``(n,)``; their signals are invalid.
+    """
+
+    behaviour: Behaviour
+    diverged: BoolArray
+
+    def grouped(self, *shape: int) -> "SimulationResult":
+        """Returns the result with its axis of runs, ``(n,)``, reshaped in row-major order."""
+        flat = self.behaviour
+        signals = {
+            signal: values.reshape(*shape, *values.shape[1:])
+            for signal, values in flat.signals.items()
+        }
+        return SimulationResult(
+            Behaviour(flat.names, flat.time, signals), np.asarray(self.diverged.reshape(shape))
+        )
+
+
+class RobotBatch:
+    """A batch with one simulation per embodiment, which continues when some of them diverge.
+
+    A simulation with a MuJoCo error is stepped no longer. MuJoCo resets a simulation with a
+    warning, which continues to be stepped: its values are invalid, but the simulations of a batch
+    are independent. Both are recorded as diverged, so the users of a batch do not count MuJoCo's
+    warnings.
+
+    Args:
+        model: Model of the layout of all embodiments.
+        embodiments: The robot of each simulation.
+        threads: Threads of the physics.
+
+    Attributes:
+        bind: Returns the array of a field of MjData, ``(simulations, width)``, which changes with
+            every step. A field that is bound after a step remains zero until the next one.
+
+    Raises:
+        InputError: MuJoCo cannot simulate the models, such as for lack of memory.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int
+    ) -> None:
+        with mujoco_errors_as_input_errors("simulate the model"):
+            self._batch = Batch(model, len(embodiments), nthread=threads)
+            self._batch.set_models([embodiment.model for embodiment in embodiments])
+        self.bind: Bind = self._batch.bind
+        self._ids: IndexArray | None = None
+        self._failed = np.zeros(len(embodiments), dtype=bool)
+
+    @property
+    def running(self) -> IndexArray:
+        """Indices of the simulations that are stepped."""
+        return np.flatnonzero(~self._failed)
+
+    def reset(self, stage: mujoco.mjtStage) -> None:
+        """Resets all simulations to the reference pose, and computes up to a stage of a step."""
+        with self._failures():
+            self._batch.reset(stage=stage)
+
+    def forward(self) -> None:
+        """Computes all quantities that depend on the state (``mj_forward``)."""
+        with self._failures():
+            self._batch.forward(self._ids)
+
+    def step(self, substeps: int) -> None:
+        """Advances by a number of physics steps."""
+        with self._failures():
+            self._batch.step(self._ids, nstep=substeps)
+
+    def rollout(self, commands: FloatArray, fields: Sequence[str]) -> dict[str, FloatArray]:
+        """Advances the running simulations by physics steps under known commands.
+
+        Args:
+            commands: ``(simulations, physics steps, motors)``.
+            fields: Names of the bound fields of MjData to record.
+
+        Returns:
+            Values of each field after each physics step, ``(running, physics steps, width)``.
+        """
+        ids, steps = self.running, commands.shape[1]
+        out = {name: np.zeros((len(ids), steps, self.bind(name).shape[1])) for name in fields}
+        with self._failures():
+            self._batch.rollout(steps, commands[ids], record=fields, ids=ids, out=out)
+        return out
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        try:
+            yield
+        except SimulationError as error:
+            self._failed[error.ids] = True
+            self._ids = self.running
+
+    def diverged(self) -> BoolArray:
+        """Returns a mask of the simulations that diverged or had a warning, ``(n,)``."""
+        warned: BoolArray = self._batch.warning[:, :, 1].any(axis=1)
+        return np.asarray(self._failed | warned)
+
+
+def live_signals(
+    robot: Robot, bind: Bind, embodiments: Sequence[Embodiment], record: Sequence[Signal]
+) -> dict[Signal, Reader]:
+    """Returns functions that read the current values of recorded signals from fields of a batch.
+
+    The readings and the commands of the controllers are not part of MuJoCo's state, and are
+    omitted.
+    """
+    state = observed_fields(robot, embodiments)
+    return {
+        signal: state[signal].reader(bind)
+        for signal in record
+        if signal not in ("sensors", "commands")
+    }
 
 
 class Rollout:
@@ -59,7 +212,7 @@ class Rollout:
         self._stats = SimulationStats() if stats is None else stats
         self._substeps, self._disturb = robot.substeps, disturb
         model = embodiments[0].model
-        batch = new_batch(model, embodiments, threads)
+        self._batch = batch = RobotBatch(model, embodiments, threads)
         self._reader = SensorReader(model, robot.anatomy, embodiments)
         self._controllers = make_batch(
             drivers,
@@ -80,30 +233,27 @@ class Rollout:
             # Those of the controllers, before the control delay.
             "commands": lambda: self._motors.inlet,
         }
-        # After all bindings: a field that is bound later remains zero until the next step.
-        self._batch = LiveBatch(batch)
         if start is None:
-            self._batch.reset(mujoco.mjtStage.mjSTAGE_ACC)
+            batch.reset(mujoco.mjtStage.mjSTAGE_ACC)
         else:
-            self._batch.reset(mujoco.mjtStage.mjSTAGE_NONE)
+            batch.reset(mujoco.mjtStage.mjSTAGE_NONE)
             self._qpos[:] = start
-            self._batch.forward()
+            batch.forward()
 
     def steps(self, count: int) -> Iterator[int]:
         """Yields the number of each control step, whose signals can be read until the next one."""
         for k in range(count):
             if k:
-                clock = perf_counter()
-                if self._part:
-                    self._batch.step(self._part)
-                    self._motors.release()
-                self._batch.step(self._substeps - self._part)
-                self._stats.physics_seconds += perf_counter() - clock
+                with self._stats.physics():
+                    if self._part:
+                        self._batch.step(self._part)
+                        self._motors.release()
+                    self._batch.step(self._substeps - self._part)
             self._reader.read(self._sensordata, self._qpos, self._controllers.readings)
             self._disturb(self._controllers.readings)
             self._controllers.step(self._motors.inlet)
             self._motors.advance()
-            self._stats.steps += self._batch.running
+            self._stats.steps += len(self._batch.running)
             yield k
 
     def diverged(self) -> BoolArray:
@@ -142,3 +292,55 @@ class _DelayLine:
 
     def _send(self, delays: IndexArray) -> None:
         self._outlet[:] = self._line[(self._step - delays) % len(self._line), self._rows]
+
+
+MAX_BATCH = 512 * 2**20
+"""Largest memory of a batch, bytes; a larger one is not faster."""
+
+_FREE_SHARE = 0.25
+"""Share of the available memory that a batch may take: other processes may run studies beside."""
+
+_NUMBER_BYTES = 8
+_BODY_NUMBERS = 16
+"""Numbers of the pose and the velocity of a body that a batch reads."""
+
+_COPIES = 3
+"""Arrays of a recorded signal at one time: during the run, its result, and a comparison."""
+
+
+def batch_bytes() -> int:
+    """Returns the memory that the models, simulations and signals of a batch may take, bytes."""
+    return min(MAX_BATCH, int(_FREE_SHARE * available_memory()))
+
+
+def largest_batch(robot: Robot, request: Request, steps: int) -> int:
+    """Returns the largest number of hypotheses to simulate together; at least one.
+
+    Args:
+        robot: The robot.
+        request: Simulation of each hypothesis.
+        steps: Control steps of the trial.
+    """
+    return max(1, batch_bytes() // hypothesis_bytes(robot, request, steps))
+
+
+def hypothesis_bytes(robot: Robot, request: Request, steps: int) -> int:
+    """Returns the memory of the simulations of one hypothesis, bytes.
+
+    Each embodiment has its own model, with all height fields, meshes and textures.
+    """
+    match request:
+        case ClosedLoop():
+            models, simulations, rows = 1, 1, steps
+        case Segments():  # a fault may adapt the model to a trial's ground contacts
+            count = len(request.starts)
+            models, simulations, rows = 2, count, count * (request.horizon + 1)
+        case Ensemble():
+            models, simulations, rows = request.members, request.members, request.members * steps
+    model = robot.model
+    state = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
+    numbers = state + model.nsensordata + _BODY_NUMBERS * model.nbody
+    widths = sum(robot.anatomy.names.width(signal) for signal in request.record)
+    return models * int(model.nbuffer) + _NUMBER_BYTES * (
+        simulations * int(numbers) + _COPIES * rows * widths
+    )

@@ -1,4 +1,4 @@
-"""Segments of a trial of the healthy robot, with the observed states they are compared with.
+"""Segments of healthy trials, and the errors of predicting them with models of the robot.
 
 A robot that walks is predicted over a tenth of a second: contacts make longer simulations chaotic.
 The joints of a fixed base are simulated for about a second without losing the trial: position
@@ -6,18 +6,26 @@ servos hold them to the commands, and in a second the commands move the joints t
 shows gains, friction and inertia.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
+from selfmodel.faults.build import apply_faults
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import with_known_base
+from selfmodel.simulation.model_factors import Parameters, model_with_parameters
+from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
+from selfmodel.simulation.rollout import SimulationStats, largest_batch
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import (
+    BASE,
     JOINTS,
     ONBOARD,
     STATE,
@@ -26,7 +34,7 @@ from selfmodel.trials.estimation import (
     lacks_joint_velocities,
     with_joint_velocities,
 )
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trial import Trial, check_magnitudes
 
 MAX_SEGMENTS = 40
@@ -51,6 +59,12 @@ MIN_SEGMENTS = 12
 MIN_HORIZON = 5
 """Smallest length of a segment of a fixed base, control steps."""
 
+MAX_ERROR = 1e6
+"""Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
+simulation that is no longer finite. The solver does not end on numbers that are not finite."""
+
+_POSITIONS: Signal = "joint_positions"
+
 
 @dataclass(frozen=True, eq=False)
 class ObservedSegments:
@@ -63,22 +77,24 @@ class ObservedSegments:
         valid: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
             after the step is known, and so are the commands that led there. Single hinges may be
             unknown; see ``compared``.
-        steps: Number of different steps of the trial in all segments, which may overlap.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     valid: BoolArray
-    steps: int
 
-    def compared(self, signal: Signal) -> BoolArray:
-        """Returns a mask of the errors of one signal, ``(segments, horizon, columns)``.
+    @cached_property
+    def compared(self) -> dict[Signal, BoolArray]:
+        """Masks of the errors of each compared signal, ``(segments, horizon, columns)``.
 
         Errors of an orientation have three columns: all of them are known, or none.
         """
-        values = self.observed[signal]
-        known = np.isfinite(values) if signal in JOINTS else np.ones((*values.shape[:2], 3), bool)
-        return np.asarray(known & self.valid[..., np.newaxis])
+        masks: dict[Signal, BoolArray] = {}
+        for signal in (own for own in CALIBRATION_ERROR_SCALES if own in self.observed):
+            values = self.observed[signal]
+            known = np.isfinite(values) if signal in JOINTS else np.ones((*values.shape[:2], 3))
+            masks[signal] = (known != 0) & self.valid[..., np.newaxis]
+        return masks
 
 
 def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
@@ -149,8 +165,7 @@ def _sequential(behaviour: Behaviour) -> ObservedSegments | None:
     """
     begins = np.arange(0, behaviour.steps - HORIZON, HORIZON)
     states = estimated_states(behaviour, ONBOARD)
-    commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
-    starts = begins[_known(states)[begins] & _all_known(commanded, begins)]
+    starts = begins[_known(states)[begins] & _all_known(_commanded(behaviour), begins)]
     segments = _cut(behaviour, states, starts, HORIZON, ONBOARD)
     return segments if segments.valid.sum() >= HORIZON else None
 
@@ -168,9 +183,8 @@ def _consecutive(trial: Trial, measured: Behaviour) -> ObservedSegments:
         raise _unusable(trial, f"the trial has {steps} steps", fixed=True)
     states = estimated_states(behaviour, STATE)
     starts = np.arange(LEAD, steps - horizon, horizon)
-    commanded = np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
-    usable = _known(states)[starts] & commanded[command_steps(starts, horizon)].all(axis=1)
-    starts = starts[usable]
+    commanded = _commanded(behaviour)[command_steps(starts, horizon)].all(axis=1)
+    starts = starts[_known(states)[starts] & commanded]
     starts = starts[_cut(behaviour, states, starts, horizon, compared).valid.any(axis=1)]
     if len(starts) < MIN_SEGMENTS // 2:
         raise _unusable(trial, f"the log has {len(starts)} such segments", fixed=True)
@@ -192,7 +206,6 @@ def _cut(
         segments=cut_segments(behaviour, states, starts, horizon, record=compared),
         observed={signal: values[after] for signal, values in observed.items()},
         valid=steady[:, LEAD:] & _known(observed)[after],
-        steps=len(np.unique(after)),
     )
 
 
@@ -204,6 +217,11 @@ def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
     complete = np.isfinite(np.hstack(list(states.values()))).all(axis=1)
     some = known_steps(states)
     return np.asarray(complete if complete.sum() >= MIN_COMPLETE_SHARE * some.sum() else some)
+
+
+def _commanded(behaviour: Behaviour) -> BoolArray:
+    """Returns a mask of the steps with known commands, ``(steps,)``."""
+    return np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
 
 
 def _steady(behaviour: Behaviour) -> BoolArray:
@@ -241,3 +259,172 @@ def _unusable(trial: Trial, reason: str, *, fixed: bool = False) -> InputError:
         f"steps, with {', '.join(ONBOARD)} and the commands"
     )
     return InputError(f"{trial.path}: {needs}, and {reason}: leave this log out")
+
+
+def is_better(one: FloatArray, other: FloatArray, min_z: float) -> bool:
+    """Returns whether the losses of segments are significantly lower, paired over the segments.
+
+    Args:
+        one: Losses of the segments, ``(segments,)``.
+        other: Losses of the same segments, to be undercut.
+        min_z: Smallest mean difference, in standard errors.
+    """
+    gains = other - one
+    error = float(gains.std(ddof=1)) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return bool(gains.mean() > min_z * error and gains.mean() > 0)
+
+
+def root_mean_square(errors: FloatArray) -> float:
+    """Returns the root mean square of errors."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def pseudo_huber(errors: FloatArray) -> FloatArray:
+    """Returns pseudo-Huber residuals: their squares grow linearly with errors above 1."""
+    return np.asarray(np.sign(errors) * np.sqrt(2 * (np.sqrt(1 + errors**2) - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentErrors:
+    """Errors of predictions of segments with models of a robot.
+
+    Attributes:
+        robot: The robot as its model describes it.
+        data: Segments of at least one trial of the healthy robot.
+        threads: Threads of MuJoCo's steps.
+    """
+
+    robot: Robot
+    data: Sequence[ObservedSegments]
+    threads: int
+
+    @cached_property
+    def segment_of_error(self) -> IndexArray:
+        """Number of the segment of each error, over all trials, ``(errors,)``."""
+        first = np.cumsum([0, *(len(own.valid) for own in self.data)])
+        return np.concatenate(
+            [
+                number + np.nonzero(mask)[0]
+                for number, own in zip(first, self.data, strict=False)
+                for mask in own.compared.values()
+            ]
+        )
+
+    @property
+    def segments(self) -> int:
+        """Number of segments of all trials."""
+        return sum(len(own.valid) for own in self.data)
+
+    @property
+    def overlap(self) -> float:
+        """Number of segments that contain a step, on average over the steps; at least 1."""
+        ahead = [np.arange(own.segments.horizon) for own in self.data]
+        steps = [
+            len(np.unique(own.segments.starts[:, np.newaxis] + after))
+            for own, after in zip(self.data, ahead, strict=True)
+        ]
+        return sum(own.valid.size for own in self.data) / sum(steps)
+
+    def folds(self, count: int) -> IndexArray:
+        """Returns the part of each segment, ``(segments,)``: each trial cut in time."""
+        parts = [np.arange(len(own.valid)) * count // len(own.valid) for own in self.data]
+        return np.concatenate(parts)
+
+    def losses(self, errors: FloatArray) -> FloatArray:
+        """Returns the mean loss of each segment, ``(segments,)``, from errors, ``(errors,)``.
+
+        A segment without a valid step has a loss of 0.
+        """
+        number = self.segment_of_error
+        sums = np.bincount(number, pseudo_huber(errors) ** 2, self.segments)
+        return np.asarray(sums / np.maximum(np.bincount(number, minlength=self.segments), 1))
+
+    def joint_errors(self, errors: FloatArray) -> FloatArray:
+        """Returns the errors of joint positions, ``(valid steps, hinges)``, rad.
+
+        The error of an unknown hinge is 0.
+
+        Args:
+            errors: All errors of one model, ``(errors,)``.
+        """
+        first, found = 0, []
+        for own in self.data:
+            for signal, mask in own.compared.items():
+                last = first + int(mask.sum())
+                if signal == _POSITIONS:
+                    known = mask[own.valid]
+                    found.append(np.zeros(known.shape))
+                    found[-1][known] = errors[first:last]
+                first = last
+        return np.concatenate(found) * CALIBRATION_ERROR_SCALES[_POSITIONS]
+
+    def of(self, models: Sequence[Parameters], stats: SimulationStats | None = None) -> FloatArray:
+        """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
+
+        The models are predicted in batches, so that their memory is bounded.
+
+        Args:
+            models: At least one model; adjacent ones with one control delay share batches.
+            stats: Statistics that are updated.
+        """
+        stats = SimulationStats() if stats is None else stats
+        size = min(largest_batch(self.robot, own.segments, steps=0) for own in self.data)
+        batches = [
+            same[first : first + size]
+            for same in (list(group) for _, group in groupby(models, lambda own: own.delay))
+            for first in range(0, len(same), size)
+        ]
+        return np.concatenate([self._of_batch(batch, stats) for batch in batches], axis=1)
+
+    def with_estimated_states(self, parameters: Parameters) -> "SegmentErrors":
+        """Returns the errors of independent segments.
+
+        An unknown state begins as the parameters predict it.
+        """
+        predict_with = self._predictor([parameters], SimulationStats())
+
+        def independent(own: ObservedSegments) -> ObservedSegments:
+            segments = own.segments
+            if segments.independent:
+                return own
+            predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
+            states = dict(segments.states)
+            for signal in predicted.signals:
+                begin = predicted[signal][0, :, 0]
+                known = states.get(signal, np.full_like(begin, np.nan))
+                states[signal] = np.where(np.isnan(known), begin, known)
+            return replace(own, segments=replace(segments, states=states))
+
+        return replace(self, data=[independent(own) for own in self.data])
+
+    def _of_batch(self, models: Sequence[Parameters], stats: SimulationStats) -> FloatArray:
+        predict_with = self._predictor(models, stats)
+        rows = []
+        for own in self.data:
+            predicted = predict_with(own.segments)
+            for signal, mask in own.compared.items():
+                with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                    error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
+                    rows.append((error / CALIBRATION_ERROR_SCALES[signal])[:, mask])
+        errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
+        return np.clip(errors, -MAX_ERROR, MAX_ERROR)
+
+    def _predictor(
+        self, models: Sequence[Parameters], stats: SimulationStats
+    ) -> Callable[[Segments], Behaviour]:
+        """Returns a function that predicts segments with models of equal delay.
+
+        The signals of its result are ``(models, segments, horizon + 1, width)``.
+        """
+        robot, delay = self.robot, models[0].delay
+        embodiments = [
+            apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
+            for parameters in models
+        ]
+
+        def predict_with(segments: Segments) -> Behaviour:
+            return predict(
+                robot, embodiments, segments, threads=self.threads, stats=stats, delay=delay
+            ).behaviour
+
+        return predict_with

@@ -1,9 +1,12 @@
 """Simulator: batches of closed-loop rollouts, short predictions and ensembles of the self-model."""
 
 import copy
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache, partial
+from typing import Any, Generic, TypeVar
 
+import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
@@ -13,20 +16,20 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.batch import SimulationResult, SimulationStats, batch_bytes
+from selfmodel.robot.state import bind_data, state_writer, with_known_base
 from selfmodel.simulation.domain import (
     DomainDistribution,
     DomainSample,
     ReadingNoise,
     initial_positions,
 )
-from selfmodel.simulation.ground_contacts import ground_contact_points
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
-from selfmodel.simulation.rollout import Rollout
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.rollout import Rollout, SimulationResult, SimulationStats, batch_bytes
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.estimation import STATE, estimated_states, known_steps
+from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import Signal
 
 Run = tuple[Hypothesis, CommandSource]
@@ -35,16 +38,19 @@ Run = tuple[Hypothesis, CommandSource]
 MAX_CACHED_EMBODIMENTS = 1024
 """Largest number of cached models, if the memory does not limit it."""
 
-MAX_CACHED_TRIALS = 16
-"""Trials with cached ground contact points."""
-
 MAX_CACHED_ENSEMBLES = 16
-"""Largest number of cached ensembles, one per edit of the model's specification."""
+"""Largest number of cached ensembles, of about ``_ENSEMBLE_MODELS`` models, and of trials with
+cached ground contact points."""
 
 CACHED_SHARE = 0.5
 """Size of the cached models, and of the cached ensembles, relative to the models of a batch."""
 
 _ENSEMBLE_MODELS = 8
+
+
+def thread_count(requested: int) -> int:
+    """Returns the number of threads to use: ``requested``, or all processors where it is 0."""
+    return requested or len(os.sched_getaffinity(0))
 
 
 class Simulator:
@@ -77,12 +83,12 @@ class Simulator:
         self.stats = SimulationStats() if stats is None else stats
         # A quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB.
         affordable = int(CACHED_SHARE * batch_bytes()) // int(robot.model.nbuffer)
-        self._embodiment = lru_cache(max(1, min(MAX_CACHED_EMBODIMENTS, affordable)))(
-            partial(build, robot)
-        )
-        self._contact_points = lru_cache(MAX_CACHED_TRIALS)(partial(ground_contact_points, robot))
+        models = max(1, min(MAX_CACHED_EMBODIMENTS, affordable))
         ensembles = max(1, min(MAX_CACHED_ENSEMBLES, affordable // _ENSEMBLE_MODELS))
+        self._embodiment = lru_cache(models)(partial(build, robot))
         self._members = lru_cache(ensembles)(partial(perturbed_models, robot))
+        points = partial(ground_contact_points, robot)
+        self._contact_points = lru_cache(MAX_CACHED_ENSEMBLES)(points)
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run for ``steps`` control steps from the initial pose.
@@ -132,14 +138,13 @@ class Simulator:
     def _adapted_to_contacts(
         self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
     ) -> Embodiment:
-        """Returns an embodiment adapted to the ground contacts of a trial."""
         faults = [fault for fault in hypothesis.faults if fault.kind.adapts_to_contacts]
         if not faults:
             return embodiment
-        own = copy.deepcopy(embodiment)  # the argument is in the cache
+        adapted = copy.deepcopy(embodiment)  # the argument is in the cache
         for fault in faults:
-            fault.kind.adapt_to_contacts(own, fault, self._contact_points(observed))
-        return own
+            fault.kind.adapt_to_contacts(adapted, fault, self._contact_points(observed))
+        return adapted
 
     def run_ensemble(
         self,
@@ -213,29 +218,126 @@ class Simulator:
         start: FloatArray | None = None,
         disturb: Callable[[FloatArray], None] = lambda _: None,
     ) -> SimulationResult:
-        robot, n = self.robot, len(embodiments)
+        robot, n, threads, stats = self.robot, len(embodiments), self.threads, self.stats
+        names = robot.anatomy.names
         rollout = Rollout(
-            robot,
-            embodiments,
-            drivers,
-            record,
-            threads=self.threads,
-            stats=self.stats,
+            *(robot, embodiments, drivers, record),
+            threads=threads,
+            stats=stats,
             start=start,
             disturb=disturb,
         )
         # Steps first during the run, so that each step is written to contiguous memory.
-        kept = {
-            signal: np.empty((steps, n, robot.anatomy.names.width(signal))) for signal in record
-        }
+        kept = {signal: np.empty((steps, n, names.width(signal))) for signal in record}
         for k in rollout.steps(steps):
             for signal, rows in kept.items():
                 rows[k] = rollout.live[signal]()
         diverged = rollout.diverged()
-        self.stats.runs += n
-        self.stats.diverged += int(diverged.sum())
+        stats.runs += n
+        stats.diverged += int(diverged.sum())
         signals = {
             signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
         }
         time = np.arange(steps, dtype=np.float64) * robot.control_timestep
-        return SimulationResult(Behaviour(robot.anatomy.names, time, signals), diverged)
+        return SimulationResult(Behaviour(names, time, signals), diverged)
+
+
+MAX_GROUND_DISTANCE = 10.0
+"""Largest distance between a foot and the model's level ground, m."""
+
+
+def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
+    """Returns the ground contact points of the bodies with touch sensors in a trial.
+
+    A contact point is the lowest point of a body, at each step with a touch reading of 1. Wrong
+    touch readings result in points in the air. A body beyond an unknown hinge has no contact point.
+
+    Args:
+        robot: The healthy robot.
+        behaviour: The logged behaviour of the trial.
+
+    Returns:
+        ``(n, 3)``, world frame, m, read-only; ``(0, 3)`` for a model without level ground.
+    """
+    model, feet = robot.model, _feet(robot)
+    ground, points = _level_ground(model), []
+    if ground is not None and feet:
+        states = estimated_states(with_known_base(robot, behaviour), STATE)
+        touched = behaviour["sensors"] == 1
+        touched[:, [column for column in range(touched.shape[1]) if column not in feet]] = False
+        unknown = np.isnan(states["joint_positions"])
+        data, nearest = mujoco.MjData(model), np.empty(6)
+        write = state_writer(robot, bind_data(data))
+        for step in np.flatnonzero(known_steps(states) & touched.any(axis=1)):
+            write({signal: values[[step]] for signal, values in states.items()})
+            mujoco.mj_kinematics(model, data)
+            for column in np.flatnonzero(touched[step]).tolist():
+                geoms, hinges = feet[column]
+                if unknown[step, hinges].any():
+                    continue
+                distance = MAX_GROUND_DISTANCE
+                for geom in geoms:
+                    apart = mujoco.mj_geomDistance(
+                        model, data, ground, geom, MAX_GROUND_DISTANCE, nearest
+                    )
+                    if apart < distance:
+                        distance, lowest = apart, nearest[3:].copy()
+                if distance < MAX_GROUND_DISTANCE:
+                    points.append(lowest)
+    contacts = np.array(points).reshape(-1, 3)
+    contacts.flags.writeable = False  # the simulator caches the array
+    return contacts
+
+
+def _level_ground(model: mujoco.MjModel) -> int | None:
+    """Returns the most level plane of the world, or None without a plane."""
+    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_bodyid == 0)
+    numbers = np.flatnonzero(planes)
+    upward = directions(model.geom_quat[numbers])[:, -1]
+    return int(numbers[np.argmax(upward)]) if len(numbers) else None
+
+
+def _feet(robot: Robot) -> dict[int, tuple[list[int], list[int]]]:
+    """Returns of each touch sensor with a colliding body, by its column, what determines its place.
+
+    They are the colliding geoms of the body, and the columns of the hinges between it and the root.
+    """
+    model, feet = robot.model, {}
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    body_of_hinge = [int(model.joint(name).bodyid[0]) for name in robot.anatomy.hinges]
+    for column, sensor in enumerate(robot.anatomy.sensors):
+        if sensor.kind != "touch":
+            continue
+        body = int(model.site_bodyid[int(model.sensor(sensor.name).objid[0])])
+        geoms = np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
+        chain = set[int]()
+        while body:
+            chain.add(body)
+            body = int(model.body_parentid[body])
+        if geoms:
+            feet[column] = geoms, [k for k, own in enumerate(body_of_hinge) if own in chain]
+    return feet
+
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+class Cache(Generic[Key]):
+    """A cache with one row of numbers per key: each search computes a row once."""
+
+    def __init__(self) -> None:
+        self._rows: dict[Key, Any] = {}
+
+    def get_or_compute(
+        self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
+    ) -> list[FloatArray]:
+        """Returns the row of each key.
+
+        Args:
+            keys: Keys in any order, with or without repetitions.
+            compute: Returns the rows, ``(n, ...)``, of the distinct keys that are not cached.
+        """
+        missing = list(dict.fromkeys(key for key in keys if key not in self._rows))
+        if missing:
+            self._rows.update(zip(missing, compute(missing), strict=True))
+        return [self._rows[key] for key in keys]

@@ -29,9 +29,9 @@ from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import SimulationStats
 from selfmodel.simulation.model_factors import with_model
 from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
+from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial

@@ -210,13 +210,14 @@ def runs_of_shape(trial: Trial, *lengths: int) -> Behaviour:
     return Behaviour(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
 
 
-def segments(trial: Trial, *, lead: int = 2, rows: int = 27) -> Segments:
+def segments(trial: Trial, horizon: int = 25) -> Segments:
     """Three segments of a trial."""
     names = trial.behaviour.names
     return Segments(
         states={"joint_positions": np.zeros((3, len(names.hinges)))},
-        commands=np.zeros((3, rows, len(names.motors))),
-        lead=lead,
+        commands=np.zeros((trial.behaviour.steps, len(names.motors))),
+        starts=np.array([0, 10, 20]),
+        horizon=horizon,
         record=("joint_positions",),
     )
 
@@ -246,14 +247,16 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
     trial, simulated = logged_and_simulated
     unknown = segments(trial)
     unknown.commands[0] = np.nan
-    narrow = replace(segments(trial), commands=np.zeros((3, 27, 1)))
+    narrow = replace(segments(trial), commands=np.zeros((300, 1)))
+    late = replace(segments(trial), starts=np.array([0, 10, 275]))
     fewer = replace(segments(trial), states={"joint_positions": np.zeros((2, 1))})
     broken: list[tuple[object, str]] = [
         ("joint_positions", "must be a ClosedLoop, Segments or an Ensemble"),
         (replace(ENSEMBLE, members=0), "at least one member"),
-        (segments(trial, lead=27), "a horizon of at least 1 step"),
+        (segments(trial, horizon=0), "a horizon of at least 1 step"),
+        (late, "from 0 to 274"),
         (unknown, "must be finite"),
-        (narrow, "the commands of segments must have shape"),
+        (narrow, "the commands of segments must be those of the trial"),
         (fewer, "the states of joint_positions must have shape"),
         (replace(segments(trial), record=("commands",)), "Segments must record some of"),
     ]
@@ -298,8 +301,9 @@ def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated
     logged = trial.behaviour
     asks = Segments(
         states={signal: logged[signal][rows] for signal in signals},
-        commands=logged["commands"][rows[:, np.newaxis] + np.arange(-2, 10)],
-        lead=2,
+        commands=logged["commands"],
+        starts=rows,
+        horizon=10,
         record=("base_position", "sensors"),
     )
     perfect = shown(asks, trial)
@@ -309,10 +313,3 @@ def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated
         np.testing.assert_array_equal(
             perfect["base_position"][0, segment], logged["base_position"][row : row + 11]
         )
-
-
-def test_a_segment_that_no_trial_contains_is_named(logged_and_simulated: Both):
-    trial, _ = logged_and_simulated
-
-    with pytest.raises(ValueError, match="no step at which segment 0 could begin"):
-        shown(segments(trial), trial)

@@ -71,14 +71,11 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
 def motion_loss(run: Behaviour, predicted: np.ndarray, hinges: np.ndarray) -> np.ndarray:
     """The loss of the motion of some encoders, ``(1, segments)``."""
     request = SEGMENT_PREDICTION.prepare(logged(run)).request
-    assert request.past is not None
     angles = np.full_like(run["joint_positions"], np.nan)
     angles[:, hinges] = run["joint_positions"][:, hinges]
     time = run.time[: request.horizon + 1]
     simulated = Behaviour(run.names, time, {"joint_positions": predicted})
-    return encoder_motion_loss(
-        simulated, logged_motion(angles, request.past.starts, request.horizon)
-    )
+    return encoder_motion_loss(simulated, logged_motion(angles, request.starts, request.horizon))
 
 
 @settings(max_examples=10, deadline=None)

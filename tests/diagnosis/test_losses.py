@@ -20,9 +20,9 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation import batch
-from selfmodel.simulation.batch import SimulationResult, hypothesis_bytes
+from selfmodel.simulation import rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
@@ -137,7 +137,7 @@ def test_losses_are_the_same_in_small_batches(
     whole = LossTable(Simulator(quadruped, 1), comparator).losses(three, trials)
     request = comparator.prepare(trials[0]).request
     needed = hypothesis_bytes(quadruped, request, STEPS)
-    monkeypatch.setattr(batch, "batch_bytes", lambda: 2 * needed)
+    monkeypatch.setattr(rollout, "batch_bytes", lambda: 2 * needed)
     small = CountingSimulator(quadruped)
     batched = LossTable(small, comparator).losses(three, trials)
 

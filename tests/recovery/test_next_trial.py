@@ -34,7 +34,7 @@ from selfmodel.recovery.result import Database
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import SimulationResult
+from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, Names, Signal

@@ -31,7 +31,7 @@ from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.result import Recovery
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import SimulationResult
+from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal

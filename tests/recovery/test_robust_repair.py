@@ -31,7 +31,7 @@ from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.batch import SimulationResult
+from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable

@@ -22,12 +22,14 @@ from selfmodel.simulation.calibration import (
     calibrate,
     prediction_error,
 )
-from selfmodel.simulation.factor_sets import FACTORS, MAX_LOG_FACTOR, prior_deviations
 from selfmodel.simulation.model_factors import (
+    FACTORS,
+    MAX_LOG_FACTOR,
     SHARED,
     Parameters,
     factor_names,
     nominal,
+    prior_deviations,
     with_parameters,
 )
 from selfmodel.tasks import ROBOTS

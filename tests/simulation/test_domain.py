@@ -9,8 +9,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.domain import DomainDistribution, draw_samples
-from selfmodel.simulation.initial_pose import StartSpread
+from selfmodel.simulation.domain import DomainDistribution, StartSpread, draw_samples
 from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers

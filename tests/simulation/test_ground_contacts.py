@@ -22,8 +22,7 @@ from selfmodel.faults.terrain import (
 from selfmodel.physical.simulated import OWN_SEED, SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.ground_contacts import ground_contact_points
-from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.simulator import Simulator, ground_contact_points
 from selfmodel.tasks import suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import JOINTS

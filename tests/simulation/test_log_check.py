@@ -8,8 +8,7 @@ import pytest
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import nominal
-from selfmodel.simulation.segment_errors import SegmentErrors
-from selfmodel.simulation.segments import observed_segments
+from selfmodel.simulation.segments import SegmentErrors, observed_segments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial

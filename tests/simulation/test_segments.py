@@ -10,12 +10,12 @@ from selfmodel.errors import InputError
 from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.simulation.requests import LEAD
-from selfmodel.simulation.segment_errors import SegmentErrors
 from selfmodel.simulation.segments import (
     HORIZON,
     MAX_SEGMENTS,
     MIN_BASE_SHARE,
     ObservedSegments,
+    SegmentErrors,
     observed_segments,
 )
 from selfmodel.tasks import ROBOTS

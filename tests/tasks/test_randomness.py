@@ -6,7 +6,7 @@ from dm_control.rl import control
 
 from selfmodel import tasks
 from selfmodel.errors import InputError
-from selfmodel.simulation.initial_pose import ANGLE_DEVIATION
+from selfmodel.simulation.domain import ANGLE_DEVIATION
 from selfmodel.tasks.arguments import Seed, construction_numbers, episode_numbers
 
 WALKER = ("suite-walker", "walk")

@@ -21,7 +21,7 @@ from selfmodel.cli.output.console import text_console
 from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_notes
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.simulation.threads import thread_count
+from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor
 from selfmodel.studies.study import Study
 

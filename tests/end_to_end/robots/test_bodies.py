@@ -28,7 +28,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.model_factors import nominal, with_parameters
-from selfmodel.simulation.requests import Past, Segments
+from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
 from selfmodel.trials.behaviour import Behaviour, collect
@@ -109,10 +109,10 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
         run = happened(body, hypothesis)
         segments = Segments(
             states={signal: run[signal][starts] for signal in STATE},
-            commands=np.stack([commands[k : k + HORIZON] for k in starts]),
-            lead=0,
+            commands=commands,
+            starts=starts,
+            horizon=HORIZON,
             record=STATE,
-            past=Past(commands, starts),
         )
         made = Simulator(body, 1).predict([hypothesis], segments).behaviour
         for signal in STATE:
