@@ -1,15 +1,27 @@
-"""Promises of rollouts under conditions: noise, initial poses and models that trials leave open."""
+"""Promises of domain randomisation: noise, initial poses and models that trials leave open."""
 
 import dataclasses
 
+import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from selfmodel.controllers.playback import Playback
+from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.domain import DomainDistribution, StartSpread, draw_samples
+from selfmodel.robot.state import signal_fields
+from selfmodel.simulation.domain import (
+    ANGLE_DEVIATION,
+    TILT_DEVIATION,
+    DomainDistribution,
+    StartSpread,
+    draw_samples,
+    randomize_initial_pose,
+    start_spread,
+)
 from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.drivers import random_controllers
@@ -116,19 +128,6 @@ def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robo
     assert len(set(readings.round(4).tolist())) == 3
 
 
-def test_a_robot_without_sensors_has_conditions(quadruped: Robot):
-    spec = quadruped.specification()
-    for sensor in list(spec.sensors):
-        spec.delete(sensor)
-    bare = Robot("bare", spec.to_xml(), quadruped.control_timestep)
-    drawn = draw_samples((INTACT,), uncertain(bare), 2, np.random.default_rng(0))
-    outcome = Simulator(bare, 1).run_under(
-        drawn, uncertain(bare), random_controllers(bare, 1), STEPS, ("sensors",)
-    )
-
-    assert outcome.behaviour["sensors"].shape == (1, 2, STEPS, 0)
-
-
 def test_hypotheses_that_cannot_be_told_apart_are_simulated_in_turn(quadruped: Robot):
     alike = [parse(text, quadruped.anatomy) for text in ("intact", "friction=0.5", "wind=3")]
     rng = np.random.default_rng(5)
@@ -153,3 +152,54 @@ def test_an_added_delay_makes_commands_arrive_later(quadruped: Robot, delay: int
     np.testing.assert_allclose(
         outcome.behaviour["joint_positions"][0], expected.behaviour["joint_positions"], atol=1e-3
     )
+
+
+def started(
+    robot: Robot, level: float, seed: int, text: str = "intact"
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = build(robot, parse(text, robot.anatomy)).model
+    data = mujoco.MjData(model)
+    randomize_initial_pose(robot, model, data, start_spread(level), np.random.default_rng(seed))
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def test_starts_spread_around_the_reference_pose(quadruped: Robot):
+    level, draws = 0.1, 200
+    fields = signal_fields(quadruped)
+    poses = np.array([started(quadruped, level, seed)[1].qpos for seed in range(draws)])
+    angles = poses[:, fields["joint_positions"].columns]
+    orientations = poses[:, fields["base_orientation"].columns]
+    tilts = Rotation.from_quat(orientations, scalar_first=True).as_rotvec()
+
+    spread = level * ANGLE_DEVIATION
+    np.testing.assert_allclose(angles.std(axis=0), spread, rtol=0.25)
+    np.testing.assert_allclose(angles.mean(axis=0), 0, atol=5 * spread / draws**0.5)
+    np.testing.assert_allclose(tilts[:, :2].std(axis=0), level * TILT_DEVIATION, rtol=0.25)
+    np.testing.assert_allclose(tilts[:, 2], 0, atol=1e-9)
+    np.testing.assert_array_equal(poses[:, :2], 0)
+
+
+def test_no_start_is_deeper_in_the_ground_or_bent_further_than_the_robot_can_be(robot: Robot):
+    _, reference = started(robot, 0.0, 0)
+    heights = []
+    for seed, level in enumerate(np.linspace(0, 0.5, 20)):
+        model, data = started(robot, level, seed)
+        heights.append(data.qpos[2])
+
+        assert data.contact.dist.min(initial=1) >= reference.contact.dist.min() - 1e-9
+        for hinge in robot.anatomy.hinges:
+            low, high = model.joint(hinge).range
+            assert low <= data.joint(hinge).qpos[0] <= high
+        assert not data.qvel.any()
+    assert min(heights) >= reference.qpos[2]
+    assert max(heights) > reference.qpos[2] + 0.005  # some had to be lifted
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_a_held_joint_starts_where_it_is_held(robot: Robot, angle: float):
+    joint = robot.anatomy.joints[0]
+    _, data = started(robot, 0.5, 0, f"jam:{joint.name}={angle}")
+
+    for hinge in joint.hinges:
+        assert data.joint(hinge).qpos[0] == angle

@@ -1,19 +1,19 @@
-"""Promises of model factors: the model and the MJCF have them; their distributions."""
+"""Promises of model factors: the model and the MJCF have them; their distributions and sets."""
 
 import dataclasses
 
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 
 from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import (
-    JOINT_QUANTITIES,
+    JOINT_FIELDS,
     LogNormal,
     Parameters,
     Weighted,
+    bases,
     exact,
     factor_names,
     from_factors,
@@ -22,8 +22,10 @@ from selfmodel.simulation.model_factors import (
     kinds_of_joints,
     model_with_parameters,
     nominal,
+    prior_deviations,
     with_parameters,
 )
+from selfmodel.tasks import ROBOTS
 from tests.helpers.robots.arms import arm
 
 FIELDS = (
@@ -99,40 +101,35 @@ def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
         )
 
 
-def test_friction_is_that_of_geoms_and_of_contact_pairs():
-    robot = Robot("legs", LEGS.format(compiler="", inertial="", damping="0.7", **NAMED), 0.02)
-    model = model_with_parameters(robot, some(robot))
-
-    np.testing.assert_allclose(model.geom_friction[:, 0], robot.model.geom_friction[:, 0] * 1.2)
-    np.testing.assert_allclose(model.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
+def bits(model: mujoco.MjModel) -> bytes:
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
 
 
 def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
-    parameters = some(robot)
-    said = with_parameters(robot, parameters)
+    before, parameters = bits(robot.model), some(robot)
+    fitted = with_parameters(robot, parameters)
 
-    assert_alike(model_with_parameters(robot, parameters), said.model)
-    assert said.control_delay == 2
-    assert said.anatomy.names == robot.anatomy.names
-    assert [joint.name for joint in said.anatomy.joints] == [
-        joint.name for joint in robot.anatomy.joints
-    ]
-    assert (said.name, said.root, said.control_timestep) == (
-        *(robot.name, robot.root),
-        robot.control_timestep,
-    )
+    assert_alike(model_with_parameters(robot, parameters), fitted.model)
+    assert fitted.control_delay == 2
+    assert fitted.anatomy.names == robot.anatomy.names
+    assert (fitted.name, fitted.root) == (robot.name, robot.root)
+    assert fitted.control_timestep == robot.control_timestep
+    assert bits(robot.model) == before
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
-def test_masses_are_written_in_whatever_way_the_model_defines_them(way: str):
+def test_masses_and_friction_are_written_in_whatever_way_the_model_defines_them(way: str):
     text = LEGS.format(**{"compiler": "", "inertial": "", "damping": "0.7"} | NAMED | WAYS[way])
     robot = Robot("legs", text, 0.01)
-    edited = model_with_parameters(robot, some(robot))
-    before = robot.model
+    edited, before = model_with_parameters(robot, some(robot)), robot.model
 
     np.testing.assert_allclose(edited.body("base").mass, 1.3 * before.body("base").mass)
     np.testing.assert_allclose(edited.body_mass[2:], 0.7 * before.body_mass[2:])
+    np.testing.assert_allclose(edited.geom_friction[:, 0], before.geom_friction[:, 0] * 1.2)
+    np.testing.assert_allclose(edited.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
     assert_alike(edited, with_parameters(robot, some(robot)).model)
 
 
@@ -145,41 +142,23 @@ def test_a_new_delay_replaces_the_old_one(quadruped: Robot):
     assert again.mjcf.count("selfmodel_control_delay") == 1
 
 
-def test_nominal_parameters_change_nothing(robot: Robot):
-    parameters = nominal(robot)
+def test_nominal_parameters_change_nothing_and_a_vector_of_factors_is_the_parameters(robot: Robot):
+    parameters, shuffled = nominal(robot), some(robot)
 
     assert set(parameters.factors) == {1.0}
     assert parameters.delay == 0
-    assert_alike(robot.model, model_with_parameters(robot, parameters))
-    assert len(factor_names(robot)) == len(parameters.factors)
+    assert not parameters.differs
+    assert shuffled.differs
+    assert bits(model_with_parameters(robot, parameters)) == bits(robot.model)
     assert len(set(factor_names(robot))) == len(parameters.factors)
+    contacts = {"contact_stiffness": 1.0, "contact_damping": 1.0}
+    expected = dataclasses.replace(shuffled, **contacts)
+    assert from_factors(shuffled.factors, shuffled.delay) == expected
 
 
-@given(
-    factors=st.lists(st.floats(0.3, 3.3), min_size=5, max_size=30),
-    delay=st.integers(0, 5),
-)
-@settings(max_examples=50, deadline=None)
-def test_a_row_of_factors_is_the_parameters(factors: list[float], delay: int):
-    parameters = from_factors(np.array(factors), delay)
-
-    assert parameters.factors.tolist() == factors
-    assert parameters.delay == delay
-    assert from_factors(parameters.factors, delay) == parameters
-
-
-def test_the_robot_stays_as_it_was(quadruped: Robot):
-    before = quadruped.model.body_mass.copy(), quadruped.model.dof_damping.copy()
-    model_with_parameters(quadruped, some(quadruped))
-    with_parameters(quadruped, some(quadruped))
-
-    np.testing.assert_array_equal(quadruped.model.body_mass, before[0])
-    np.testing.assert_array_equal(quadruped.model.dof_damping, before[1])
-
-
-@pytest.mark.parametrize("said", ["-3", "nan", "1e300", "2.3", "6"])
-def test_an_invalid_delay_is_refused(quadruped: Robot, said: str):
-    numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{said}"/></custom></mujoco>'
+@pytest.mark.parametrize("delay", ["-3", "nan", "1e300", "2.3", "6"])
+def test_an_invalid_delay_is_refused(quadruped: Robot, delay: str):
+    numeric = f'<custom><numeric name="{CONTROL_DELAY}" data="{delay}"/></custom></mujoco>'
     mjcf = quadruped.mjcf.replace("</mujoco>", numeric)
 
     with pytest.raises(ValueError, match="must be a multiple of 1/2 from 0 to 5"):
@@ -189,31 +168,26 @@ def test_an_invalid_delay_is_refused(quadruped: Robot, said: str):
 def test_fitted_contacts_are_marked_once_and_remain_marked(quadruped: Robot):
     softer = dataclasses.replace(nominal(quadruped), contact_stiffness=0.5)
     fitted = with_parameters(quadruped, softer)
-    again = with_parameters(fitted, softer)
     late = dataclasses.replace(nominal(quadruped), delay=1)
 
     assert not with_parameters(quadruped, late).has_fitted_contacts
     assert fitted.has_fitted_contacts
-    assert again.has_fitted_contacts
-    assert again.mjcf.count(FITTED_CONTACTS) == 1
+    assert with_parameters(fitted, softer).has_fitted_contacts
+    assert with_parameters(fitted, softer).mjcf.count(FITTED_CONTACTS) == 1
 
 
 def joints_scaled(robot: Robot, factor: float) -> Parameters:
-    parts = dict.fromkeys(JOINT_QUANTITIES, (factor,) * len(robot.anatomy.hinges))
+    parts = dict.fromkeys(JOINT_FIELDS, (factor,) * len(robot.anatomy.hinges))
     return dataclasses.replace(nominal(robot), **parts)
 
 
-def test_factors_of_one_of_joints_change_nothing_to_the_bit():
+def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
     same = model_with_parameters(arm(), joints_scaled(arm(), 1.0))
-
-    for field in ("dof_damping", "dof_frictionloss", "dof_armature"):
+    for field, _ in JOINT_FIELDS.values():
         assert getattr(same, field).tobytes() == getattr(arm().model, field).tobytes()
 
-
-def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
     twice, less = joints_scaled(arm(), 2.0), joints_scaled(arm(), 0.5)
     before = joint_values(arm(), nominal(arm()), "joint_damping")
-
     np.testing.assert_allclose(joint_values(arm(), twice, "joint_damping"), 2 * before)
     assert not arm().model.dof_frictionloss.any()
     assert (joint_values(arm(), twice, "dry_friction") > 0).all()
@@ -223,11 +197,11 @@ def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
 def test_the_mjcf_contains_the_quantities_of_joints_and_a_delay_of_a_part_of_a_step():
     delay = 1 + 1 / arm().substeps
     parameters = dataclasses.replace(joints_scaled(arm(), 1.35), delay=delay)
-    said, model = with_parameters(arm(), parameters), model_with_parameters(arm(), parameters)
+    fitted, model = with_parameters(arm(), parameters), model_with_parameters(arm(), parameters)
 
-    assert said.control_delay == delay
-    for field in ("dof_damping", "dof_frictionloss", "dof_armature"):
-        np.testing.assert_allclose(getattr(said.model, field), getattr(model, field), rtol=1e-5)
+    assert fitted.control_delay == delay
+    for field, _ in JOINT_FIELDS.values():
+        np.testing.assert_allclose(getattr(fitted.model, field), getattr(model, field), rtol=1e-5)
 
 
 def test_legs_of_one_shape_have_the_same_kinds_of_joints(quadruped: Robot):
@@ -238,21 +212,25 @@ def test_legs_of_one_shape_have_the_same_kinds_of_joints(quadruped: Robot):
     assert len(set(kinds_of_joints(arm()).tolist())) == 6
 
 
-def test_known_contacts_take_no_random_numbers(quadruped: Robot):
-    factors, bodies = np.full(4 + quadruped.model.nu, 0.1), np.full(quadruped.model.nbody, 0.1)
-    known = LogNormal(factors, bodies).draw(np.random.default_rng(0))
-    unknown = LogNormal(factors, bodies, 0.5).draw(np.random.default_rng(0))
+@pytest.mark.parametrize("robot", [arm(), ROBOTS["quadruped"].robot()], ids=lambda own: own.name)
+def test_the_coordinates_of_a_set_are_those_of_its_parameters(robot: Robot):
+    start = dataclasses.replace(nominal(robot), delay=1, contact_damping=0.5)
+    prior, sizes = prior_deviations(robot), []
+    for _, basis in bases(robot):
+        x = np.linspace(-0.5, 0.5, len(basis.prior))
+        applied = basis.applied(start, x)
+        sizes.append(len(x))
 
-    assert not known.has_other_contacts
-    assert unknown.has_other_contacts
-    same = {"contact_stiffness": 1.0, "contact_damping": 1.0}
-    assert dataclasses.replace(unknown, **same) == known
+        np.testing.assert_allclose(basis.coordinates(applied), x, atol=1e-12)
+        assert (applied.delay, applied.contact_damping) == (1, 0.5)
+        for quantity, deviations in basis.by_quantity(basis.prior).items():
+            np.testing.assert_array_equal(deviations, prior[quantity])
+    assert sizes == sorted(set(sizes))
 
 
 def test_draws_have_a_median_of_one_and_the_given_deviations(quadruped: Robot):
-    bodies = np.full(quadruped.model.nbody, 0.2)
-    distribution = LogNormal(np.full(4 + quadruped.model.nu, 0.1), bodies, 0.5)
-    rng = np.random.default_rng(0)
+    bodies, factors = np.full(quadruped.model.nbody, 0.2), np.full(4 + quadruped.model.nu, 0.1)
+    distribution, rng = LogNormal(factors, bodies, 0.5), np.random.default_rng(0)
     drawn = [distribution.draw(rng) for _ in range(400)]
 
     assert not distribution.is_exact
@@ -266,6 +244,9 @@ def test_draws_have_a_median_of_one_and_the_given_deviations(quadruped: Robot):
         logarithms = np.log(values)
         np.testing.assert_allclose(logarithms.mean(axis=0), 0, atol=deviation / 4)
         np.testing.assert_allclose(logarithms.std(axis=0), deviation, rtol=0.2)
+    # Known contacts take no random numbers.
+    known, first = LogNormal(factors, bodies).draw(np.random.default_rng(0)), drawn[0]
+    assert dataclasses.replace(first, contact_stiffness=1.0, contact_damping=1.0) == known
 
 
 def test_a_draw_scales_the_model_of_the_robot(quadruped: Robot):
@@ -288,19 +269,14 @@ def test_a_draw_scales_the_model_of_the_robot(quadruped: Robot):
     np.testing.assert_allclose(scaled.geom("torso").solref, own.geom("torso").solref * [0.5, 1])
     # The constants that follow from the masses are those of the scaled model.
     assert scaled.body_subtreemass[1] > own.body_subtreemass[1]
-    assert parameters.differs
 
 
 def test_the_exact_model_is_drawn_to_the_bit(quadruped: Robot):
     drawn = exact(quadruped).draw(np.random.default_rng(0))
+
     assert not drawn.differs
     assert exact(quadruped).is_exact
-    size = mujoco.mj_sizeModel(quadruped.model)
-    buffers = [np.empty(size, np.uint8) for _ in range(2)]
-    models = quadruped.model, model_with_parameters(quadruped, drawn)
-    for model, buffer in zip(models, buffers, strict=True):
-        mujoco.mj_saveModel(model, None, buffer)
-    assert buffers[0].tobytes() == buffers[1].tobytes()
+    assert bits(model_with_parameters(quadruped, drawn)) == bits(quadruped.model)
 
 
 def test_a_weighted_sample_draws_its_models_as_often_as_they_are_probable(quadruped: Robot):

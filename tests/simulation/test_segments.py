@@ -14,7 +14,6 @@ from selfmodel.simulation.segments import (
     HORIZON,
     MAX_SEGMENTS,
     MIN_BASE_SHARE,
-    ObservedSegments,
     SegmentErrors,
     observed_segments,
 )
@@ -29,6 +28,7 @@ from tests.helpers.hostile import lacking, without_encoders
 STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()
 GAP = draw_gap(QUADRUPED, 0.05, np.random.default_rng(0))
+SEEN = pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 
 
 def trial(physical: SimulatedRobot, steps: int = STEPS) -> Trial:
@@ -40,10 +40,8 @@ def trial(physical: SimulatedRobot, steps: int = STEPS) -> Trial:
     )
 
 
-@pytest.fixture(scope="module")
-def whole() -> Trial:
-    """A trial without noise, all of it observed."""
-    return trial(SimulatedRobot(QUADRUPED))
+WHOLE = trial(SimulatedRobot(QUADRUPED))
+"""A trial without noise, all of it observed."""
 
 
 def lost_and_late(whole: Trial) -> Trial:
@@ -55,75 +53,55 @@ def lost_and_late(whole: Trial) -> Trial:
     return replace(whole, behaviour=run)
 
 
-def starts(found: ObservedSegments) -> np.ndarray:
-    past = found.segments.past
-    assert past is not None
-    return past.starts
+def starts(tried: Trial) -> np.ndarray:
+    return observed_segments(QUADRUPED, tried).segments.starts
 
 
-def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_state(whole: Trial):
-    found = observed_segments(QUADRUPED, whole)
+def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_state():
+    found = observed_segments(QUADRUPED, WHOLE)
+    begins = found.segments.starts
 
-    assert len(starts(found)) == MAX_SEGMENTS
-    assert (starts(found)[0], starts(found)[-1]) == (LEAD, STEPS - 1 - HORIZON)
+    assert len(begins) == MAX_SEGMENTS
+    assert (begins[0], begins[-1]) == (LEAD, STEPS - 1 - HORIZON)
     assert set(found.segments.states) == set(found.observed) == set(STATE)
 
 
 @pytest.mark.parametrize("lost", [BASE, BASE[:1], BASE[1:]], ids=["both", "place", "velocity"])
-def test_where_it_was_not_they_follow_each_other_from_the_start_on(
-    whole: Trial, lost: tuple[Signal, ...]
-):
-    found = observed_segments(QUADRUPED, lacking(whole, lost))
+def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[Signal, ...]):
+    found = observed_segments(QUADRUPED, lacking(WHOLE, lost))
 
-    np.testing.assert_array_equal(starts(found), np.arange(0, STEPS - HORIZON, HORIZON))
+    np.testing.assert_array_equal(found.segments.starts, np.arange(0, STEPS - HORIZON, HORIZON))
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
 
 
-@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
-def test_they_say_what_was_logged_and_commanded(whole: Trial, lost: tuple[Signal, ...]):
-    run, found = whole.behaviour, observed_segments(QUADRUPED, lacking(whole, lost))
+@SEEN
+def test_they_contain_what_was_logged_and_commanded(lost: tuple[Signal, ...]):
+    run, found = WHOLE.behaviour, observed_segments(QUADRUPED, lacking(WHOLE, lost))
+    segments = found.segments
 
-    for number, k in enumerate(starts(found)):
-        for signal, values in found.observed.items():
-            np.testing.assert_array_equal(found.segments.states[signal][number], run[signal][k])
-            np.testing.assert_array_equal(values[number], run[signal][k + 1 : k + HORIZON + 1])
-        before, after = np.split(found.segments.commands[number], [LEAD])
-        np.testing.assert_array_equal(after, run["commands"][k : k + HORIZON])
-        np.testing.assert_array_equal(
-            before[max(LEAD - k, 0) :], run["commands"][max(k - LEAD, 0) : k]
-        )
-        assert not before[: max(LEAD - k, 0)].any()
-
-
-@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
-def test_all_that_they_say_can_be_recorded_and_they_know_what_was_commanded_before(
-    whole: Trial, lost: tuple[Signal, ...]
-):
-    segments = observed_segments(QUADRUPED, lacking(whole, lost)).segments
-
+    assert segments.horizon == HORIZON
+    assert segments.commands is run["commands"]
     assert set(segments.record) == set(segments.states)
-    assert segments.lead == LEAD
-    assert segments.past is not None
-    np.testing.assert_array_equal(segments.past.commands, whole.behaviour["commands"])
+    for number, k in enumerate(segments.starts):
+        for signal, values in found.observed.items():
+            np.testing.assert_array_equal(segments.states[signal][number], run[signal][k])
+            np.testing.assert_array_equal(values[number], run[signal][k + 1 : k + HORIZON + 1])
 
 
-@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
+@SEEN
 def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
     run = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), lost)
-    found = observed_segments(QUADRUPED, run)
-    estimated = estimated_states(run.behaviour, tuple(found.segments.states))
+    segments = observed_segments(QUADRUPED, run).segments
+    estimated = estimated_states(run.behaviour, tuple(segments.states))
 
-    for signal, values in found.segments.states.items():
-        np.testing.assert_array_equal(values, estimated[signal][starts(found)])
-    assert np.any(
-        found.segments.states["joint_positions"] != run.behaviour["joint_positions"][starts(found)]
-    )
+    for signal, values in segments.states.items():
+        np.testing.assert_array_equal(values, estimated[signal][segments.starts])
+    logged = run.behaviour["joint_positions"][segments.starts]
+    assert np.any(segments.states["joint_positions"] != logged)
 
 
-def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_came_late(
-    whole: Trial,
-):
-    found = starts(observed_segments(QUADRUPED, lost_and_late(whole)))
+def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_came_late():
+    found = starts(lost_and_late(WHOLE))
 
     for first, last in ((60, 79), (149, 149)):
         assert np.all((found + HORIZON < first) | (found - LEAD > last))
@@ -131,9 +109,9 @@ def test_where_the_base_was_seen_they_touch_nothing_that_was_not_observed_or_cam
     assert found.max() > 160
 
 
-def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(whole: Trial):
-    found = observed_segments(QUADRUPED, lost_and_late(lacking(whole, BASE)))
-    begins = starts(found)
+def test_where_it_was_not_they_are_compared_up_to_a_late_step_and_where_observed():
+    found = observed_segments(QUADRUPED, lost_and_late(lacking(WHOLE, BASE)))
+    begins = found.segments.starts
     rows = begins[:, np.newaxis] + np.arange(1, HORIZON + 1)
 
     # What begins where the state is not known is left out; the command of step 149 stood longer.
@@ -144,114 +122,84 @@ def test_where_it_was_not_they_are_judged_up_to_a_late_step_and_where_observed(w
 
 
 @pytest.mark.parametrize(("lost", "fewest"), [((), 33), (BASE, 17)], ids=["seen", "unseen"])
-def test_none_is_predicted_under_commands_that_are_not_known(
-    whole: Trial, lost: tuple[Signal, ...], fewest: int
-):
-    found = starts(
-        observed_segments(QUADRUPED, lacking(lacking(whole, lost), ("commands",), slice(60, 62)))
-    )
+def test_none_is_predicted_under_commands_that_are_not_known(lost: tuple[Signal, ...], fewest: int):
+    found = starts(lacking(lacking(WHOLE, lost), ("commands",), slice(60, 62)))
 
     assert np.all((found + HORIZON < 60) | (found - LEAD > 61))
     assert len(found) >= fewest
 
 
-def test_a_log_that_is_late_every_twentieth_step_serves():
-    noisy = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), BASE)
-    for phase in range(20):
-        late = np.arange(STEPS) % 20 == phase
-        late[0] = False
-        valid = observed_segments(
-            QUADRUPED, replace(noisy, behaviour=replace(noisy.behaviour, late=late))
-        ).valid
+@pytest.mark.parametrize("phase", range(0, 20, 3))
+def test_a_log_that_is_late_every_twentieth_step_serves(phase: int):
+    noisy = lacking(WHOLE, BASE)
+    late = np.arange(STEPS) % 20 == phase
+    late[0] = False
+    run = replace(noisy.behaviour, late=late)
 
-        assert valid.sum() >= STEPS // 10
-
-
-def test_a_base_that_was_seen_is_looked_at_however_much_else_is_missing(whole: Trial):
-    found = observed_segments(QUADRUPED, lacking(whole, ("joint_velocities",), slice(25, 190)))
-
-    assert set(found.observed) == set(STATE)
-    assert len(starts(found)) < MIN_BASE_SHARE * MAX_SEGMENTS
+    valid = observed_segments(QUADRUPED, replace(noisy, behaviour=run)).valid
+    assert valid.sum() >= STEPS // 10
 
 
-def test_a_base_that_was_seen_for_a_while_is_looked_at_then(whole: Trial):
-    found = observed_segments(QUADRUPED, lacking(whole, BASE, slice(100, None)))
+def test_a_base_is_used_wherever_it_was_seen_for_long_enough():
+    rare = observed_segments(QUADRUPED, lacking(WHOLE, ("joint_velocities",), slice(25, 190)))
+    assert set(rare.observed) == set(STATE)
+    assert len(rare.segments.starts) < MIN_BASE_SHARE * MAX_SEGMENTS
 
-    assert set(found.observed) == set(STATE)
-    assert starts(found).max() + HORIZON < 100
+    first = observed_segments(QUADRUPED, lacking(WHOLE, BASE, slice(100, None)))
+    assert set(first.observed) == set(STATE)
+    assert first.segments.starts.max() + HORIZON < 100
 
-
-def test_a_base_that_was_seen_for_a_moment_is_not_looked_at(whole: Trial):
-    found = observed_segments(
-        QUADRUPED, lacking(lacking(whole, BASE, slice(0, 100)), BASE, slice(130, None))
-    )
-
-    assert set(found.observed) == set(ONBOARD)
+    moment = lacking(lacking(WHOLE, BASE, slice(0, 100)), BASE, slice(130, None))
+    assert set(observed_segments(QUADRUPED, moment).observed) == set(ONBOARD)
 
 
 @pytest.mark.parametrize("steps", [16, 17, 40])
 def test_a_short_trial_has_each_segment_once(steps: int):
-    whole = trial(SimulatedRobot(QUADRUPED), steps)
+    short = trial(SimulatedRobot(QUADRUPED), steps)
 
-    assert starts(observed_segments(QUADRUPED, whole)).tolist() == list(
-        range(LEAD, steps - HORIZON)
-    )
-    assert starts(observed_segments(QUADRUPED, lacking(whole, BASE))).tolist() == list(
-        range(0, steps - HORIZON, HORIZON)
-    )
+    assert starts(short).tolist() == list(range(LEAD, steps - HORIZON))
+    unseen = starts(lacking(short, BASE)).tolist()
+    assert unseen == list(range(0, steps - HORIZON, HORIZON))
 
 
-def test_a_trial_that_is_too_short_is_refused():
-    with pytest.raises(InputError, match=r"16 steps or more.* and the trial has 15: leave"):
-        observed_segments(QUADRUPED, trial(SimulatedRobot(QUADRUPED), 15))
-
-
-def test_a_trial_of_nothing_but_late_steps_is_refused(whole: Trial):
-    run = replace(whole.behaviour, late=np.arange(STEPS) > 0)
-
-    with pytest.raises(InputError, match=r"without late steps, .* the log has no such segment"):
-        observed_segments(QUADRUPED, replace(whole, behaviour=run))
-
-
-def test_a_trial_of_which_too_little_can_be_judged_is_refused(whole: Trial):
-    """All of it is seen at some time, and together after five steps only."""
-    blinking = lacking(whole, (*BASE, "base_orientation"), slice(6, None))
-
-    with pytest.raises(InputError, match=r"the log has no such segment: leave"):
-        observed_segments(QUADRUPED, blinking)
-
-
-def test_what_was_never_observed_is_named_by_its_column_where_only_some_was_not(whole: Trial):
-    run = lacking(whole, (*BASE, "base_angular_velocity")).behaviour
-    commands = run["commands"].copy()
+def test_a_trial_without_a_usable_segment_is_refused_by_what_it_lacks():
+    late = replace(WHOLE.behaviour, late=np.arange(STEPS) > 0)
+    # All of it is seen at some time, and together after five steps only.
+    blinking = lacking(WHOLE, (*BASE, "base_orientation"), slice(6, None))
+    numb = lacking(WHOLE, (*BASE, "base_angular_velocity"))
+    commands = numb.behaviour["commands"].copy()
     commands[:, 3] = np.nan
-    broken = replace(run, signals={**run.signals, "commands": commands})
-    name = run.names.motors[3]
+    mute = replace(numb.behaviour, signals={**numb.behaviour.signals, "commands": commands})
+    refused = {
+        "16 steps or more.* and the trial has 15: leave": trial(SimulatedRobot(QUADRUPED), 15),
+        "without late steps, .* the log has no such segment": replace(WHOLE, behaviour=late),
+        r"a\.mcap: .* the log has no such segment: leave": blinking,
+        f"never has base_angular_velocity, commands of {WHOLE.behaviour.names.motors[3]}": replace(
+            numb, behaviour=mute
+        ),
+    }
+    for message, tried in refused.items():
+        with pytest.raises(InputError, match=message):
+            observed_segments(QUADRUPED, tried)
 
-    with pytest.raises(InputError, match=f"never has base_angular_velocity, commands of {name}"):
-        observed_segments(QUADRUPED, replace(whole, behaviour=broken))
 
-
-@pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
-def test_a_hinge_without_an_encoder_is_unknown_and_the_others_are_used(
-    whole: Trial, lost: tuple[Signal, ...]
-):
-    run = lacking(whole, lost)
+@SEEN
+def test_a_hinge_without_an_encoder_is_unknown_and_the_others_are_used(lost: tuple[Signal, ...]):
+    run = lacking(WHOLE, lost)
     found = observed_segments(QUADRUPED, without_encoders(run, [3]))
-    complete = observed_segments(QUADRUPED, run)
 
     assert np.isnan(found.segments.states["joint_positions"][:, 3]).all()
-    assert set(np.diff(starts(found))) == {HORIZON}
+    assert set(np.diff(found.segments.starts)) == {HORIZON}
     assert found.valid.all()
-    assert set(found.observed) == set(complete.observed)
+    assert set(found.observed) == set(observed_segments(QUADRUPED, run).observed)
     for signal in ("joint_positions", "joint_velocities"):
-        assert found.compared(signal).all(axis=(0, 1)).tolist() == [k != 3 for k in range(8)]
+        assert found.compared[signal].all(axis=(0, 1)).tolist() == [k != 3 for k in range(8)]
 
 
-def test_an_encoder_that_was_lost_late_costs_only_the_segments_after(whole: Trial):
-    found = observed_segments(QUADRUPED, without_encoders(whole, [3], slice(100, None)))
+def test_an_encoder_that_was_lost_late_costs_only_the_segments_after():
+    found = observed_segments(QUADRUPED, without_encoders(WHOLE, [3], slice(100, None)))
 
-    assert starts(found).max() + HORIZON < 100
+    assert found.segments.starts.max() + HORIZON < 100
     assert all(np.isfinite(values).all() for values in found.segments.states.values())
 
 
