@@ -12,7 +12,7 @@ from mcap.writer import Writer
 
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.logs import read_log
-from selfmodel.logs.contents import read_contents
+from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.simulated import SimulatedRobot

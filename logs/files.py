@@ -17,6 +17,16 @@ def partial_path(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def taken(path: Path) -> InputError:
+    """Returns the error of a new file whose name is taken."""
+    return InputError(f"{path} exists, and is not overwritten: choose another name")
+
+
+def no_folder(path: Path) -> InputError:
+    """Returns the error of a new file whose folder does not exist."""
+    return InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+
+
 def refuse_existing(path: Path) -> None:
     """Checks that a file, or the unfinished log of its name, does not exist, before any work.
 
@@ -26,7 +36,7 @@ def refuse_existing(path: Path) -> None:
     names = (path, partial_path(path)) if path.suffix == ".mcap" else (path,)
     for existing in names:
         if os_path.lexists(existing):
-            raise InputError(f"{existing} exists, and is not overwritten: choose another name")
+            raise taken(existing)
 
 
 @contextmanager
@@ -41,11 +51,9 @@ def create_file(path: Path) -> Iterator[IO[bytes]]:
         with new_file(path) as file:
             yield file
     except FileExistsError:
-        raise InputError(f"{path} exists, and is not overwritten: choose another name") from None
+        raise taken(path) from None
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(
-            f"{path}: there is no folder {path.parent}: make it, or choose another"
-        ) from None
+        raise no_folder(path) from None
     except OSError as error:
         raise not_written(path, error) from error
 
@@ -72,17 +80,18 @@ def write_new(path: Path, data: bytes) -> Path:
     Raises:
         LogWriteError: Writing failed, and no file is left.
     """
-    for number in count(1):
-        name = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
+    names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    name = path
+    while True:
         try:
             with new_file(name) as file:
                 file.write(data)
         except FileExistsError:
-            continue
+            name = next(names)
         except OSError as error:
             raise not_written(path, error) from error
-        break
-    return name
+        else:
+            return name
 
 
 def publish(part: Path, path: Path) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.files import file_digest
-from selfmodel.logs.contents import Messages, read_contents
 from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
+from selfmodel.logs.log_file import Messages, read_contents
 from selfmodel.logs.reader import TrialLog, interpret, read_log
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
 from selfmodel.robot.mjcf.untrusted import checked_model
@@ -65,15 +65,12 @@ class Info:
 def read_info(path: Path) -> Info:
     """Returns the summary of a log, without the hidden faults of a simulated robot.
 
-    Args:
-        path: The log.
-
     Raises:
         LogError: The file is damaged, or not a trial log.
         InputError: The file does not exist.
     """
     contents = read_contents(path)
-    log = interpret(path, contents)
+    log = interpret(contents)
     behaviour = log.trial.behaviour
     return Info(
         log=log,
@@ -134,13 +131,9 @@ def verify(path: Path, expected: str = "") -> Verified:
         checked_model(log.mjcf, log.assets)
     except ValueError as error:
         raise SchemaMismatchError(path, str(error), good=GOOD) from error
-    return Verified(log, _loads(log), digest)
-
-
-def _loads(log: TrialLog) -> bool:
     try:
         from selfmodel.logs.robots import robot_of  # noqa: PLC0415  # it needs MuJoCo
     except ImportError:
-        return False
+        return Verified(log, model_loaded=False, digest=digest)
     robot_of(log)
-    return True
+    return Verified(log, model_loaded=True, digest=digest)

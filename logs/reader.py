@@ -1,4 +1,4 @@
-"""Strict reader of trial logs: every checksum, digest, count and name is verified."""
+"""Strict reader of trial logs: every checksum, digest, layout and name is verified."""
 
 import json
 from collections.abc import Mapping
@@ -7,26 +7,28 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, frozen
 from selfmodel.controllers.controller import Controller
-from selfmodel.controllers.playback import Playback, played_back
+from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.logs.contents import Contents, read_contents
 from selfmodel.logs.controllers import parse_controller
-from selfmodel.logs.decoding import Timing, read_behaviour, read_timing
 from selfmodel.logs.errors import (
     ANOTHER,
     IMPORT_IT,
     OTHER_VERSION,
     CorruptError,
     IncompleteError,
-    SchemaMismatchError,
     UnsupportedError,
     salvage_it,
 )
+from selfmodel.logs.log_file import Contents, Messages, read_contents
+from selfmodel.logs.messages import TIMING, Part, Topic, is_known, names_in, schema_text, topics
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FINISHED,
-    FORMATS,
+    FORMAT,
     GAP,
     HIDDEN,
     IMPORT,
@@ -37,19 +39,35 @@ from selfmodel.logs.records import (
     SETTINGS_FILE,
     SOFTWARE,
     STOPPED,
+    TIMED_FORMAT,
     TRIAL,
     TRUTH,
     Result,
     TrialRecord,
     parse_settings,
-    result_record,
+    record_of,
     sha256,
-    trial_record,
 )
-from selfmodel.logs.topics import is_known, schema_text
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS, Names
 from selfmodel.trials.trial import Trial, TrialPlan
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """Timing of a trial's steps; see ``selfmodel.trials.behaviour.StepTiming``.
+
+    Attributes:
+        elapsed: Time since the first step, ``(steps,)`` s; NaN if unknown.
+        late: Flags of late steps, ``(steps,)``; a step lost from a damaged log is late.
+        missing: Flags of steps without an observation, ``(steps,)``; a step lost from a damaged log
+            is missing.
+    """
+
+    elapsed: FloatArray
+    late: BoolArray
+    missing: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +106,9 @@ class TrialLog:
 def read_log(path: str | Path) -> TrialLog:
     """Returns the content of a log.
 
-    Verified are the checksums and counts of the file, the digests of its records, of the model and
-    of the controller, the layout and time of every message, the names, and the displacement. The
-    hidden faults of a simulated robot are not read.
+    Verified are the checksums of the file, the digests of its records, of the model and of the
+    controller, the layout and time of every message, the names, and the displacement. The hidden
+    faults of a simulated robot are not read.
 
     Example:
         >>> import selfmodel
@@ -105,52 +123,47 @@ def read_log(path: str | Path) -> TrialLog:
         LogError: A check failed.
         InputError: The file does not exist.
     """
-    path = Path(path)
-    return interpret(path, read_contents(path, (HIDDEN,)))
+    return interpret(read_contents(Path(path), (HIDDEN,)))
 
 
-def interpret(path: Path, contents: Contents) -> TrialLog:
+def interpret(contents: Contents) -> TrialLog:
     """Returns the trial log in the contents of a file.
-
-    Args:
-        path: The file, for errors and as the path of the trial.
-        contents: Contents of the file, with verified checksums.
 
     Raises:
         LogError: The contents do not fit the format of a trial log, or contradict each other.
     """
-    record = read_record(path, contents)
-    result = _result(path, contents, record)
-    _check_definitions(path, contents)
-    mjcf = read_attachment(path, contents, MODEL_FILE, record.model_sha256)
-    controller = read_controller(path, contents, record)
-    behaviour = read_behaviour(path, contents, record, result.steps, controller)
-    timing = read_timing(path, contents, record, result.steps)
+    record = read_record(contents)
+    result = _result(contents, record)
+    for topic, messages in contents.topics.items():
+        if is_known(messages.type) and messages.schema != schema_text(messages.type).encode():
+            what = f"on {topic}: its definition of {messages.type} is not that of selfmodel"
+            raise contents.error(what)
+    mjcf = _attachment(contents, MODEL_FILE, record.model_sha256)
+    controller = read_controller(contents, record)
+    behaviour = read_behaviour(contents, record, result.steps, controller)
+    timing = _timing(contents, record, result.steps)
     if timing is not None:
         behaviour = replace(behaviour, late=timing.late)
-    driver = controller or _playback(path, behaviour)
+    with contents.mismatch("it has no controller, and cannot be played back"):
+        driver = controller or played_back(behaviour.names.motors, behaviour["commands"])
     plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
-    trial = Trial(plan, record.robot, behaviour, str(path))
+    trial = Trial(plan, record.robot, behaviour, str(contents.path))
     # Compared as text: the displacement is NaN if the base was not observed.
     if repr(result.displacement) != repr(trial.displacement):
-        raise CorruptError(
-            path,
+        what = (
             f"the displacement is {result.displacement!r} m in its result, and "
-            f"{trial.displacement!r} m in its messages",
-            good=contents.good,
+            f"{trial.displacement!r} m in its messages"
         )
-    try:
-        settings = parse_settings(read_attachment(path, contents, SETTINGS_FILE))
+        raise contents.error(what, CorruptError)
+    with contents.mismatch("an attachment cannot be read"):
+        settings = parse_settings(_attachment(contents, SETTINGS_FILE))
         text = mjcf.decode()
-    except (ValueError, TypeError, RecursionError) as error:
-        raise SchemaMismatchError(
-            path, f"an attachment cannot be read: {error}", good=contents.good
-        ) from error
+    ours = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
     return TrialLog(
         trial=trial,
         mjcf=text,
         assets=MappingProxyType(
-            {name: data for name, data in contents.attachments.items() if name not in _OWN_FILES}
+            {name: data for name, data in contents.attachments.items() if name not in ours}
         ),
         root=record.root,
         control_timestep=record.control_timestep,
@@ -192,23 +205,14 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
     text = contents.metadata.get(HIDDEN, {}).get(GAP)
     if text is None:
         return None
-    try:
-        values: Any = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SchemaMismatchError(
-            path, f"its gap cannot be read: {error}", good=contents.good
-        ) from error
-    if not isinstance(values, dict):
-        raise SchemaMismatchError(
-            path, f"expected its gap as an object, got {type(values).__name__}", good=contents.good
-        )
-    return values
+    with contents.mismatch("its gap cannot be read"):
+        return dict(json.loads(text))
 
 
-_OWN_FILES = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
+# ---------------------------------------------------------------- records and attachments
 
 
-def read_record(path: Path, contents: Contents) -> TrialRecord:
+def read_record(contents: Contents) -> TrialRecord:
     """Returns the record ``selfmodel.trial``, which precedes the first step.
 
     Raises:
@@ -216,46 +220,41 @@ def read_record(path: Path, contents: Contents) -> TrialRecord:
     """
     texts = contents.metadata.get(TRIAL)
     if texts is None:
-        advice = f"{ANOTHER}; {IMPORT_IT}"
-        raise SchemaMismatchError(
-            path, f"it has no record {TRIAL}", good=contents.good, advice=advice
-        )
-    if texts.get("format") not in FORMATS:
-        what = f"expected format {' or '.join(FORMATS)}, got {texts.get('format')!r}"
-        raise UnsupportedError(path, what, advice=OTHER_VERSION)
-    try:
-        return trial_record(texts)
-    except ValueError as error:
-        raise SchemaMismatchError(
-            path, f"its record {TRIAL} is wrong: {error}", good=contents.good
-        ) from error
+        raise contents.error(f"it has no record {TRIAL}", advice=f"{ANOTHER}; {IMPORT_IT}")
+    if texts.get("format") not in (FORMAT, TIMED_FORMAT):
+        what = f"expected format {FORMAT} or {TIMED_FORMAT}, got {texts.get('format')!r}"
+        raise UnsupportedError(contents.path, what, advice=OTHER_VERSION)
+    with contents.mismatch(f"its record {TRIAL} is wrong"):
+        return record_of(TrialRecord, texts)
 
 
-def read_attachment(path: Path, contents: Contents, name: str, expected: str = "") -> bytes:
-    """Returns an attachment of a log.
+def _result(contents: Contents, record: TrialRecord) -> Result:
+    texts = contents.metadata.get(RESULT)
+    if texts is None:
+        what = f"it has no record {RESULT}, so the trial did not finish"
+        raise contents.error(what, IncompleteError, salvage_it(contents.path))
+    with contents.mismatch(f"its record {RESULT} is wrong"):
+        result = record_of(Result, texts)
+    if result.status not in (FINISHED, INTERRUPTED, STOPPED):
+        raise contents.error(f"the trial is {result.status!r}", UnsupportedError, OTHER_VERSION)
+    if result.steps > record.steps or (result.status == FINISHED and result.steps < record.steps):
+        what = f"the trial is {result.status!r} after {result.steps} of {record.steps} steps"
+        raise contents.error(what, IncompleteError)
+    return result
 
-    Args:
-        path: The log, for errors.
-        contents: Contents of the log.
-        name: Name of the attachment.
-        expected: SHA-256 of the attachment, if known.
 
-    Raises:
-        LogError: The attachment is missing, or its SHA-256 is wrong.
-    """
+def _attachment(contents: Contents, name: str, expected: str = "") -> bytes:
+    """Attachment of a log, whose SHA-256 is checked if it is known."""
     data = contents.attachments.get(name)
     if data is None:
-        raise SchemaMismatchError(path, f"it has no attachment {name}", good=contents.good)
+        raise contents.error(f"it has no attachment {name}")
     if expected and sha256(data) != expected:
-        raise CorruptError(
-            path,
-            f"{name} is not the file of the trial: its SHA-256 differs",
-            good=contents.good,
-        )
+        what = f"{name} is not the file of the trial: its SHA-256 differs"
+        raise contents.error(what, CorruptError)
     return data
 
 
-def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Controller | None:
+def read_controller(contents: Contents, record: TrialRecord) -> Controller | None:
     """Returns the controller of the robot; None if unknown.
 
     Raises:
@@ -263,52 +262,101 @@ def read_controller(path: Path, contents: Contents, record: TrialRecord) -> Cont
     """
     if not record.controller_sha256:
         return None
-    data = read_attachment(path, contents, CONTROLLER_FILE, record.controller_sha256)
+    data = _attachment(contents, CONTROLLER_FILE, record.controller_sha256)
     try:
         return parse_controller(data, CONTROLLER_FILE)
     except InputError as error:
-        raise SchemaMismatchError(path, str(error), good=contents.good) from error
+        raise contents.error(str(error)) from error
 
 
-def _check_definitions(path: Path, contents: Contents) -> None:
-    for topic, messages in contents.topics.items():
-        if is_known(messages.type) and messages.schema != schema_text(messages.type).encode():
-            what = f"on {topic}: its definition of {messages.type} is not that of selfmodel"
-            raise SchemaMismatchError(path, what, good=contents.good)
+# ---------------------------------------------------------------- messages
 
 
-def _result(path: Path, contents: Contents, record: TrialRecord) -> Result:
-    texts = contents.metadata.get(RESULT)
-    if texts is None:
-        raise IncompleteError(
-            path,
-            f"it has no record {RESULT}, so the trial did not finish",
-            good=contents.good,
-            advice=salvage_it(path),
+def read_behaviour(
+    contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
+) -> Behaviour:
+    """Returns the behaviour in the messages of a log.
+
+    Args:
+        contents: Contents of the log.
+        record: Record of the trial.
+        steps: Number of steps in the log's result.
+        controller: Controller of the robot, if known; the messages must have its names.
+
+    Raises:
+        LogError: The messages do not fit the record, the controller or their types.
+    """
+    names = read_names(contents)
+    ends = controller.design if controller else names
+    if (names.sensors, names.motors) != (ends.sensors, ends.motors):
+        raise contents.error(
+            f"its controller is for the sensors {ends.sensors} and motors {ends.motors}, "
+            f"its messages have {names.sensors} and {names.motors}"
         )
-    try:
-        result = result_record(texts)
-    except ValueError as error:
-        raise SchemaMismatchError(
-            path, f"its record {RESULT} is wrong: {error}", good=contents.good
-        ) from error
-    if result.status not in (FINISHED, INTERRUPTED, STOPPED):
-        raise UnsupportedError(
-            path, f"the trial is {result.status!r}", good=contents.good, advice=OTHER_VERSION
-        )
-    if result.steps > record.steps or (result.status == FINISHED and result.steps < record.steps):
-        raise IncompleteError(
-            path,
-            f"the trial is {result.status!r} after {result.steps} of {record.steps} steps",
-            good=contents.good,
-        )
-    return result
+    parts: dict[Part, FloatArray] = {}
+    for topic in topics(names, record.root):
+        parts |= _rows(contents, topic, record, steps)
+    time = np.arange(steps, dtype=np.float64) * record.control_timestep
+    return Behaviour(names, frozen(time), {signal: frozen(parts[signal]) for signal in SIGNALS})
 
 
-def _playback(path: Path, behaviour: Behaviour) -> Playback:
-    try:
-        return played_back(behaviour.names.motors, behaviour["commands"])
-    except ValueError as error:
-        raise SchemaMismatchError(
-            path, f"it has no controller, and cannot be played back: {error}"
-        ) from error
+def read_names(contents: Contents) -> Names:
+    """Returns the column names of the signals, from the first message of each topic.
+
+    Raises:
+        LogError: A topic has no message, or the message has no names.
+    """
+
+    def names(topic: str) -> tuple[str, ...]:
+        payload = _messages(contents, topic).payloads[0]
+        with contents.mismatch(f"on {topic}"):
+            return names_in(payload)
+
+    return Names(
+        sensors=names("/sensors"), motors=names("/joint_commands"), hinges=names("/joint_states")
+    )
+
+
+def _messages(contents: Contents, topic: str) -> Messages:
+    messages = contents.topics.get(topic)
+    if messages is None or not messages.payloads:
+        raise contents.error(f"it has no messages on {topic}")
+    return messages
+
+
+def _rows(
+    contents: Contents, topic: Topic, record: TrialRecord, steps: int
+) -> dict[Part, FloatArray]:
+    """Numbers in the messages of a topic, one at each step, ``(steps, width)`` per part."""
+    messages = _messages(contents, topic.name)
+    if (messages.type, messages.encoding) != (topic.type, "cdr"):
+        raise contents.error(
+            f"expected {topic.type} in cdr on {topic.name}, "
+            f"got {messages.type!r} in {messages.encoding!r}"
+        )
+    if len(messages.payloads) != steps:
+        what = f"{len(messages.payloads)} messages on {topic.name} for {steps} steps"
+        raise contents.error(what, CorruptError)
+    with contents.mismatch(f"on {topic.name}"):
+        stamps, values = topic.template.decode(messages.payloads)
+    expected = np.rint(np.arange(steps, dtype=np.float64) * record.control_timestep * 1e9)
+    times = np.array(messages.times, dtype=np.float64)  # exact for the first hundred days
+    if np.any(stamps != expected) or np.any(times != expected[:, np.newaxis]):
+        what = f"the times on {topic.name} are not the multiples of the control time step"
+        raise contents.error(what)
+    return topic.unpack(values)
+
+
+def _timing(contents: Contents, record: TrialRecord, steps: int) -> Timing | None:
+    """Measured timing of the steps; None for a robot without its own clock."""
+    if record.format != TIMED_FORMAT:
+        return None
+    rows = _rows(contents, TIMING, record, steps)["timing"]
+    elapsed, marks = rows[:, 0], rows[:, 1:]
+    known = elapsed[~np.isnan(elapsed)]
+    if not np.all(np.isfinite(known)) or np.any(np.diff(known) < 0):
+        raise contents.error(f"on {TIMING.name}: expected seconds that never go back")
+    if not np.all(np.isin(marks, (0.0, 1.0)) | np.isnan(marks)):
+        raise contents.error(f"on {TIMING.name}: expected 0 or 1 for late and for missing")
+    # NaN, unknown, counts as late and missing: such steps are not compared with predictions.
+    return Timing(frozen(elapsed), marks[:, 0] != 0, marks[:, 1] != 0)

@@ -7,19 +7,20 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
 
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import STAGES, Stage, checked_seed, stage_of
+from selfmodel.trials.trial import MAX_SEED, Stage
 
 FORMAT = "1"
 """Version of the format of a log; a reader refuses unknown versions."""
 
 TIMED_FORMAT = "2"
 """Version of the format of a robot with its own clock: the same with ``/timing``."""
-
-FORMATS = (FORMAT, TIMED_FORMAT)
 
 TRIAL = "selfmodel.trial"
 SOFTWARE = "selfmodel.software"
@@ -58,17 +59,13 @@ FINISHED = "finished"
 INTERRUPTED = "interrupted"
 STOPPED = "stopped"
 
-MIN_CONTROL_TIMESTEP, MAX_CONTROL_TIMESTEP = 1e-9, 3600.0
-"""Bounds of the control time step, s: the time stamps of a log are in nanoseconds, and bounded."""
-
 MAX_TEXT = 1000
 """Maximum length of a text in a record, characters."""
 
-_NAME = re.compile(r"[A-Za-z0-9-]{1,100}")
+Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 
 
-@dataclass(frozen=True)
-class TrialRecord:
+class TrialRecord(Struct, frozen=True):
     """Record ``selfmodel.trial``, written before the trial starts.
 
     Attributes:
@@ -77,35 +74,28 @@ class TrialRecord:
         stage: Stage of the recovery.
         robot: Name of the robot.
         root: Name of the root body, whose motion is on ``/odom``.
-        control_timestep: Control time step, s; step k is at k times this value.
+        control_timestep: Control time step, s; step k is at k times this value. Time stamps are in
+            nanoseconds, and bounded.
         steps: Planned number of control steps.
-        seed: Seed of all random choices, from 0 to ``trial.MAX_SEED``.
+        seed: Seed of all random choices.
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
             commands are known.
         model_sha256: SHA-256 of the attached model.
     """
 
-    format: str
-    name: str
+    format: Text
+    name: Text
     stage: Stage
-    robot: str
-    root: str
-    control_timestep: float
+    robot: Text
+    root: Text
+    control_timestep: Annotated[float, Meta(ge=1e-9, le=3600.0)]
     steps: int
-    seed: int
-    controller_sha256: str
-    model_sha256: str
-
-    def texts(self) -> dict[str, str]:
-        """Returns the record as texts, the form of MCAP metadata."""
-        return {
-            name: value if isinstance(value, str) else repr(value)
-            for name, value in dataclasses.asdict(self).items()
-        }
+    seed: Annotated[int, Meta(ge=0, le=MAX_SEED)]
+    controller_sha256: Text
+    model_sha256: Text
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(Struct, frozen=True, omit_defaults=True):
     """Record ``selfmodel.result``, written last.
 
     Attributes:
@@ -118,16 +108,27 @@ class Result:
     status: str
     steps: int
     displacement: float
-    reason: str = ""
+    reason: Text = ""
 
-    def texts(self) -> dict[str, str]:
-        """Returns the record as texts, the form of MCAP metadata."""
-        return {
-            "status": self.status,
-            "steps": str(self.steps),
-            "displacement": repr(self.displacement),
-            **({"reason": self.reason[:MAX_TEXT]} if self.reason else {}),
-        }
+
+Record = TypeVar("Record", TrialRecord, Result)
+
+
+def texts_of(record: Struct) -> dict[str, str]:
+    """Returns a record as texts, the form of MCAP metadata."""
+    return {
+        name: value if isinstance(value, str) else repr(value)
+        for name, value in msgspec.to_builtins(record).items()
+    }
+
+
+def record_of(kind: type[Record], texts: Mapping[str, str]) -> Record:
+    """Returns the record in texts; the inverse of ``texts_of``.
+
+    Raises:
+        ValueError: A field is missing or invalid; the message names the field.
+    """
+    return msgspec.convert(texts, kind, strict=False)
 
 
 @dataclass(frozen=True)
@@ -162,57 +163,6 @@ class TrialHeader:
     imported: Imported | None = None
 
 
-def trial_record(texts: Mapping[str, str]) -> TrialRecord:
-    """Returns the trial record of a log.
-
-    Raises:
-        ValueError: A field is missing or invalid; the message names the field.
-    """
-    fields = [field.name for field in dataclasses.fields(TrialRecord)]
-    missing = [name for name in fields if name not in texts]
-    if missing:
-        raise ValueError(f"it lacks {', '.join(missing)}")
-    stage = stage_of(texts["stage"])
-    if stage is None:
-        raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {texts['stage']!r}")
-    long = [name for name in fields if len(texts.get(name, "")) > MAX_TEXT]
-    if long:
-        raise ValueError(f"expected at most {MAX_TEXT} characters in {', '.join(long)}")
-    timestep = float(texts["control_timestep"])
-    if not MIN_CONTROL_TIMESTEP <= timestep <= MAX_CONTROL_TIMESTEP:
-        raise ValueError(
-            f"control_timestep must be above 0 s, from {MIN_CONTROL_TIMESTEP} to "
-            f"{MAX_CONTROL_TIMESTEP}, got {texts['control_timestep']!r}"
-        )
-    return TrialRecord(
-        format=texts["format"],
-        name=texts["name"],
-        stage=stage,
-        robot=texts["robot"],
-        root=texts["root"],
-        control_timestep=timestep,
-        steps=int(texts["steps"]),
-        seed=checked_seed(int(texts["seed"])),
-        controller_sha256=texts["controller_sha256"],
-        model_sha256=texts["model_sha256"],
-    )
-
-
-def result_record(texts: Mapping[str, str]) -> Result:
-    """Returns the result record of a log.
-
-    Raises:
-        ValueError: A field is missing or invalid.
-    """
-    missing = [name for name in ("status", "steps", "displacement") if name not in texts]
-    if missing:
-        raise ValueError(f"it lacks {', '.join(missing)}")
-    reason = texts.get("reason", "")
-    if len(reason) > MAX_TEXT:
-        raise ValueError(f"expected at most {MAX_TEXT} characters in reason")
-    return Result(texts["status"], int(texts["steps"]), float(texts["displacement"]), reason)
-
-
 def settings_json(settings: Settings) -> bytes:
     """Returns settings as JSON."""
     return json.dumps(dataclasses.asdict(settings), indent=1).encode()
@@ -222,24 +172,17 @@ def parse_settings(data: bytes) -> Settings:
     """Returns the settings of a log; a missing setting has its default.
 
     Raises:
-        ValueError: The data are not JSON, or a name or a value is invalid.
-        TypeError: The data are no JSON object, or a value is no number.
+        ValueError: The data are no JSON object, or a name or a value is invalid.
     """
-    values: Any = json.loads(data)
-    if not isinstance(values, dict):
-        raise TypeError(f"expected an object, got {type(values).__name__}")
-    defaults = dataclasses.asdict(Settings())
-    for name, value in values.items():
-        if name not in defaults:
-            raise ValueError(f"there is no setting {name!r}")
-        if type(value) not in (int, type(defaults[name])):
-            raise TypeError(f"{name} must be a number such as {defaults[name]}, got {value!r}")
-    return Settings(**values)
+    values = msgspec.json.decode(data, type=dict[str, float | int])
+    if unknown := values.keys() - {field.name for field in dataclasses.fields(Settings)}:
+        raise ValueError(f"there is no setting {min(unknown)!r}")
+    return msgspec.convert(values, Settings)
 
 
 def with_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
     """Returns a record with its digest: MCAP has no checksum of a single record."""
-    return {**texts, DIGEST: _digest(name, texts)}
+    return {**texts, DIGEST: sha256(json.dumps([name, sorted(texts.items())]).encode())}
 
 
 def without_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
@@ -249,13 +192,9 @@ def without_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
         ValueError: The digest is missing or wrong.
     """
     bare = {key: text for key, text in texts.items() if key != DIGEST}
-    if texts.get(DIGEST) != _digest(name, bare):
+    if texts != with_digest(name, bare):
         raise ValueError(f"the digest of the record {name} is missing or wrong")
     return bare
-
-
-def _digest(name: str, texts: Mapping[str, str]) -> str:
-    return sha256(json.dumps([name, sorted(texts.items())]).encode())
 
 
 def sha256(data: bytes) -> str:
@@ -269,7 +208,7 @@ def checked_name(name: str) -> str:
     Raises:
         InputError: The name has other characters than letters, digits and ``-``.
     """
-    if not _NAME.fullmatch(name):
+    if not re.fullmatch(r"[A-Za-z0-9-]{1,100}", name):
         raise InputError(
             f"a trial's name names its file: expected 1 to 100 letters, digits and '-', "
             f"got {name!r}"

@@ -7,12 +7,18 @@ from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, file_digest
-from selfmodel.logs.contents import Contents, Messages, read_undamaged
-from selfmodel.logs.decoding import read_behaviour, read_names
 from selfmodel.logs.errors import CorruptError, LogError
 from selfmodel.logs.files import refuse_existing
-from selfmodel.logs.log_file import LogFile
-from selfmodel.logs.reader import interpret, read_controller, read_log, read_record
+from selfmodel.logs.log_file import Contents, LogFile, read_undamaged
+from selfmodel.logs.messages import DESCRIPTION, TRANSFORMS, topics
+from selfmodel.logs.reader import (
+    interpret,
+    read_behaviour,
+    read_controller,
+    read_log,
+    read_names,
+    read_record,
+)
 from selfmodel.logs.records import (
     INTERRUPTED,
     OWN,
@@ -22,8 +28,8 @@ from selfmodel.logs.records import (
     TRIAL,
     Result,
     TrialRecord,
+    texts_of,
 )
-from selfmodel.logs.topics import DESCRIPTION, TIMING, TRANSFORMS, topics
 from selfmodel.trials.behaviour import forward_displacement
 
 _SEALED = "selfmodel.manifest"
@@ -60,17 +66,19 @@ def salvage(path: Path, out: Path) -> Salvaged:
         LogWriteError: The disk is full, or failed.
     """
     refuse_existing(out)
-    _refuse_sound(path)
-    contents, result, saved = _saved(path)
-    _write(out, contents, result)
-    return dataclasses.replace(saved, log=str(out))
+    try:
+        status = read_log(path).status
+    except LogError:
+        contents, result, saved = _saved(path)
+        _write(out, contents, result)
+        return dataclasses.replace(saved, log=str(out))
+    raise InputError(
+        f"{path} is valid, and the trial in it is {status}: there is nothing to salvage"
+    )
 
 
 def salvageable_steps(path: Path) -> int:
-    """Returns the number of steps that ``salvage`` would write.
-
-    Args:
-        path: The log; it is only read.
+    """Returns the number of steps that ``salvage`` would write, of a log that is only read.
 
     Raises:
         InputError: The file does not exist.
@@ -81,78 +89,60 @@ def salvageable_steps(path: Path) -> int:
         return 0
 
 
-def _refuse_sound(path: Path) -> None:
-    try:
-        status = read_log(path).status
-    except LogError:
-        return
-    raise InputError(
-        f"{path} is valid, and the trial in it is {status}: there is nothing to salvage"
-    )
-
-
 def _saved(path: Path) -> tuple[Contents, Result, Salvaged]:
     """Contents and result of the new log, checked as a reader would check them."""
     contents, damage = read_undamaged(path)
     reason = damage.what if damage else "the trial did not finish"
-    record = read_record(path, contents)
-    controller = read_controller(path, contents, record)
-    steps = _cut(path, contents, record, reason)
-    behaviour = read_behaviour(path, contents, record, steps, controller)
+    record = read_record(contents)
+    controller = read_controller(contents, record)
+    steps = _cut(contents, record, reason)
+    behaviour = read_behaviour(contents, record, steps, controller)
     result = Result(INTERRUPTED, steps, float(forward_displacement(behaviour)))
     contents.metadata = {
         name: texts
         for name, texts in contents.metadata.items()
         if name.startswith(OWN) and name != _SEALED
     } | {
-        TRIAL: record.texts(),
-        RESULT: result.texts(),
+        TRIAL: texts_of(record),
+        RESULT: texts_of(result),
         SALVAGE: {
             "source": encodable(path.name),
             "source_sha256": file_digest(path),
             "complete_steps": str(steps),
         },
     }
-    interpret(path, contents)
+    interpret(contents)
     return contents, result, Salvaged("", steps, record.steps, reason)
 
 
-def _cut(path: Path, contents: Contents, record: TrialRecord, reason: str) -> int:
-    """Removes what is not of the complete first steps, and returns their number.
-
-    Raises:
-        CorruptError: Not one step is complete.
-    """
-    nothing = CorruptError(path, f"nothing can be salvaged before its first damage: {reason}")
+def _cut(contents: Contents, record: TrialRecord, reason: str) -> int:
+    """Removes what is not of the complete first steps, and returns their number."""
+    what = f"nothing can be salvaged before its first damage: {reason}"
+    nothing = CorruptError(contents.path, what)
     try:
-        every = topics(read_names(path, contents), record.root)
+        names = read_names(contents)
     except LogError as error:
         raise nothing from error
-    names = [topic.name for topic in (*every, *([TIMING] if record.format == TIMED_FORMAT else []))]
-    held = [contents.topics.get(name) for name in names]
-    steps = min(0 if messages is None else _first_steps(messages, record) for messages in held)
+    every = topics(names, record.root, timed=record.format == TIMED_FORMAT)
+
+    def time_of(step: int) -> int:
+        return round(step * record.control_timestep * 1e9)
+
+    def first_steps(topic: str) -> int:
+        """Number of messages before the first one that is missing."""
+        times = contents.topics[topic].times if topic in contents.topics else []
+        missing = (k for k, (time, _) in enumerate(times) if time != time_of(k))
+        return next(missing, len(times))
+
+    steps = min(first_steps(topic.name) for topic in every)
     if not steps:
         raise nothing
-    end = _time_of(steps, record)
-    for name, messages in list(contents.topics.items()):
-        if name not in (*names, TRANSFORMS, DESCRIPTION):
-            del contents.topics[name]
-            continue
-        kept = sum(time < end for time, _ in messages.times)
-        del messages.payloads[kept:], messages.times[kept:]
+    kept = {*(topic.name for topic in every), TRANSFORMS, DESCRIPTION}
+    contents.topics = {name: held for name, held in contents.topics.items() if name in kept}
+    for messages in contents.topics.values():
+        count = sum(time < time_of(steps) for time, _ in messages.times)
+        del messages.payloads[count:], messages.times[count:]
     return steps
-
-
-def _first_steps(messages: Messages, record: TrialRecord) -> int:
-    """Number of messages before the first one that is missing."""
-    for k, (time, _) in enumerate(messages.times):
-        if time != _time_of(k, record):
-            return k
-    return len(messages.times)
-
-
-def _time_of(step: int, record: TrialRecord) -> int:
-    return round(step * record.control_timestep * 1e9)
 
 
 def _write(out: Path, contents: Contents, result: Result) -> None:

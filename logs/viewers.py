@@ -7,15 +7,15 @@ left out; a capsule becomes a cylinder of its length.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.logs.topics import WORLD
-from selfmodel.robot.motion import Shape, body_poses, shapes_of
+from selfmodel.logs.messages import WORLD, Part
+from selfmodel.robot.motion import POSE, Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer
 from selfmodel.trials.rotation import product, rotated
@@ -24,8 +24,6 @@ _JOINTS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",
     int(mujoco.mjtJoint.mjJNT_SLIDE): "prismatic",
 }
-
-_POSITION_XYZW = [0, 1, 2, 4, 5, 6, 3]
 
 
 def urdf(robot: Robot) -> str:
@@ -173,35 +171,31 @@ class Kinematics:
         fields = {"qpos": self._qpos, "qvel": np.zeros((1, robot.model.nv))}
         self._write = state_writer(robot, fields.__getitem__)
 
-    def transforms(
-        self, joint_positions: FloatArray, position: FloatArray, orientation: FloatArray
-    ) -> FloatArray:
+    def transforms(self, rows: Mapping[Part, FloatArray]) -> FloatArray:
         """Returns the pose of each body in the frame of its parent.
 
         Args:
-            joint_positions: Joint angles, ``(steps, hinges)`` rad.
-            position: Position of the root body, ``(steps, 3)`` m.
-            orientation: Quaternion of the root body, ``(steps, 4)``, w x y z.
+            rows: The signals of ``POSE``, ``(steps, width)`` each.
 
         Returns:
             Position x y z in metres and quaternion x y z w of each body, ``(steps, 7 bodies)``,
             rounded by ``to_micrometres``.
         """
-        qpos = np.empty((len(position), self._model.nq))
-        for k in range(len(position)):
-            self._write(
-                {
-                    "joint_positions": joint_positions[k : k + 1],
-                    "base_position": position[k : k + 1],
-                    "base_orientation": orientation[k : k + 1],
-                }
-            )
-            qpos[k] = self._qpos[0]
+        qpos = np.empty((len(rows["base_position"]), self._model.nq))
+        for k, row in enumerate(qpos):
+            self._write({signal: rows[signal][k : k + 1] for signal in POSE})
+            row[:] = self._qpos[0]
         poses = body_poses(self._model, qpos)
-        parents = self._model.body_parentid[1:]
+        parents, children = poses[:, self._model.body_parentid[1:]], poses[:, 1:]
         with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
-            relative = _relative(poses[:, parents], poses[:, 1:])[..., _POSITION_XYZW]
-        return to_micrometres(relative).reshape(len(position), 7 * len(parents))
+            moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
+            turned = product(parents[..., 3:] * _INVERSE, children[..., 3:])
+        relative = np.concatenate([moved, turned[..., _XYZW]], axis=-1)
+        return to_micrometres(relative).reshape(len(qpos), 7 * (self._model.nbody - 1))
+
+
+_INVERSE = (1.0, -1.0, -1.0, -1.0)
+_XYZW = (1, 2, 3, 0)
 
 
 def to_micrometres(values: FloatArray) -> FloatArray:
@@ -223,14 +217,5 @@ def to_body_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
         orientation: Quaternion of the body, ``(..., 4)``, w x y z.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        scalar, axis = orientation[..., :1], -orientation[..., 1:]
-        twice = 2 * np.cross(axis, velocity)
-        rotated: FloatArray = velocity + scalar * twice + np.cross(axis, twice)
-    return rotated
-
-
-def _relative(parents: FloatArray, children: FloatArray) -> FloatArray:
-    """Poses of children in the frames of their parents, ``(..., 7)`` each, w x y z last."""
-    back = parents[..., 3:] * (1.0, -1.0, -1.0, -1.0)
-    moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
-    return np.concatenate([moved, product(back, children[..., 3:])], axis=-1)
+        inverse = np.concatenate([orientation[..., :1], -orientation[..., 1:]], axis=-1)
+        return rotated(velocity, inverse)

@@ -1,9 +1,11 @@
 """Writer of a trial's log, while the trial runs: a kill loses at most the last steps."""
 
+import dataclasses
 import itertools
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,14 +14,22 @@ import mcap
 import mujoco
 import numpy as np
 
-from selfmodel.controllers.controller import CommandSource
+from selfmodel.arrays import FloatArray
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.controllers import controller_bytes
-from selfmodel.logs.encoder import Encoder, empty_rows, sample_rows
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import partial_path
-from selfmodel.logs.log_file import LogFile
+from selfmodel.logs.log_file import LogFile, Row
+from selfmodel.logs.messages import (
+    DESCRIPTION,
+    DESCRIPTION_TYPE,
+    Part,
+    description,
+    frames_stride,
+    topics,
+    transforms,
+)
 from selfmodel.logs.records import (
     CONTROLLER_FILE,
     FINISHED,
@@ -28,6 +38,7 @@ from selfmodel.logs.records import (
     HIDDEN,
     IMPORT,
     MAPPING_FILE,
+    MAX_TEXT,
     MODEL_FILE,
     SETTINGS_FILE,
     SOFTWARE,
@@ -41,9 +52,16 @@ from selfmodel.logs.records import (
     checked_name,
     settings_json,
     sha256,
+    texts_of,
 )
-from selfmodel.logs.topics import DESCRIPTION, DESCRIPTION_TYPE, description
-from selfmodel.logs.viewers import urdf
+from selfmodel.logs.viewers import (
+    Kinematics,
+    body_names,
+    parent_names,
+    to_body_frame,
+    to_micrometres,
+    urdf,
+)
 from selfmodel.physical.safety import cleanup
 from selfmodel.physical.stop_signals import (
     handle_stop_signals,
@@ -52,7 +70,7 @@ from selfmodel.physical.stop_signals import (
 )
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.signals import Names
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from selfmodel.version import __version__
 
@@ -95,14 +113,12 @@ def write_trial(
         TrialWriter(path, robot, plan, header) as writer,
         cleanup(getattr(samples, "close", lambda: None)),
     ):
-        while (sample := _next(iterator)) is not None:
+        while True:
+            with release_stop_signals():
+                sample = next(iterator, None)
+            if sample is None:
+                return path
             writer.add(sample)
-    return path
-
-
-def _next(samples: Iterator[Sample]) -> Sample | None:
-    with release_stop_signals():
-        return next(samples, None)
 
 
 class TrialWriter:
@@ -126,15 +142,31 @@ class TrialWriter:
 
     def __init__(self, path: Path, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
         checked_name(plan.name)
-        names = robot.anatomy.names
-        _check_ends(robot.name, names, plan.controller)
+        names, driver = robot.anatomy.names, plan.controller
+        ends = (
+            (names.sensors, driver.motors)
+            if isinstance(driver, Playback)
+            else (driver.design.sensors, driver.design.motors)
+        )
+        if ends != (names.sensors, names.motors):
+            raise InputError(
+                f"expected a controller for {robot.name}, with the sensors {names.sensors} and "
+                f"motors {names.motors}, got one for {ends[0]} and {ends[1]}"
+            )
         if plan.steps < 1:
             raise InputError(f"a trial has at least 1 step, got {plan.steps}")
         self.path = path
         self.steps = 0
         self._robot, self._plan, self._header = robot, plan, header
-        self._encoder = Encoder(robot, timed=header.timed)
-        self._rows = empty_rows(names, FLUSH_STEPS, timed=header.timed)
+        self._topics = (
+            *topics(names, robot.root, timed=header.timed),
+            transforms(body_names(robot.model), parent_names(robot.model)),
+        )
+        widths: dict[Part, int] = {signal: names.width(signal) for signal in SIGNALS}
+        if header.timed:
+            widths["timing"] = 3
+        self._kinematics = Kinematics(robot)
+        self._rows = {part: np.empty((FLUSH_STEPS, width)) for part, width in widths.items()}
         self._written = 0
         self._start = self._end = 0.0
         self._sound = False
@@ -144,9 +176,7 @@ class TrialWriter:
         with ExitStack() as undo:
             undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
             _write_preamble(self._log, self._robot, self._plan, self._header)
-            self._channels = [
-                self._log.channel(topic.name, topic.type) for topic in self._encoder.topics
-            ]
+            self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
             self._log.sync()  # the disk has the preamble before the robot moves
             undo.pop_all()
         self._sound = True
@@ -172,7 +202,9 @@ class TrialWriter:
                 f"the sample of step {self.steps} has {has} moment, but timed is {given} in the "
                 f"header: a trial is timed if its robot has a clock of its own"
             )
-        sampled = sample_rows(sample)
+        sampled = dict[Part, FloatArray](sample.values.items())
+        if sample.moment is not None:
+            sampled["timing"] = np.array(dataclasses.astuple(sample.moment), dtype=np.float64)
         for part, rows in self._rows.items():
             row = sampled.get(part)
             if row is None or row.shape != rows.shape[1:]:
@@ -201,7 +233,9 @@ class TrialWriter:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
                 self._finish(FINISHED)
-            elif error is not None and self._is_stopped_trial(error):
+            elif self._sound and (
+                isinstance(error, TrialError) or (error is not None and self._header.timed)
+            ):
                 if self.steps:
                     self._finish(STOPPED, _stop_reason(error))
                 else:
@@ -220,25 +254,45 @@ class TrialWriter:
                 advice=salvage_it(partial_path(self.path)),
             )
 
-    def _is_stopped_trial(self, error: BaseException) -> bool:
-        """Whether the log of a trial that ended by an error is finished as it is."""
-        return self._sound and (self._header.timed or isinstance(error, TrialError))
-
     def _flush(self) -> None:
         """Writes the buffered steps, and flushes them to the operating system."""
         count = self.steps - self._written
         if not count:
             return
         self._sound = False
-        rows = {part: rows[:count] for part, rows in self._rows.items()}
-        self._log.messages(self._channels, self._encoder.encode(self._written, rows))
+        self._log.messages(
+            self._channels, self._encoded({part: rows[:count] for part, rows in self._rows.items()})
+        )
         self._log.flush()
         self._written = self.steps
         self._sound = True
 
+    def _encoded(self, rows: Mapping[Part, FloatArray]) -> list[Row]:
+        """Messages of the steps in some rows, in order; the last topic is not in every step."""
+        steps = np.arange(self._written, self.steps)
+        stamps = np.rint(steps * self._robot.control_timestep * 1e9).astype(np.int64)
+        stride = frames_stride(self._robot.control_timestep)
+        drawn = slice(-self._written % stride, None, stride)
+        parts: dict[Part, FloatArray] = {
+            **rows,
+            "child_linear_velocity": to_micrometres(
+                to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
+            ),
+            "transforms": self._kinematics.transforms({k: v[drawn] for k, v in rows.items()}),
+        }
+        messages: list[Row] = []
+        for index, topic in enumerate(self._topics):
+            chosen = drawn if index == len(self._topics) - 1 else slice(None)
+            times = stamps[chosen]
+            payloads = topic.template.encode(times, topic.pack(parts))
+            messages += zip(
+                steps[chosen].tolist(), itertools.repeat(index), times.tolist(), payloads
+            )
+        messages.sort(key=itemgetter(0, 1))
+        return messages
+
     def _finish(self, status: str, reason: str = "") -> None:
-        result = Result(status, self.steps, self._end - self._start, reason)
-        self._log.finish(result)
+        self._log.finish(Result(status, self.steps, self._end - self._start, reason[:MAX_TEXT]))
 
 
 def _stop_reason(error: BaseException) -> str:
@@ -247,30 +301,8 @@ def _stop_reason(error: BaseException) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def _check_ends(robot: str, names: Names, driver: CommandSource) -> None:
-    if isinstance(driver, Playback):
-        sensors, motors = names.sensors, driver.motors
-    else:
-        sensors, motors = driver.design.sensors, driver.design.motors
-    if (sensors, motors) != (names.sensors, names.motors):
-        raise InputError(
-            f"expected a controller for {robot}, with the sensors {names.sensors} and motors "
-            f"{names.motors}, got one for {sensors} and {motors}"
-        )
-
-
 def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
-    """Writes the records, attachments and robot description that precede the first step.
-
-    Args:
-        log: File to write to.
-        robot: Robot as its model describes it.
-        plan: Plan of the trial.
-        header: Other content of the preamble.
-
-    Raises:
-        LogWriteError: The disk is full, or failed.
-    """
+    """Writes the records, attachments and robot description that precede the first step."""
     driver = plan.controller
     controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
@@ -286,8 +318,17 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         controller_sha256=sha256(controller) if controller else "",
         model_sha256=sha256(model),
     )
-    log.metadata(TRIAL, record.texts())
-    log.metadata(SOFTWARE, _software())
+    log.metadata(TRIAL, texts_of(record))
+    log.metadata(
+        SOFTWARE,
+        {
+            "selfmodel": __version__,
+            "mujoco": mujoco.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+            "mcap": mcap.__version__,
+        },
+    )
     truths = {TRUTH: header.hidden, GAP: header.gap}
     if known := {name: text for name, text in truths.items() if text is not None}:
         log.metadata(HIDDEN, known)
@@ -302,13 +343,3 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         log.attach(MAPPING_FILE, header.imported.mapping.encode())
     channel = log.channel(DESCRIPTION, DESCRIPTION_TYPE)
     log.messages([channel], [(0, 0, 0, description(urdf(robot)))])
-
-
-def _software() -> dict[str, str]:
-    return {
-        "selfmodel": __version__,
-        "mujoco": mujoco.__version__,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-        "mcap": mcap.__version__,
-    }

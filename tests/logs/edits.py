@@ -4,10 +4,10 @@ import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import Writer
 
-from selfmodel.logs.contents import chunk_records, verified_records
+from selfmodel.logs.log_file import verified_records
 from selfmodel.logs.records import TRIAL, sha256, with_digest, without_digest
 
 Change = Callable[[McapRecord], McapRecord | None]
@@ -15,11 +15,7 @@ Change = Callable[[McapRecord], McapRecord | None]
 
 def records_of(data: bytes) -> list[McapRecord]:
     """Returns the records of a log, those of its chunks in their place."""
-    return [
-        part
-        for record in verified_records(data)
-        for part in (chunk_records(record) if isinstance(record, Chunk) else [record])
-    ]
+    return list(verified_records(data))
 
 
 def rewritten(path: Path, change: Change, *, more: Sequence[McapRecord] = ()) -> None:

@@ -12,9 +12,9 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError, LogWriteError, TruncatedError, log_file, read_log
-from selfmodel.logs.contents import read_undamaged
+from selfmodel.logs.log_file import read_undamaged
+from selfmodel.logs.messages import topics
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.topics import topics
 from selfmodel.logs.writer import FLUSH_STEPS, write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -10,10 +10,10 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, SchemaMismatchError, UnsupportedError, log_file, read_log
-from selfmodel.logs.contents import read_contents
+from selfmodel.logs.log_file import read_contents
+from selfmodel.logs.messages import TIMING
 from selfmodel.logs.records import MAX_TEXT, RESULT, TRIAL, TrialHeader
 from selfmodel.logs.salvage import salvage
-from selfmodel.logs.topics import TIMING
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -143,7 +143,7 @@ def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: 
 
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
     rewritten(clocked, says(RESULT, reason="x" * (MAX_TEXT + 1)))
-    with pytest.raises(SchemaMismatchError, match="at most 1000 characters in reason"):
+    with pytest.raises(SchemaMismatchError, match="1000 .*reason"):
         read_log(clocked)
 
 

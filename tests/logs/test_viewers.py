@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from selfmodel.logs.contents import read_contents
+from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.viewers import _roll_pitch_yaw, body_names, urdf
 from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.settings import MjcfSettings

@@ -21,8 +21,8 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import read_truth, reader
-from selfmodel.logs.contents import Contents
 from selfmodel.logs.journal import FolderJournal, create_journal
+from selfmodel.logs.log_file import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.events import Event, SearchBegins
