@@ -143,7 +143,7 @@ def test_a_reason_that_is_no_text_does_not_cost_the_log(biped: Robot, tmp_path: 
 
 def test_a_reason_that_is_too_long_is_refused(clocked: Path):
     rewritten(clocked, says(RESULT, reason="x" * (MAX_TEXT + 1)))
-    with pytest.raises(SchemaMismatchError, match="1000 .*reason"):
+    with pytest.raises(SchemaMismatchError, match="reason"):
         read_log(clocked)
 
 
