@@ -1,16 +1,19 @@
 """Controller files: ``.npz`` archives of numpy arrays, without pickled objects.
 
 The arrays of every file: ``kind`` (the name of the design), ``sensors`` and ``motors`` (names), the
-design's own arrays (``KINDS``: ``hidden``, a count, of a network; ``timestep``, s, of a CPG) and
+design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``, s, of a CPG) and
 ``genome`` (float64). Controllers whose command ranges differ from the paper's also have ``ranges``
 (float64, centre and half width per motor).
 """
 
 import io
+import struct
+import tokenize
 import warnings
 import zipfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -18,80 +21,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controllers.controller import Controller, Design, Ranges, checked_ranges
+from selfmodel.controllers.controller import Controller, Design, checked_ranges
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.files import create_file
-from selfmodel.logs.npz import NPZ_FAILURES, read_array
 
 MAX_CONTROLLER_BYTES = 2**20
 """Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
 
 Arrays = Mapping[str, NDArray[Any]]
-"""Arrays of a controller file, by name."""
+"""Arrays of a file, by name."""
 
-_COMMON: Mapping[str, tuple[str, int]] = MappingProxyType(
-    {"kind": ("U", 0), "sensors": ("U", 1), "motors": ("U", 1), "genome": ("f", 1)}
+KINDS: Mapping[str, tuple[Callable[..., Design], str, str]] = MappingProxyType(
+    {Network.name: (Network, "hidden", "i"), Cpg.name: (Cpg, "timestep", "f")}
 )
-"""Type code and rank of the arrays of every controller file."""
+"""Class of each kind of design, by its name, with the name and type code of its own number."""
 
-_RANGES = ("f", 2)
-"""Type code and rank of the optional array ``ranges``."""
-
-
-@dataclass(frozen=True)
-class KindFormat:
-    """Format of the arrays of one kind of design.
-
-    Attributes:
-        arrays: Type code and rank of the design's own arrays, by name, in the order of the file.
-        write: Function from a design of the kind to its own arrays.
-        read: Function from sensors, motors, command ranges and the arrays of a file to the design.
-    """
-
-    arrays: Mapping[str, tuple[str, int]]
-    write: Callable[[Any], Arrays]
-    read: Callable[[tuple[str, ...], tuple[str, ...], Ranges, Arrays], Design]
-
-    @property
-    def types(self) -> dict[str, tuple[str, int]]:
-        """Type code and rank of all required arrays, by name, in the order of the file."""
-        return {
-            **{name: _COMMON[name] for name in ("kind", "sensors", "motors")},
-            **self.arrays,
-            "genome": _COMMON["genome"],
-        }
-
-
-def _write_network(design: Network) -> Arrays:
-    return {"hidden": np.array(design.hidden, dtype=np.int64)}
-
-
-def _read_network(
-    sensors: tuple[str, ...], motors: tuple[str, ...], ranges: Ranges, arrays: Arrays
-) -> Network:
-    return Network(sensors, motors, int(arrays["hidden"]), ranges)
-
-
-def _write_cpg(design: Cpg) -> Arrays:
-    return {"timestep": np.array(design.timestep)}
-
-
-def _read_cpg(
-    sensors: tuple[str, ...], motors: tuple[str, ...], ranges: Ranges, arrays: Arrays
-) -> Cpg:
-    return Cpg(sensors, motors, float(arrays["timestep"]), ranges)
-
-
-KINDS: Mapping[str, KindFormat] = MappingProxyType(
-    {
-        Network.name: KindFormat({"hidden": ("i", 0)}, _write_network, _read_network),
-        Cpg.name: KindFormat({"timestep": ("f", 0)}, _write_cpg, _read_cpg),
-    }
+NPZ_FAILURES = (
+    ValueError,  # numpy's headers
+    TypeError,
+    KeyError,
+    EOFError,
+    RuntimeError,  # an encrypted file, or an unknown compression
+    OverflowError,
+    SyntaxError,
+    tokenize.TokenError,  # numpy's headers are Python literals
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
 )
-"""Format of each kind of design, by its name."""
+"""Exceptions of zipfile and numpy for malformed bytes."""
 
 
 def save_controller(path: Path, controller: Controller) -> None:
@@ -117,12 +78,12 @@ def load_controller(path: Path) -> Controller:
 def controller_bytes(controller: Controller) -> bytes:
     """Returns a controller as the bytes of an ``.npz`` file; equal controllers, equal bytes."""
     design = controller.design
-    kind = KINDS[design.name]
+    number = KINDS[design.name][1]
     arrays: dict[str, NDArray[Any]] = {
         "kind": np.array(design.name),
         "sensors": np.array(design.sensors, dtype=np.str_),
         "motors": np.array(design.motors, dtype=np.str_),
-        **kind.write(design),
+        number: np.array(getattr(design, number)),
         "genome": controller.genome,
     }
     if design.ranges != checked_ranges(design.motors, ()):
@@ -138,62 +99,88 @@ def parse_controller(data: bytes, source: str) -> Controller:
     Args:
         data: The bytes of an ``.npz`` file.
         source: Name of the file, for the error message.
+    """
+    what = "a controller (.npz with the arrays kind, sensors, motors, genome and a design's own)"
+    with npz_errors(source, what):
+        arrays = read_arrays(data, MAX_CONTROLLER_BYTES)
+        kind = str(arrays.get("kind", "network"))
+        if kind not in KINDS:
+            raise ValueError(f"expected the kind {' or '.join(map(repr, KINDS))}, got {kind!r}")
+        design, number, code = KINDS[kind]
+        expected = {"kind": "U0", "sensors": "U1", "motors": "U1", number: f"{code}0"}
+        expected |= {"genome": "f1"} | ({"ranges": "f2"} if "ranges" in arrays else {})
+        check_types(arrays, expected, lambda array: f"{array.dtype.kind}{array.ndim}")
+        for name, array in arrays.items():
+            if array.dtype.kind == "f" and array.dtype != np.float64:
+                raise ValueError(f"its {name} is {array.dtype}, expected float64")
+        sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
+        ranges = tuple((c, half) for c, half in arrays.get("ranges", np.empty((0, 2))).tolist())
+        own = arrays[number].item()
+        return Controller(design(sensors, motors, own, ranges), arrays["genome"])
 
-    Raises:
-        InputError: The bytes are not a controller file.
+
+# ---------------------------------------------------------------- archives of arrays
+
+
+@contextmanager
+def npz_errors(source: str, what: str, advice: str = "") -> Iterator[None]:
+    """Makes the errors of malformed bytes one sentence, and warnings errors.
+
+    Args:
+        source: Name of the file.
+        what: Expected content.
+        advice: Remedy.
     """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # Python's, for a header that is a damaged literal
-            arrays = _arrays(data)
-        return Controller(_design(arrays), arrays["genome"])
-    except _FAILURES as failure:
-        raise InputError(
-            f"{source}: expected a controller (.npz with the arrays "
-            f"{', '.join(KINDS['network'].types)}, or those of a CPG): "
-            f"{failure or type(failure).__name__}"
-        ) from failure
+            yield
+    except (*NPZ_FAILURES, MemoryError, Warning) as failure:
+        reason = f"{failure or type(failure).__name__}{advice}"
+        raise InputError(f"{source}: expected {what}: {reason}") from failure
 
 
-def _design(arrays: Arrays) -> Design:
-    sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
-    ranges = tuple(
-        (float(centre), float(half)) for centre, half in arrays.get("ranges", np.empty((0, 2)))
-    )
-    return KINDS[str(arrays["kind"])].read(sensors, motors, ranges, arrays)
+def read_arrays(data: bytes, limit: int) -> dict[str, NDArray[Any]]:
+    """Returns the arrays of an ``.npz`` file, whose sizes are checked before memory is allocated.
 
-
-_FAILURES = (*NPZ_FAILURES, MemoryError, Warning)
-"""Exceptions of malformed bytes, and of a genome that does not fit."""
-
-
-def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
-    if len(data) > MAX_CONTROLLER_BYTES:
-        raise ValueError(f"it has more than {MAX_CONTROLLER_BYTES} bytes")
+    Args:
+        data: The bytes of the file.
+        limit: Largest size of the arrays, bytes.
+    """
+    if len(data) > limit:
+        raise ValueError(f"it has more than {limit} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = {info.filename: info for info in archive.infolist()}
-        if sum(info.file_size for info in members.values()) > MAX_CONTROLLER_BYTES:
-            raise ValueError(f"it unpacks to more than {MAX_CONTROLLER_BYTES} bytes")
-        kind = _kind(archive) if "kind.npy" in members else "network"
-        expected = KINDS[kind].types | ({"ranges": _RANGES} if "ranges.npy" in members else {})
-        names = {f"{name}.npy" for name in expected}
-        if set(members) != names or len(archive.infolist()) != len(names):
-            raise ValueError(f"it holds {', '.join(sorted(members)) or 'nothing'}")
-        found = {name: read_array(archive.read(f"{name}.npy")) for name in expected}
-    types = {name: array.dtype.kind for name, array in found.items()}
-    ranks = {name: array.ndim for name, array in found.items()}
-    if types != {name: type_code for name, (type_code, _) in expected.items()}:
-        raise ValueError(f"its arrays have the types {types}")
-    if ranks != {name: rank for name, (_, rank) in expected.items()}:
-        raise ValueError(f"its arrays have the ranks {ranks}")
-    for name, array in found.items():
-        if array.dtype.kind == "f" and array.dtype != np.float64:
-            raise ValueError(f"its {name} is {array.dtype}, expected float64")
-    return found
+        members = archive.infolist()
+        if sum(info.file_size for info in members) > limit:
+            raise ValueError(f"it unpacks to more than {limit} bytes")
+        names = [info.filename.removesuffix(".npy") for info in members]
+        if len(set(names)) != len(names):
+            raise ValueError("it holds an array twice")
+        return {name: _array(archive.read(info)) for name, info in zip(names, members, strict=True)}
 
 
-def _kind(archive: zipfile.ZipFile) -> str:
-    kind = str(read_array(archive.read("kind.npy")))
-    if kind not in KINDS:
-        raise ValueError(f"expected the kind {' or '.join(map(repr, KINDS))}, got {kind!r}")
-    return kind
+def check_types(
+    arrays: Arrays, expected: Mapping[str, str], type_of: Callable[[NDArray[Any]], str]
+) -> None:
+    """Checks that a file has all arrays of some types, and no others."""
+    if arrays.keys() != expected.keys():
+        raise ValueError(f"it holds {', '.join(sorted(arrays)) or 'nothing'}")
+    types = {name: type_of(array) for name, array in arrays.items()}
+    if types != expected:
+        raise ValueError(f"its arrays have the types and ranks {types}")
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    """Array of an ``.npy`` file, of version 1.0 and without objects."""
+    file = io.BytesIO(data)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("it has arrays of another version than 1.0")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+    count = 1
+    for length in shape:
+        count *= length
+    if dtype.hasobject or dtype.itemsize * count != len(data) - file.tell():
+        raise ValueError(f"an array of shape {shape} and type {dtype} does not fit its size")
+    file.seek(0)
+    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    return array

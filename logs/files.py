@@ -28,11 +28,7 @@ def no_folder(path: Path) -> InputError:
 
 
 def refuse_existing(path: Path) -> None:
-    """Checks that a file, or the unfinished log of its name, does not exist, before any work.
-
-    Raises:
-        InputError: One of the two exists.
-    """
+    """Checks that a file, or the unfinished log of its name, does not exist, before any work."""
     names = (path, partial_path(path)) if path.suffix == ".mcap" else (path,)
     for existing in names:
         if os_path.lexists(existing):
@@ -41,12 +37,7 @@ def refuse_existing(path: Path) -> None:
 
 @contextmanager
 def create_file(path: Path) -> Iterator[IO[bytes]]:
-    """Opens a new file, which gets its name once it is complete; see ``selfmodel.files.new_file``.
-
-    Raises:
-        InputError: The file exists, or its folder does not.
-        LogWriteError: The disk is full, or failed; no file is left.
-    """
+    """Opens a new file, which gets its name once it is complete; see ``files.new_file``."""
     try:
         with new_file(path) as file:
             yield file
@@ -59,11 +50,7 @@ def create_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Writes a file, or replaces its content, in one atomic step.
-
-    Raises:
-        LogWriteError: Writing failed; the file keeps its old content.
-    """
+    """Writes a file, or replaces its content, in one atomic step."""
     try:
         with new_file(path, replace=True) as file:
             file.write(data)
@@ -76,9 +63,6 @@ def write_new(path: Path, data: bytes) -> Path:
 
     Returns:
         ``path``; if that name was taken, the next one that is free, such as ``NAME-2.html``.
-
-    Raises:
-        LogWriteError: Writing failed, and no file is left.
     """
     names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     name = path
@@ -95,12 +79,7 @@ def write_new(path: Path, data: bytes) -> Path:
 
 
 def publish(part: Path, path: Path) -> None:
-    """Renames a complete log that is on the disk.
-
-    Raises:
-        InputError: ``path`` was created meanwhile; the ``.part`` file remains.
-        OSError: The disk failed.
-    """
+    """Renames a complete log that is on the disk."""
     try:
         give_name(part, path)
     except FileExistsError:
@@ -112,11 +91,7 @@ def publish(part: Path, path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder with its parents, unless it exists, and flushes their names to the disk.
-
-    Raises:
-        LogWriteError: The folder cannot be made.
-    """
+    """Makes a folder with its parents, unless it exists, and flushes their names to the disk."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
         with suppress(FileNotFoundError):  # another process removed an empty parent meanwhile

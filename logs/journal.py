@@ -44,12 +44,7 @@ class FolderJournal:
         return self.folder / TRIALS
 
     def add(self, diagnosis: Diagnosis) -> None:
-        """Writes a diagnosis after the earlier ones.
-
-        Raises:
-            CorruptError: The file of the earlier diagnoses is damaged.
-            LogWriteError: The disk is full, or failed.
-        """
+        """Writes a diagnosis after the earlier ones."""
         earlier = read_diagnoses(self.folder, self.space)
         values = [each.to_dict() for each in (*earlier, diagnosis)]
         text = json.dumps(values, indent=1, allow_nan=False)
@@ -59,10 +54,6 @@ class FolderJournal:
         """Returns the finished trials and the diagnoses in the folder, read and verified.
 
         A ``.part`` file, the log of an interrupted trial, is ignored.
-
-        Raises:
-            InputError: The folder is not the folder of a run.
-            LogError: A file is damaged, or of another robot.
         """
         if not self.trials.is_dir():
             raise InputError(
@@ -115,9 +106,6 @@ def is_calibrated(folder: Path) -> bool:
     """Returns whether the self-model of a run is fitted to the trials before the failure.
 
     A run of an earlier version did not record that: it counts as one with the default.
-
-    Raises:
-        InputError: The file of the options is damaged, or was altered.
     """
     path = folder / OPTIONS
     if not path.exists():
@@ -141,9 +129,6 @@ def read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...
     Args:
         folder: The folder.
         space: Hypotheses that the diagnoses may name.
-
-    Raises:
-        CorruptError: The file is damaged.
     """
     path = folder / DIAGNOSES
     if not path.exists():

@@ -141,11 +141,7 @@ class LogFile:
             sync(self._file)
 
     def finish(self, result: Result) -> None:
-        """Writes the result and the end of the file, and renames the ``.part``.
-
-        Raises:
-            InputError: A file of that name was created meanwhile; the ``.part`` remains.
-        """
+        """Writes the result and the end of the file, and renames the ``.part``."""
         self.flush()
         self.metadata(RESULT, texts_of(result))
         with self._writing():
@@ -254,10 +250,6 @@ def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
     Args:
         path: The file.
         unread: Names of metadata records to ignore.
-
-    Raises:
-        LogError: The file is damaged, or not MCAP.
-        InputError: The file does not exist, or cannot be opened.
     """
     contents, error = read_undamaged(path, unread)
     if error is not None:
@@ -271,9 +263,6 @@ def read_undamaged(path: Path, unread: Collection[str] = ()) -> tuple[Contents, 
     Args:
         path: The file.
         unread: Names of metadata records to ignore.
-
-    Raises:
-        InputError: The file does not exist, or cannot be opened.
     """
     data, contents = read_file(path, "a log file", MAX_BYTES), Contents(path)
     try:
@@ -287,9 +276,6 @@ def verified_records(data: bytes) -> Iterator[McapRecord]:
     """Yields the records of a file, each after the checks of what is before it.
 
     The file is intact if the iteration ends without an exception.
-
-    Raises:
-        Exception: One of ``_FAILURES``: the file is damaged.
     """
     stream, ended = io.BytesIO(data), False
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(data))

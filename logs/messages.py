@@ -182,10 +182,6 @@ class Template:
 
         Returns:
             Times, ``(steps,)`` ns, and numbers, ``(steps, width)``.
-
-        Raises:
-            ValueError: A message differs from the template outside its gaps, or its stamps differ
-                from each other.
         """
         length = len(self.payload)
         for index, payload in enumerate(payloads):
@@ -216,11 +212,7 @@ class Template:
 
 
 def names_in(payload: bytes) -> tuple[str, ...]:
-    """Returns the names in a message that begins with a header and a ``string[] name``.
-
-    Raises:
-        ValueError: The message has another layout.
-    """
+    """Returns the names in a message that begins with a header and a ``string[] name``."""
     if payload[:4] != _ENCAPSULATION:
         raise ValueError(f"expected little-endian CDR (00 01 00 00), got {payload[:4].hex(' ')!r}")
     at = len(_ENCAPSULATION) + 8

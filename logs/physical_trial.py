@@ -65,13 +65,6 @@ class TrialRunner:
 
         A trial that the robot could not finish, such as after an emergency stop, is returned as far
         as it went.
-
-        Raises:
-            InputError: The plan's name is no file name, or the name of an existing log.
-            LogError: The robot stopped early without an error, or the log failed its verification.
-            LogWriteError: The disk is full, or failed.
-            TrialError: The trial ended before ``MIN_STEPS`` or is of the stage ``before``, its
-                driver hangs, or the robot could not be stopped.
         """
         path = self.folder / f"{checked_name(plan.name)}.mcap"
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)

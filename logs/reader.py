@@ -127,11 +127,7 @@ def read_log(path: str | Path) -> TrialLog:
 
 
 def interpret(contents: Contents) -> TrialLog:
-    """Returns the trial log in the contents of a file.
-
-    Raises:
-        LogError: The contents do not fit the format of a trial log, or contradict each other.
-    """
+    """Returns the trial log in the contents of a file."""
     record = read_record(contents)
     result = _result(contents, record)
     for topic, messages in contents.topics.items():
@@ -213,11 +209,7 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
 
 
 def read_record(contents: Contents) -> TrialRecord:
-    """Returns the record ``selfmodel.trial``, which precedes the first step.
-
-    Raises:
-        LogError: The record is missing, of another format, or invalid.
-    """
+    """Returns the record ``selfmodel.trial``, which precedes the first step."""
     texts = contents.metadata.get(TRIAL)
     if texts is None:
         raise contents.error(f"it has no record {TRIAL}", advice=f"{ANOTHER}; {IMPORT_IT}")
@@ -255,11 +247,7 @@ def _attachment(contents: Contents, name: str, expected: str = "") -> bytes:
 
 
 def read_controller(contents: Contents, record: TrialRecord) -> Controller | None:
-    """Returns the controller of the robot; None if unknown.
-
-    Raises:
-        LogError: The attached controller is missing, invalid, or its SHA-256 is wrong.
-    """
+    """Returns the controller of the robot; None if unknown."""
     if not record.controller_sha256:
         return None
     data = _attachment(contents, CONTROLLER_FILE, record.controller_sha256)
@@ -282,9 +270,6 @@ def read_behaviour(
         record: Record of the trial.
         steps: Number of steps in the log's result.
         controller: Controller of the robot, if known; the messages must have its names.
-
-    Raises:
-        LogError: The messages do not fit the record, the controller or their types.
     """
     names = read_names(contents)
     ends = controller.design if controller else names
@@ -301,11 +286,7 @@ def read_behaviour(
 
 
 def read_names(contents: Contents) -> Names:
-    """Returns the column names of the signals, from the first message of each topic.
-
-    Raises:
-        LogError: A topic has no message, or the message has no names.
-    """
+    """Returns the column names of the signals, from the first message of each topic."""
 
     def names(topic: str) -> tuple[str, ...]:
         payload = _messages(contents, topic).payloads[0]

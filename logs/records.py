@@ -123,11 +123,7 @@ def texts_of(record: Struct) -> dict[str, str]:
 
 
 def record_of(kind: type[Record], texts: Mapping[str, str]) -> Record:
-    """Returns the record in texts; the inverse of ``texts_of``.
-
-    Raises:
-        ValueError: A field is missing or invalid; the message names the field.
-    """
+    """Returns the record in texts; the inverse of ``texts_of``."""
     return msgspec.convert(texts, kind, strict=False)
 
 
@@ -169,11 +165,7 @@ def settings_json(settings: Settings) -> bytes:
 
 
 def parse_settings(data: bytes) -> Settings:
-    """Returns the settings of a log; a missing setting has its default.
-
-    Raises:
-        ValueError: The data are no JSON object, or a name or a value is invalid.
-    """
+    """Returns the settings of a log; a missing setting has its default."""
     values = msgspec.json.decode(data, type=dict[str, float | int])
     if unknown := values.keys() - {field.name for field in dataclasses.fields(Settings)}:
         raise ValueError(f"there is no setting {min(unknown)!r}")
@@ -186,11 +178,7 @@ def with_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
 
 
 def without_digest(name: str, texts: Mapping[str, str]) -> dict[str, str]:
-    """Returns a record of selfmodel without its verified digest.
-
-    Raises:
-        ValueError: The digest is missing or wrong.
-    """
+    """Returns a record of selfmodel without its verified digest."""
     bare = {key: text for key, text in texts.items() if key != DIGEST}
     if texts != with_digest(name, bare):
         raise ValueError(f"the digest of the record {name} is missing or wrong")
@@ -203,11 +191,7 @@ def sha256(data: bytes) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Returns ``name`` if it is a valid name of a trial and its file.
-
-    Raises:
-        InputError: The name has other characters than letters, digits and ``-``.
-    """
+    """Returns ``name`` if it is a valid name of a trial and its file."""
     if not re.fullmatch(r"[A-Za-z0-9-]{1,100}", name):
         raise InputError(
             f"a trial's name names its file: expected 1 to 100 letters, digits and '-', "

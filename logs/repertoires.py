@@ -10,43 +10,43 @@ import dataclasses
 import hashlib
 import io
 import json
-import warnings
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
-from selfmodel.logs.controllers import controller_bytes, parse_controller
+from selfmodel.logs.controllers import (
+    check_types,
+    controller_bytes,
+    npz_errors,
+    parse_controller,
+    read_arrays,
+)
 from selfmodel.logs.files import replace_file
-from selfmodel.logs.npz import NPZ_FAILURES, read_array
 from selfmodel.recovery.repertoire import Modelled, Origin, Repertoire, model_digest
 
 MAX_BYTES = 2**28
 """Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have
 under 4 MB."""
 
-_TYPES: Mapping[str, tuple[str, int]] = {
-    "controller": ("uint8", 1),
-    "genomes": ("int8", 2),
-    "scores": ("float64", 1),
-    "descriptors": ("float64", 2),
-    "origin": ("uint8", 1),
-    "sha256": ("uint8", 1),
+_TYPES: Mapping[str, str] = {
+    "controller": "uint8 1",
+    "genomes": "int8 2",
+    "scores": "float64 1",
+    "descriptors": "float64 2",
+    "origin": "uint8 1",
+    "sha256": "uint8 1",
 }
-"""Type and rank of each array, in the order of the file."""
+"""Type and rank of each array."""
 
 
 def repertoire_bytes(repertoire: Repertoire) -> bytes:
-    """Returns a repertoire as the bytes of an ``.npz`` file; equal repertoires, equal bytes.
-
-    Raises:
-        ValueError: A genome is not in hundredths.
-    """
+    """Returns a repertoire as the bytes of an ``.npz`` file; equal repertoires, equal bytes."""
     hundredths = np.rint(repertoire.genomes * 100)
     if not np.array_equal(hundredths / 100, repertoire.genomes):
         raise ValueError("expected genomes in hundredths, as a repertoire search returns them")
@@ -94,9 +94,6 @@ def check_model(repertoire: Repertoire, robot: Modelled, source: str) -> None:
         repertoire: The repertoire.
         robot: The robot.
         source: Name of the file, for the error message.
-
-    Raises:
-        InputError: The repertoire is of another model.
     """
     if repertoire.origin.model != model_digest(robot):
         raise InputError(
@@ -113,54 +110,24 @@ def parse_repertoire(data: bytes, source: str) -> Repertoire:
     Args:
         data: The bytes of an ``.npz`` file.
         source: Name of the file, for the error message.
-
-    Raises:
-        InputError: The bytes are not a repertoire file, or were altered.
     """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # Python's, for a header that is a damaged literal
-            return _repertoire(_arrays(data), source)
-    except (*NPZ_FAILURES, MemoryError, Warning) as failure:
-        raise InputError(
-            f"{source}: expected a repertoire (.npz with the arrays {', '.join(_TYPES)}): "
-            f"{failure or type(failure).__name__}; make it anew with `selfmodel repertoire make`"
-        ) from failure
-
-
-def _repertoire(arrays: Mapping[str, NDArray[Any]], source: str) -> Repertoire:
-    given = {name: array for name, array in arrays.items() if name != "sha256"}
-    if not np.array_equal(arrays["sha256"], _digest(given)):
-        raise ValueError("its digest is wrong, so it was altered or damaged")
-    best = parse_controller(arrays["controller"].tobytes(), source)
-    scores, descriptors = arrays["scores"], arrays["descriptors"]
-    if not (np.isfinite(scores).all() and np.isfinite(descriptors).all()):
-        raise ValueError("a score or a descriptor is not finite")
-    if arrays["genomes"].size and np.abs(arrays["genomes"].astype(np.int16)).max() > 100:
-        raise ValueError("a weight is outside of -1 to 1")
-    origin = _origin(json.loads(arrays["origin"].tobytes().decode()))
-    return Repertoire(best.design, arrays["genomes"] / 100, scores, descriptors, origin)
-
-
-def _origin(values: Any) -> Origin:  # noqa: ANN401  # JSON
-    types = get_type_hints(Origin)
-    if not isinstance(values, dict) or {name: type(one) for name, one in values.items()} != types:
-        raise ValueError(f"its origin needs the values {', '.join(types)}")
-    return Origin(**values)
-
-
-def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = archive.infolist()
-        if sum(info.file_size for info in members) > MAX_BYTES:
-            raise ValueError(f"it unpacks to more than {MAX_BYTES} bytes")
-        if sorted(info.filename for info in members) != sorted(f"{name}.npy" for name in _TYPES):
-            raise ValueError(f"it holds {len(members)} other members")
-        found = {name: read_array(archive.read(f"{name}.npy")) for name in _TYPES}
-    types = {name: (str(array.dtype), array.ndim) for name, array in found.items()}
-    if types != _TYPES:
-        raise ValueError(f"its arrays have the types and ranks {types}")
-    return found
+    what = f"a repertoire (.npz with the arrays {', '.join(_TYPES)})"
+    with npz_errors(source, what, "; make it anew with `selfmodel repertoire make`"):
+        arrays = read_arrays(data, MAX_BYTES)
+        check_types(arrays, _TYPES, lambda array: f"{array.dtype} {array.ndim}")
+        given = {name: array for name, array in arrays.items() if name != "sha256"}
+        if not np.array_equal(arrays["sha256"], _digest(given)):
+            raise ValueError("its digest is wrong, so it was altered or damaged")
+        best = parse_controller(arrays["controller"].tobytes(), source)
+        genomes, scores, descriptors = (
+            arrays[name] for name in ("genomes", "scores", "descriptors")
+        )
+        if not (np.isfinite(scores).all() and np.isfinite(descriptors).all()):
+            raise ValueError("a score or a descriptor is not finite")
+        if genomes.size and np.abs(genomes.astype(np.int16)).max() > 100:
+            raise ValueError("a weight is outside of -1 to 1")
+        origin = msgspec.json.decode(arrays["origin"].tobytes(), type=Origin)
+        return Repertoire(best.design, genomes / 100, scores, descriptors, origin)
 
 
 def _digest(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:

@@ -45,12 +45,7 @@ def versions() -> Mapping[str, str]:
 
 
 def result_bytes(content: Mapping[str, Any]) -> bytes:
-    """Returns the bytes of a result file, with the installed versions and the digest.
-
-    Raises:
-        ValueError: A number is NaN or infinite, or the file is larger than ``MAX_BYTES``.
-        TypeError: A value has no form in JSON.
-    """
+    """Returns the bytes of a result file, with the installed versions and the digest."""
     # The digest is that of the values as a reader parses them: JSON's keys are texts.
     given = {**content, MADE_WITH: versions()}
     values = parse_json(json.dumps(given, allow_nan=False).encode())
@@ -80,11 +75,7 @@ def read_result(path: Path, what: str, remedy: str) -> ResultFile:
 
 
 def parse_json(data: bytes) -> Any:  # noqa: ANN401  # JSON
-    """Returns the values of a JSON document in UTF-8, with finite numbers and bounded nesting.
-
-    Raises:
-        ValueError: The document is none of this.
-    """
+    """Returns the values of a JSON document in UTF-8, with finite numbers and bounded nesting."""
     try:
         return json.loads(data.decode(), parse_float=_finite, parse_constant=_finite)
     except RecursionError:
@@ -92,11 +83,7 @@ def parse_json(data: bytes) -> Any:  # noqa: ANN401  # JSON
 
 
 def verified(values: Any) -> ResultFile:  # noqa: ANN401  # JSON
-    """Returns the content of a parsed result file, after its digest was checked.
-
-    Raises:
-        ValueError: The values are no object, or do not have the digest that the file states.
-    """
+    """Returns the content of a parsed result file, after its digest was checked."""
     if not isinstance(values, dict):
         raise ValueError("it is no JSON object")  # noqa: TRY004  # one error for all damage
     if not values.keys() & {MADE_WITH, DIGEST}:

@@ -261,9 +261,6 @@ def converted(path: Path, values: object, kind: type[Read], what: str, remedy: s
         kind: The class.
         what: Expected content, for the error.
         remedy: Remedy, for the error.
-
-    Raises:
-        InputError: A value is missing, or of another type; the message names it.
     """
     try:
         return msgspec.convert(values, kind)
@@ -272,30 +269,18 @@ def converted(path: Path, values: object, kind: type[Read], what: str, remedy: s
 
 
 def read_as(path: Path, kind: type[Read], what: str, remedy: str) -> Read:
-    """Returns the content of a result file, whose digest is checked; see ``converted``.
-
-    Raises:
-        InputError: The file cannot be read, was altered, or has other content.
-    """
+    """Returns the content of a result file, whose digest is checked; see ``converted``."""
     return converted(path, read_result(path, what, remedy).content, kind, what, remedy)
 
 
 def write_searches(folder: Path, searches: Sequence[Search]) -> None:
-    """Writes the progress of searches into the folder of a run.
-
-    Raises:
-        LogWriteError: The disk is full, or failed.
-    """
+    """Writes the progress of searches into the folder of a run."""
     # JSON has no infinity, which is the fitness if every simulation diverged: it is null.
     replace_file(folder / SEARCHES, msgspec.json.format(msgspec.json.encode(searches), indent=1))
 
 
 def read_searches(folder: Path) -> tuple[Search, ...]:
-    """Returns the progress in the folder of a run; none if it was not recorded.
-
-    Raises:
-        InputError: The file is damaged.
-    """
+    """Returns the progress in the folder of a run; none if it was not recorded."""
     path = folder / SEARCHES
     if not path.exists():
         return ()
@@ -314,9 +299,6 @@ def best_hypothesis(path: Path) -> str:
     Args:
         path: ``result.json`` or ``diagnoses.json`` of a recovery (the last diagnosis counts), or
             the output of ``diagnose --json`` or ``recover --json``.
-
-    Raises:
-        InputError: The file is none of these, or a ``result.json`` with a wrong digest.
     """
     what = (
         "a diagnosis: the result.json or diagnoses.json of a recovery, or the output of selfmodel "

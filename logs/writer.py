@@ -183,13 +183,7 @@ class TrialWriter:
         return self
 
     def add(self, sample: Sample) -> None:
-        """Adds the sample of the next step.
-
-        Raises:
-            InputError: The trial has all its steps, the time is not that of the next step, or the
-                rows do not fit the robot.
-            LogWriteError: The disk is full, or failed.
-        """
+        """Adds the sample of the next step."""
         time = self.steps * self._robot.control_timestep
         if self.steps >= self._plan.steps or sample.time != time:
             raise InputError(

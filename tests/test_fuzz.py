@@ -103,7 +103,9 @@ def _mapping(path: Path) -> object:
 
 
 def _table(path: Path) -> object:
-    return read_table(Message({"path": str(path), "wanted": ["q", "q.0"], "exact": "time"}))
+    return read_table(
+        Message({"path": str(path), "wanted": ["q", "q.0"], "time": "time", "unit": 1})
+    )
 
 
 def _bag(path: Path) -> object:

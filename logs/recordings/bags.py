@@ -47,6 +47,9 @@ if TYPE_CHECKING:
 MAX_LOG_TIME = 2**62
 """Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
 
+_EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
+_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
+
 
 def read_bag(path: Path, topics: Collection[str] | None = None) -> Recording:
     """Returns a bag, after a check of all its files.
@@ -62,8 +65,7 @@ def read_bag(path: Path, topics: Collection[str] | None = None) -> Recording:
     """
     request = Message({"path": str(path), "topics": None if topics is None else sorted(topics)})
     task = "selfmodel.logs.recordings.bags:read_in_child"
-    answer = run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS)
-    return unpacked(answer, Recording)
+    return unpacked(run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS))
 
 
 def read_in_child(request: Message) -> Message:
@@ -85,9 +87,6 @@ def bag_files(path: Path) -> list[Path]:
 
     Args:
         path: Folder of a bag, with or without ``metadata.yaml``, or one of its files.
-
-    Raises:
-        InputError: The bag does not exist, lacks a file, or its list of files is damaged.
     """
     if not path.is_dir():
         check_regular(path, "a bag")
@@ -98,30 +97,23 @@ def bag_files(path: Path) -> list[Path]:
         if not storage:
             raise InputError(f"{path}: expected a bag, got a folder without one: {_EXPECTED}")
         return sorted(storage, key=_natural)
+    advice = "add what is missing, or remove it to read the files that are there"
+    data = read_file(metadata, "a list of files", 2**20)
     try:
-        text = read_file(metadata, "a list of files", 2**20)
         # The base loader returns every value as text.
-        listed = YAML(typ="base", pure=True).load(text)["rosbag2_bagfile_information"]
+        listed = YAML(typ="base", pure=True).load(data)["rosbag2_bagfile_information"]
         # Older versions prepend the folder.
         files = [path / PurePath(name).name for name in listed["relative_file_paths"]]
-    except InputError:
-        raise
     except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as failure:
         reason = " ".join(str(failure).split())
         raise InputError(
-            f"{metadata}: expected the list of the bag's files, got: {reason}: remove it to read "
-            f"the files that are there"
+            f"{metadata}: expected the list of the bag's files, got: {reason}: {advice}"
         ) from failure
     if missing := [file.name for file in files if not file.is_file()]:
         raise InputError(
-            f"{metadata}: expected files that exist, got {', '.join(missing)}: add what is "
-            f"missing, or remove metadata.yaml to read the files that are there"
+            f"{metadata}: expected files that exist, got {', '.join(missing)}: {advice}"
         )
     return files
-
-
-_EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
-_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
@@ -149,10 +141,10 @@ def _stored(file: Path) -> Iterator[_Stored]:
         opened.seek(0)
         if head.startswith(ZSTD_MAGIC):
             with tempfile.TemporaryDirectory() as folder:
-                unpacked = Path(folder, file.stem)
-                with unpacked.open("wb") as target:
+                plain = Path(folder, file.stem)
+                with plain.open("wb") as target:
                     zstandard.ZstdDecompressor().copy_stream(opened, target)
-                yield from _stored(unpacked)
+                yield from _stored(plain)
             return
     for magic, (read, _) in _FORMATS.items():
         if head.startswith(magic):
@@ -293,16 +285,14 @@ class _Topic:
     Attributes:
         types: Message types, one in nearly every bag.
         count: Number of messages.
-        stamps: Time stamps of the decoded messages, ns; 0 without a stamp.
-        logged: Log times of these, ns.
+        times: Time stamp (0 without one) and log time of each decoded message, ns.
         layouts: Indices and rows of these by the names in them, nearly always the same.
         refused: Numbers of messages left out, by reason.
     """
 
     types: dict[str, None] = field(default_factory=dict)
     count: int = 0
-    stamps: list[int] = field(default_factory=list)
-    logged: list[int] = field(default_factory=list)
+    times: list[tuple[int, int]] = field(default_factory=list)
     layouts: dict[tuple[str, ...], tuple[list[int], list["FloatArray"]]] = field(
         default_factory=dict
     )
@@ -324,31 +314,23 @@ class _Topic:
                 self.refused[str(refused)] += 1
                 return
             indices, blocks = self.layouts.setdefault(names, ([], []))
-            indices.append(len(self.stamps))
+            indices.append(len(self.times))
             blocks.append(rows)
-            self.stamps.append(stamp)
-            self.logged.append(item.time)
+            self.times.append((stamp, item.time))
 
     def series(self) -> Series:
-        """Returns the messages as arrays."""
-        parts: dict[str, list[Column]] = {}
+        """Returns the messages as arrays; a column may be in messages of several layouts."""
+        parts: dict[str, list[tuple[list[int], FloatArray]]] = {}
         for names, (indices, blocks) in self.layouts.items():
-            index, values = np.array(indices, dtype=np.int64), np.array(blocks)
+            rows = np.array(blocks)
             for k, name in enumerate(names):
-                parts.setdefault(name, []).append(Column(index, values[:, k]))
-        return Series(
-            type=" and ".join(self.types),
-            count=self.count,
-            stamps=np.array(self.stamps, dtype=np.int64),
-            logged=np.array(self.logged, dtype=np.int64),
-            names=tuple(parts),
-            columns={name: _in_order(some) for name, some in parts.items()},
-            refused=self.refused,
-        )
-
-
-def _in_order(parts: list[Column]) -> Column:
-    """Column of messages with other names, in the order of the messages."""
-    index = np.concatenate([part.index for part in parts])
-    order = np.argsort(index)
-    return Column(index[order], np.concatenate([part.values for part in parts])[order])
+                parts.setdefault(name, []).append((indices, rows[:, k]))
+        columns = {}
+        for name, some in parts.items():
+            index = np.concatenate([np.array(indices, dtype=np.int64) for indices, _ in some])
+            values = np.concatenate([values for _, values in some])
+            order = np.argsort(index)
+            columns[name] = Column(index[order], values[order])
+        stamps, logged = np.array(self.times, dtype=np.int64).reshape(-1, 2).T
+        kind = " and ".join(self.types)
+        return Series(kind, self.count, stamps, logged, tuple(parts), columns, self.refused)

@@ -7,28 +7,47 @@ from pathlib import Path
 
 import numpy as np
 
-from selfmodel.arrays import frozen
+from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.logs.recordings.bags import read_bag
-from selfmodel.logs.recordings.checks import check_recording, check_robot
-from selfmodel.logs.recordings.mapping import TIMES, TableMapping
-from selfmodel.logs.recordings.mapping_file import RecordingMapping
+from selfmodel.logs.recordings.mapping import TIMES, Trial
+from selfmodel.logs.recordings.mapping_file import RecordingMapping, check_recording, check_robot
 from selfmodel.logs.recordings.quality import Quality, notes, quality
-from selfmodel.logs.recordings.recording import IntArray, Recording
-from selfmodel.logs.recordings.resample import Clocked, ClocksApartError, Track, clocked, reach
-from selfmodel.logs.recordings.signals import Tracks, signals, tracks_of
-from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table, recording_of
+from selfmodel.logs.recordings.recording import TABLE, IntArray, Recording
+from selfmodel.logs.recordings.resample import (
+    NOTHING,
+    Clocked,
+    ClocksApartError,
+    Method,
+    Track,
+    angles,
+    at_steps,
+    clocked,
+    hold,
+    hold_forever,
+    hold_outside_gaps,
+    linear,
+    reach,
+    slerp,
+    slerp_or_sample,
+    track,
+)
+from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.behaviour import Behaviour, samples_of
+from selfmodel.trials.rotation import rotated
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 
 MAX_STEPS = 100_000
 """Largest number of control steps of a trial: its log has up to ten messages a step."""
+
+Tracks = dict[tuple[str, str], Track]
+"""Tracks by quantity and part, in the units and signs of the model; see ``Trial.places``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +106,17 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
     check_robot(mapping, robot.anatomy)
     recording = _read(path, mapping)
     check_recording(mapping, recording)
-    clocks = _clocks(mapping, recording)
-    tracks = tracks_of(mapping, recording, clocks)
+    clock = "column" if mapping.trial.time else mapping.trial.clock
+    clocks = _clocks(mapping, recording, clock)
+    tracks = _tracks(mapping, recording, clocks)
     origin, steps = _steps(mapping, tracks, robot.control_timestep)
     try:
-        found = signals(mapping.trial, tracks, robot, origin, steps)
+        signals = _signals(mapping.trial, tracks, robot, origin, steps)
     except ValueError as error:
         raise mapping.error(("start",), f"{error}: set another start") from error
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
     behaviour = Behaviour(
-        robot.anatomy.names, frozen(time), {signal: frozen(found[signal]) for signal in SIGNALS}
+        robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
     )
     roles: dict[str, dict[str, None]] = {}
     for place in mapping.places.values():
@@ -106,8 +126,7 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
         topic: quality(recording.series[topic], clocks[topic], origin, tuple(names))
         for topic, names in roles.items()
     }
-    clock = mapping.trial.clock
-    warnings = notes(mapping, behaviour, qualities, robot)
+    warnings = notes(mapping.trial, behaviour, qualities, robot)
     return ImportedTrial(behaviour, qualities, recording.digests, clock, origin, warnings)
 
 
@@ -144,9 +163,8 @@ def write_recording(
 
 def _read(path: Path, mapping: RecordingMapping) -> Recording:
     """The topics or the columns of a mapping."""
-    trial = mapping.trial
-    places = mapping.places.values()
-    if not isinstance(trial, TableMapping):
+    time, places = mapping.trial.time, mapping.places.values()
+    if time is None:
         if is_table(path):
             raise mapping.error(
                 (),
@@ -160,19 +178,19 @@ def _read(path: Path, mapping: RecordingMapping) -> Recording:
             f"[time] is for tables ({', '.join(FORMATS)}), got the bag {path}: make a mapping of "
             f"it with --suggest",
         )
-    time = trial.time.column
-    wanted = {time, *(name for place in places for name in place.columns)}
-    table = read_table(path, wanted, exact=time)
-    if time not in table.columns:
-        raise mapping.unknown(("time", "column"), "column of the table", time, table.names)
-    return recording_of(path, table, time, TIMES[trial.time.unit])
+    wanted = {name for place in places for name in place.columns}
+    table = read_table(path, wanted, time=time.column, unit=TIMES[time.unit])
+    names = table.series[TABLE].names
+    if time.column not in names:
+        raise mapping.unknown(("time", "column"), "column of the table", time.column, names)
+    return table
 
 
-def _clocks(mapping: RecordingMapping, recording: Recording) -> dict[str, Clocked]:
+def _clocks(mapping: RecordingMapping, recording: Recording, clock: str) -> dict[str, Clocked]:
     clocks = {}
     for place in mapping.places.values():
         try:
-            clocks[place.topic] = clocked(recording.series[place.topic], mapping.trial.clock)
+            clocks[place.topic] = clocked(recording.series[place.topic], clock)
         except ClocksApartError as error:
             raise mapping.error(
                 (*place.role, "topic"),
@@ -181,24 +199,62 @@ def _clocks(mapping: RecordingMapping, recording: Recording) -> dict[str, Clocke
     return clocks
 
 
+def _tracks(
+    mapping: RecordingMapping, recording: Recording, clocks: Mapping[str, Clocked]
+) -> Tracks:
+    """Tracks of a recording, whose topics have the times of the clocks."""
+    tracks: Tracks = {}
+    for key, place in mapping.places.items():
+        columns = recording.series[place.topic].columns
+        known = [columns[name] for name in place.columns if name in columns]
+        raw = track(clocks[place.topic], known, slice(*place.numbers)) if known else NOTHING
+        tracks[key] = raw.scaled(place.scale, place.offset)
+    for name, touch in mapping.trial.touch.items():
+        force = tracks["touch", name]
+        tracks["touch", name] = Track(force.times, (force.values > touch.threshold).astype(float))
+    for body in ("base", "imu"):
+        if (orientation := tracks.get((f"{body}_orientation", ""))) is not None:
+            rounding = _ROUNDING if _keeps_samples(mapping.trial, body) else 0.0
+            tracks[f"{body}_orientation", ""] = _normalised(orientation, rounding)
+    return tracks
+
+
+_ROUNDING = 1e-14
+"""Difference from 1 of the length of a normalised quaternion in float64."""
+
+
+def _keeps_samples(trial: Trial, body: str) -> bool:
+    """Whether orientations at the time of a sample have its bits.
+
+    Those of a bag keep the bits that earlier versions imported.
+    """
+    return body == "base" and trial.time is not None
+
+
+def _normalised(track: Track, rounding: float) -> Track:
+    """Normalised quaternions; unset ones, of length 0, are left out."""
+    lengths: FloatArray = np.linalg.norm(track.values, axis=1)
+    known = np.abs(lengths - 1) < 0.1
+    # A quaternion that is normalised already keeps its bits.
+    divisors = np.where(np.abs(lengths - 1) < rounding, 1.0, lengths)
+    return Track(track.times[known], track.values[known] / divisors[known, np.newaxis])
+
+
+# ---------------------------------------------------------------- control steps
+
+
 def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float) -> tuple[int, IntArray]:
     """Time of the first control step at which every role has data, and times after it, ns."""
     needed = _required(tracks)
-    for (quantity, part), track in needed.items():
+    for (quantity, part), needed_track in needed.items():
         place = mapping.places[quantity, part]
-        if not len(track):
+        if not len(needed_track):
             raise mapping.error(
                 (*place.role, "topic"),
                 f"{place.topic} has no number for {part or 'the base'}: name another one",
             )
     first = max(int(track.times[0]) for track in needed.values())
-    # The last command is held, so the end of the commands does not end the trial; nor does that of
-    # single encoders.
-    lasting = [
-        t for (quantity, _), t in needed.items() if quantity not in ("commands", "joint_positions")
-    ]
-    lasting += _lasting([t for (quantity, _), t in needed.items() if quantity == "joint_positions"])
-    last = min(int(track.times[-1]) for track in lasting)
+    last = min(int(track.times[-1]) for track in _lasting(needed))
     trial = mapping.trial
     origin = first + round(trial.start * 1e9)
     period = timestep * 1e9
@@ -231,17 +287,129 @@ def _required(tracks: Tracks) -> Tracks:
         ("base_position", "base_orientation"),
         ("imu_angular_velocity", "imu_orientation"),
     ):
-        found = [(quantity, "") for quantity in pair if (quantity, "") in tracks]
-        if found:
-            key = next((key for key in found if len(tracks[key])), found[-1])
+        if mapped := [(quantity, "") for quantity in pair if (quantity, "") in tracks]:
+            key = next((key for key in mapped if len(tracks[key])), mapped[-1])
             needed[key] = tracks[key]
     return needed | {key: track for key, track in tracks.items() if key[0] == "touch"}
 
 
-def _lasting(hinges: list[Track]) -> list[Track]:
-    """Tracks without those that end early, such as those of encoders that were lost.
+def _lasting(needed: Tracks) -> list[Track]:
+    """Tracks whose end is the end of the trial.
 
-    A track ends early if another has a sample more than a gap (``reach``) after its last one.
+    The last command is held, so the end of the commands does not end the trial. Nor does that of
+    an encoder that was lost: another one has a sample more than a gap (``reach``) after its last.
     """
+    hinges = [track for (quantity, _), track in needed.items() if quantity == "joint_positions"]
     end = max(int(track.times[-1]) for track in hinges)
-    return [track for track in hinges if end - int(track.times[-1]) <= reach(track.times)]
+    return [
+        track
+        for (quantity, _), track in needed.items()
+        if quantity != "commands"
+        and (quantity != "joint_positions" or end - int(track.times[-1]) <= reach(track.times))
+    ]
+
+
+# ---------------------------------------------------------------- signals
+
+
+def _signals(
+    trial: Trial, tracks: Tracks, robot: Robot, origin: int, steps: IntArray
+) -> dict[str, FloatArray]:
+    """Signals of a trial; NaN where nothing was observed.
+
+    Args:
+        trial: Mapping of the recording.
+        tracks: Tracks of the recording.
+        robot: The robot.
+        origin: Time of the first control step, ns.
+        steps: Times after the first step, ``(steps,)`` ns.
+    """
+    anatomy = robot.anatomy
+
+    def at(quantity: str, part: str, method: Method, width: int = 1) -> FloatArray:
+        return at_steps(tracks.get((quantity, part), NOTHING), origin, steps, method, width)
+
+    def all_of(quantity: str, parts: tuple[str, ...], method: Method) -> FloatArray:
+        return np.concatenate([at(quantity, part, method) for part in parts], axis=1)
+
+    def angle(hinge: str) -> FloatArray:
+        # Only the angle of a hinge without limits can wrap around.
+        limited = robot.model.joint(hinge).limited[0]
+        return at("joint_positions", hinge, linear if limited else angles)
+
+    positions = np.concatenate([angle(hinge) for hinge in anatomy.hinges], axis=1)
+    readings = np.full((len(steps), len(anatomy.sensors)), np.nan)
+    for column, sensor in enumerate(anatomy.sensors):
+        if ("sensors", sensor.name) in tracks:
+            readings[:, column] = at("sensors", sensor.name, hold_outside_gaps)[:, 0]
+        elif sensor.kind == "angle":
+            hinge = positions[:, anatomy.hinges.index(sensor.hinge)]
+            readings[:, column] = (hinge - sensor.centre) / sensor.half_range
+        elif ("touch", sensor.name) in tracks:
+            readings[:, column] = at("touch", sensor.name, hold)[:, 0]
+    # A gyroscope measures the angular velocity; odometry derives it.
+    turning = "imu" if len(tracks.get(("imu_angular_velocity", ""), NOTHING)) else "base"
+    body = "imu" if trial.base is None else "base"
+    turned = slerp_or_sample if _keeps_samples(trial, body) else slerp
+    pose = {
+        "base_position": at("base_position", "", linear, 3),
+        "base_orientation": at(f"{body}_orientation", "", turned, 4),
+        "base_linear_velocity": at("base_linear_velocity", "", linear, 3),
+    }
+    observed = {
+        signal
+        for signal, quantity in (
+            ("base_position", "base_position"),
+            ("base_orientation", f"{body}_orientation"),
+        )
+        if len(tracks.get((quantity, ""), NOTHING))
+    }
+    return {
+        "joint_positions": positions,
+        "joint_velocities": all_of("joint_velocities", anatomy.hinges, linear),
+        "joint_efforts": all_of("joint_efforts", anatomy.hinges, linear),
+        "commands": all_of("commands", anatomy.motors, hold_forever),
+        "sensors": readings,
+        **_in_frame(trial, pose, observed),
+        "base_angular_velocity": at(f"{turning}_angular_velocity", "", linear, 3),
+    }
+
+
+def _in_frame(
+    trial: Trial, pose: dict[str, FloatArray], observed: set[str]
+) -> dict[str, FloatArray]:
+    """Pose and linear velocity of the base in the frame of a mapping; the velocity in the world."""
+    position, orientation, velocity = pose.values()
+    in_world = trial.base is not None and trial.base.velocity_frame == "world"
+    if trial.base is None or trial.base.frame == "start":
+        if any(np.isnan(pose[signal][0]).any() for signal in observed):
+            raise ValueError(
+                "the pose of the base at the start of the trial is unknown, because of a gap in "
+                "its topic"
+            )
+        position = position - position[0] * [1, 1, 0]
+        if "base_orientation" in observed:
+            rotation = _heading_removal(orientation[0])
+            orientation = _rotated_world(orientation, rotation)
+            position = rotated(position, rotation[np.newaxis])
+            velocity = rotated(velocity, rotation[np.newaxis]) if in_world else velocity
+    velocity = velocity if in_world else rotated(velocity, orientation)
+    return dict(zip(pose, (position, orientation, velocity), strict=True))
+
+
+def _rotated_world(quaternions: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Orientations ``(steps, 4)`` after a rotation of the world ``(4,)``, w x y z.
+
+    A matrix product, which rounds differently from ``trials.rotation.product``.
+    """
+    w, x, y, z = rotation
+    matrix = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    result: FloatArray = quaternions @ matrix.T
+    return result
+
+
+def _heading_removal(quaternion: FloatArray) -> FloatArray:
+    """Rotation about the vertical that turns the heading of an orientation to +x, w x y z."""
+    w, x, y, z = quaternion
+    half = -np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) / 2
+    return np.array([np.cos(half), 0.0, 0.0, np.sin(half)])

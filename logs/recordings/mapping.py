@@ -1,7 +1,6 @@
 """Mapping from the topics of a bag, or the columns of a table, to the parts of a robot, as TOML.
 
-The classes are the tables of the file, and their fields its keys: any other key is an error. Each
-error names its line.
+The classes are the tables of the file, and their fields its keys: any other key is an error.
 """
 
 import math
@@ -33,6 +32,19 @@ TIMES: Mapping[str, int] = MappingProxyType({"s": 10**9, "ms": 10**6, "us": 10**
 Keys = tuple[str, ...]
 """Path of an entry: names of its tables, then its key."""
 
+_VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = MappingProxyType(
+    {
+        "base": {
+            "position": (0, 3),
+            "orientation": (3, 7),
+            "linear_velocity": (7, 10),
+            "angular_velocity": (10, 13),
+        },
+        "imu": {"orientation": (0, 4), "angular_velocity": (4, 7)},
+    }
+)
+"""Numbers of each quantity of a body in the rows of ``messages.DECODERS``."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -61,18 +73,14 @@ class Place:
 
 
 Places = Iterator[tuple[tuple[str, str], Place]]
-"""Quantities and parts with their places.
-
-The quantities are signals, ``touch``, ``imu_orientation`` and ``imu_angular_velocity``; the part is
-"" for the base and the IMU.
-"""
+"""Quantities and parts with their places."""
 
 # ---------------------------------------------------------------- tables of the file
 
 Number = Annotated[float, Meta(gt=-1e15, lt=1e15)]  # neither infinite nor nan
 Positive = Annotated[float, Meta(gt=0, lt=1e15)]
-Vector = tuple[str, str, str]
-Quaternion = tuple[str, str, str, str]
+Vector = tuple[str, str, str] | None
+Quaternion = tuple[str, str, str, str] | None
 
 
 class Section(Struct, forbid_unknown_fields=True):
@@ -99,10 +107,11 @@ class Link(Section):
 
 
 class Angles(Section):
-    """Names in the recording by hinge or motor, and their unit."""
+    """Names in the recording by hinge or motor, and their unit; of a bag, their topic."""
 
     unit: Literal["rad", "deg", "raw"]
     names: dict[str, str | Link]
+    topic: str = ""
 
     @property
     def links(self) -> dict[str, Link]:
@@ -115,92 +124,59 @@ class Angles(Section):
         return link.sign * UNITS[self.unit], link.offset * UNITS[self.unit]
 
 
-class BagJoints(Angles):
-    """Topic of the joint angles."""
-
-    unit: Literal["rad", "deg"]
-    topic: str
-
-
-class BagCommands(Angles):
-    """Topic of the commands; a Float64MultiArray has the names of its numbers here."""
-
-    topic: str
-    order: tuple[str, ...] = ()
-
-
-class TableJoints(Angles):
-    """Columns of the joint angles, and of other quantities by hinge."""
+class Joints(Angles):
+    """Joint angles; of a table, also the columns of other quantities by hinge."""
 
     unit: Literal["rad", "deg"]
     velocities: dict[str, str] = {}
     efforts: dict[str, str] = {}
 
 
-class Base(Section):
-    """Root body; in the frame ``start``, the trial begins at x = y = 0 heading along +x."""
+class Commands(Angles):
+    """Commands; a Float64MultiArray has the names of its numbers in ``order``."""
+
+    order: tuple[str, ...] = ()
+
+
+class Imu(Section):
+    """Topic or columns of an IMU."""
+
+    topic: str = ""
+    orientation: Quaternion = None
+    angular_velocity: Vector = None
+
+    def __post_init__(self) -> None:
+        """Checks that something is mapped."""
+        vectors = [key for key in self.__struct_fields__ if isinstance(getattr(self, key), tuple)]
+        if not self.topic and not vectors:
+            raise ValueError("this table needs topic, or the columns of a vector: add one")
+
+
+class Base(Imu):
+    """Root body: its topic, whose velocities are in the frame of the base, or its columns.
+
+    In the frame ``start``, the trial begins at x = y = 0 heading along +x. ``velocity_frame`` is
+    that of the linear velocity of a table.
+    """
 
     frame: Literal["start", "recorded"] = "start"
     unit: Literal["m", "cm", "mm", "km"] = "m"
-
-
-class BagBase(Base, kw_only=True):
-    """Topic of the root body; its velocities are in the frame of the base."""
-
-    topic: str
-
-
-class TableBase(Base):
-    """Columns of the root body; ``velocity_frame`` is that of the linear velocity."""
-
-    position: Vector | None = None
-    orientation: Quaternion | None = None
-    linear_velocity: Vector | None = None
-    angular_velocity: Vector | None = None
+    position: Vector = None
+    linear_velocity: Vector = None
     velocity_frame: Literal["base", "world"] = "base"
-
-    def __post_init__(self) -> None:
-        """Checks that there is a pose."""
-        if self.position is None and self.orientation is None:
-            raise ValueError("[base] needs position or orientation, and has neither: add one")
-
-
-class BagImu(Section):
-    """Topic of an IMU."""
-
-    topic: str
-
-
-class TableImu(Section):
-    """Columns of an IMU."""
-
-    orientation: Quaternion | None = None
-    angular_velocity: Vector | None = None
-
-    def __post_init__(self) -> None:
-        """Checks that there is a measurement."""
-        if self.orientation is None and self.angular_velocity is None:
-            raise ValueError("[imu] needs orientation or angular_velocity: add one")
 
 
 class Touch(Section):
-    """Touch sensor, which reads 1 above the threshold; no unit is converted."""
+    """Touch sensor, which reads 1 above the threshold; no unit is converted.
+
+    Its topic, with the index of its number in a Float64MultiArray, or its column.
+    """
 
     threshold: Number = 0.0
     unit: Literal["N", "kN", "raw"] = "N"
-
-
-class BagTouch(Touch, kw_only=True):
-    """Topic of a touch sensor; of a Float64MultiArray, the index of its number."""
-
-    topic: str
+    topic: str = ""
     index: Annotated[int, Meta(ge=0)] | None = None
-
-
-class TableTouch(Touch, kw_only=True):
-    """Column of a touch sensor."""
-
-    column: str
+    column: str = ""
 
 
 class TimeColumn(Section):
@@ -210,7 +186,7 @@ class TimeColumn(Section):
     unit: Literal["s", "ms", "us", "ns"] = "s"
 
 
-class Trial(Section):
+class Trial(Section, kw_only=True):
     """Trial in a recording.
 
     Attributes:
@@ -220,6 +196,14 @@ class Trial(Section):
         stage: Stage of the trial: ``before`` for a healthy robot.
         start: Start of the trial after the first time at which every role has data, s.
         duration: Duration, s; None for as long as every role has data.
+        clock: Whether the times of a bag are time stamps or log times.
+        time: Time column of a table; None for a bag.
+        joints: Joint angles.
+        commands: Commands of the motors.
+        base: Root body.
+        imu: IMU.
+        touch: Touch sensors by name.
+        sensors: Columns of the controller's readings by sensor, of a table.
     """
 
     robot: str
@@ -228,74 +212,30 @@ class Trial(Section):
     stage: Stage = "single"
     start: Annotated[float, Meta(ge=0, lt=1e15)] = 0.0
     duration: Positive | None = None
-
-
-class BagMapping(Trial, kw_only=True):
-    """Mapping of the topics of a bag, whose times are time stamps or log times."""
-
     clock: Literal["header", "log"] = "header"
-    joints: BagJoints
-    commands: BagCommands
-    base: BagBase | None = None
-    imu: BagImu | None = None
-    touch: dict[str, BagTouch] = {}
+    time: TimeColumn | None = None
+    joints: Joints
+    commands: Commands
+    base: Base | None = None
+    imu: Imu | None = None
+    touch: dict[str, Touch] = {}
+    sensors: dict[str, str] = {}
 
     def places(self) -> Places:
-        """Yields the places of all quantities; for the numbers, see ``DECODERS`` in ``bags``."""
+        """Yields quantities and parts with their places.
+
+        The quantities are signals, ``touch``, ``imu_orientation`` and ``imu_angular_velocity``;
+        the part is "" for the base and the IMU.
+        """
         joints, commands = self.joints, self.commands
         for hinge, link in joints.links.items():
             scale, offset = joints.conversion(link)
-            place = partial(Place, ("joints", "names", hinge), joints.topic, (link.name,))
+            path = ("joints", "names", hinge)
+            place = partial(Place, path, joints.topic or TABLE, (link.name,))
             yield ("joint_positions", hinge), place((0, 1), scale, offset)
-            yield ("joint_velocities", hinge), place((1, 2), scale)
-            yield ("joint_efforts", hinge), place((2, 3), link.sign)
-        for motor, link in commands.links.items():
-            column = str(commands.order.index(link.name)) if commands.order else link.name
-            place = partial(Place, ("commands", "names", motor), commands.topic, (column,))
-            yield ("commands", motor), place((0, 1), *commands.conversion(link))
-        if self.base is not None:
-            place = partial(Place, ("base", "topic"), self.base.topic, ("",))
-            length = UNITS[self.base.unit]
-            yield ("base_position", ""), place((0, 3), length)
-            yield ("base_orientation", ""), place((3, 7))
-            yield ("base_linear_velocity", ""), place((7, 10), length)
-            yield ("base_angular_velocity", ""), place((10, 13))
-        if self.imu is not None:
-            place = partial(Place, ("imu", "topic"), self.imu.topic, ("",))
-            yield ("imu_orientation", ""), place((0, 4))
-            yield ("imu_angular_velocity", ""), place((4, 7))
-        for name, touch in self.touch.items():
-            column = "" if touch.index is None else str(touch.index)
-            yield ("touch", name), Place(("touch", name, "index"), touch.topic, (column,))
-
-
-class TableMapping(Trial, kw_only=True):
-    """Mapping of the columns of a table; those of ``sensors`` are a controller's readings."""
-
-    time: TimeColumn
-    joints: TableJoints
-    commands: Angles
-    base: TableBase | None = None
-    imu: TableImu | None = None
-    touch: dict[str, TableTouch] = {}
-    sensors: dict[str, str] = {}
-
-    @property
-    def clock(self) -> str:
-        """Clock of the times: the time column."""
-        return "column"
-
-    def places(self) -> Places:
-        """Yields the places of all quantities."""
-        joints = self.joints
-        for quantity, role, angles in (
-            ("joint_positions", "joints", joints),
-            ("commands", "commands", self.commands),
-        ):
-            for part, link in angles.links.items():
-                scale, offset = angles.conversion(link)
-                path = (role, "names", part)
-                yield (quantity, part), Place(path, TABLE, (link.name,), scale=scale, offset=offset)
+            if joints.topic:
+                yield ("joint_velocities", hinge), place((1, 2), scale)
+                yield ("joint_efforts", hinge), place((2, 3), link.sign)
         for key, columns in (("velocities", joints.velocities), ("efforts", joints.efforts)):
             for hinge, name in columns.items():
                 link = joints.links.get(hinge, Link(NONE))
@@ -303,17 +243,29 @@ class TableMapping(Trial, kw_only=True):
                 if name != NONE:
                     path = ("joints", key, hinge)
                     yield (f"joint_{key}", hinge), Place(path, TABLE, (name,), scale=scale)
-        yield from self._vectors(
-            "base", self.base, UNITS["m" if self.base is None else self.base.unit]
-        )
-        yield from self._vectors("imu", self.imu)
+        for motor, link in commands.links.items():
+            column = str(commands.order.index(link.name)) if commands.order else link.name
+            place = partial(Place, ("commands", "names", motor), commands.topic or TABLE, (column,))
+            yield ("commands", motor), place((0, 1), *commands.conversion(link))
+        yield from _vectors("base", self.base)
+        yield from _vectors("imu", self.imu)
         for name, touch in self.touch.items():
-            yield ("touch", name), Place(("touch", name, "column"), TABLE, (touch.column,))
+            column = touch.column or ("" if touch.index is None else str(touch.index))
+            path = ("touch", name, "index" if touch.topic else "column")
+            yield ("touch", name), Place(path, touch.topic or TABLE, (column,))
         for sensor, name in self.sensors.items():
             yield ("sensors", sensor), Place(("sensors", sensor), TABLE, (name,))
 
-    def _vectors(self, body: str, section: Section | None, length: float = 1.0) -> Places:
-        for key in ("position", "orientation", "linear_velocity", "angular_velocity"):
-            if names := getattr(section, key, None):
-                scale = length if key in ("position", "linear_velocity") else 1.0
-                yield (f"{body}_{key}", ""), Place((body, key), TABLE, names, scale=scale)
+
+def _vectors(body: str, section: Imu | None) -> Places:
+    if section is None:
+        return
+    for key, numbers in _VECTORS[body].items():
+        scale = 1.0
+        if isinstance(section, Base) and key in ("position", "linear_velocity"):
+            scale = UNITS[section.unit]
+        quantity = (f"{body}_{key}", "")
+        if section.topic:
+            yield quantity, Place((body, "topic"), section.topic, ("",), numbers, scale)
+        elif columns := getattr(section, key):
+            yield quantity, Place((body, key), TABLE, columns, scale=scale)

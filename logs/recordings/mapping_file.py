@@ -1,4 +1,4 @@
-"""Reading of a mapping; each error names its line."""
+"""Reading of a mapping, and its checks against robot and recording; each error names its line."""
 
 import re
 from collections import Counter
@@ -6,14 +6,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.logs.recordings.mapping import NONE, UNKNOWN, BagMapping, Keys, Place, TableMapping
+from selfmodel.logs.recordings.mapping import NONE, UNKNOWN, Angles, Keys, Place, Trial
+from selfmodel.logs.recordings.messages import ARRAY, TYPES
+from selfmodel.logs.recordings.recording import TABLE, Recording
+from selfmodel.robot.anatomy import Anatomy
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,11 @@ class RecordingMapping:
 
     name: str
     text: str
-    trial: BagMapping | TableMapping
+    trial: Trial
 
     @cached_property
     def places(self) -> dict[tuple[str, str], Place]:
-        """Places by quantity and part; see ``Places``."""
+        """Places by quantity and part; see ``Trial.places``."""
         return dict(self.trial.places())
 
     def error(self, path: Keys, sentence: str) -> InputError:
@@ -73,25 +76,19 @@ def parse_mapping(text: str, name: str) -> RecordingMapping:
         tables = load_toml(text)
     except ValueError as failure:
         raise _toml_error(name, text, str(failure)) from failure
-    joints = tables.get("joints")
-    if "time" not in tables and isinstance(joints, dict) and "topic" not in joints:
-        sentence = "[joints] needs topic, for a bag, or the mapping [time], for a table: add one"
-        raise _error(name, text, ("joints",), sentence)
-    kind: type[BagMapping | TableMapping] = TableMapping if "time" in tables else BagMapping
     try:
-        mapping = RecordingMapping(name, text, msgspec.convert(tables, kind))
+        mapping = RecordingMapping(name, text, msgspec.convert(tables, Trial))
     except msgspec.ValidationError as failure:
-        raise _error(name, text, *_explained(str(failure), tables, kind)) from failure
-    _check_names(mapping, "joints")
-    _check_names(mapping, "commands")
+        raise _error(name, text, *_explained(str(failure), tables)) from failure
+    _check_names(mapping, "joints", mapping.trial.joints)
+    _check_names(mapping, "commands", mapping.trial.commands)
     return mapping
 
 
-def _check_names(mapping: RecordingMapping, role: Literal["joints", "commands"]) -> None:
+def _check_names(mapping: RecordingMapping, role: str, angles: Angles) -> None:
     """Checks that each name in the recording is filled in, and used once."""
-    angles = getattr(mapping.trial, role)
     path = (role, "names")
-    order = Counter(getattr(angles, "order", ()))
+    order = Counter[str](getattr(angles, "order", ()))
     if twice := [column for column, count in order.items() if count > 1]:
         raise mapping.error((role, "order"), f"{twice[0]} is listed twice in order: remove one")
     absent = [part for part in angles.names if part not in angles.links]
@@ -122,6 +119,103 @@ def _check_names(mapping: RecordingMapping, role: Literal["joints", "commands"])
             raise mapping.unknown((*path, part), "name in order", link.name, order)
 
 
+# ---------------------------------------------------------------- checks
+
+
+def check_robot(mapping: RecordingMapping, anatomy: Anatomy) -> None:
+    """Checks that a mapping names the parts of the robot and no others.
+
+    All hinges must be mapped, some to ``NONE``, and all motors.
+    """
+    trial = mapping.trial
+    touches = [sensor.name for sensor in anatomy.sensors if sensor.kind == "touch"]
+    parts: dict[Keys, tuple[Iterable[str], str, Iterable[str]]] = {
+        ("joints", "names"): (trial.joints.names, "hinge", anatomy.hinges),
+        ("commands", "names"): (trial.commands.names, "motor", anatomy.motors),
+        ("touch",): (trial.touch, "touch sensor", touches),
+        ("joints", "velocities"): (trial.joints.velocities, "hinge", anatomy.hinges),
+        ("joints", "efforts"): (trial.joints.efforts, "hinge", anatomy.hinges),
+        ("sensors",): (trial.sensors, "sensor", anatomy.names.sensors),
+    }
+    for path, (listed, what, known) in parts.items():
+        for name in listed:
+            if name not in known:
+                raise mapping.unknown((*path, name), f"{what} of the robot", name, known)
+        if path[-1] == "names" and (missing := [name for name in known if name not in listed]):
+            advice = f", with {NONE!r} for a hinge without an encoder" if what == "hinge" else ""
+            raise mapping.error(
+                path,
+                f"[{'.'.join(path)}] must list every {what} of the robot, and lacks "
+                f"{', '.join(missing)}: add a line for each{advice}",
+            )
+
+
+def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
+    """Checks that a recording has what a mapping names, of a type that can play its role."""
+    for place in mapping.places.values():
+        _check_topic(mapping, recording, place)
+    order = getattr(mapping.trial.commands, "order", ())
+    for place in mapping.places.values():
+        columns = recording.series[place.topic].names
+        if place.role == ("commands",) and order:
+            if len(order) != len(columns):
+                raise mapping.error(
+                    ("commands", "order"),
+                    f"order must name the {len(columns)} numbers of a message on {place.topic}, "
+                    f"got {len(order)} names",
+                )
+            continue
+        for name in place.columns:
+            if name and name not in columns:
+                kind = "number" if place.role[0] == "touch" else "joint"
+                what = "column of the table" if place.topic == TABLE else f"{kind} on {place.topic}"
+                error = str(unknown_name(what, name, columns))
+                lost = f"; {NONE!r} is for a hinge without an encoder"
+                raise mapping.error(place.path, error + (lost if place.role == ("joints",) else ""))
+
+
+def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) -> None:
+    """Checks that a topic exists, has a suitable type, and has messages."""
+    role, topic, trial = place.role, place.topic, mapping.trial
+    series = recording.series.get(topic)
+    if topic == TABLE:
+        if series is None:
+            sentence = f"[{'.'.join(role)}] needs topic, or the mapping [time], of a table: add one"
+            raise mapping.error(role, sentence)
+        return
+    path, kinds = (*role, "topic"), TYPES[role[0]]
+    fitting = [name for name, other in recording.series.items() if other.type in kinds]
+    if series is None:
+        known = fitting or sorted(recording.series)
+        raise mapping.unknown(path, "topic of the recording", topic, known)
+    if series.type not in kinds:
+        raise mapping.error(
+            path,
+            f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, got {topic} of "
+            f"{series.type or 'no type'}: name one that fits, of "
+            f"{', '.join(fitting) or 'which the bag has none'}",
+        )
+    if not series.count:
+        raise mapping.error(path, f"expected messages on {topic}, got none: name another one")
+    if role[0] not in ("commands", "touch"):
+        return
+    key, table = (
+        ("order", trial.commands) if role[0] == "commands" else ("index", trial.touch[role[1]])
+    )
+    named = getattr(table, key) not in (None, ())
+    if series.type == ARRAY and not named:
+        raise mapping.error(
+            role,
+            f"{topic} has numbers without names ({ARRAY}): add {key} to [{'.'.join(role)}], which "
+            f"names them",
+        )
+    if named and series.type != ARRAY:
+        raise mapping.error(
+            (*role, key),
+            f"{key} is for topics of {ARRAY}, got one of {series.type} on {topic}: remove it",
+        )
+
+
 # ---------------------------------------------------------------- errors
 
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
@@ -150,24 +244,36 @@ def _names(keys: str) -> Keys:
 
 
 def _toml_error(name: str, text: str, reason: str) -> InputError:
-    found = re.search(r" ?\(at line (\d+), column \d+\)", reason)
-    line = int(found[1]) if found else max(1, text.count("\n"))
-    reason = reason.replace(found[0] if found else "", "")
-    entry = _ENTRY.match(text.split("\n")[line - 1])
-    if reason == "Cannot overwrite a value" and entry:
-        reason = f"{entry[1]} is listed twice: expected each name once, remove one of the two"
-    elif reason.startswith(("Cannot declare", "Cannot mutate")):
-        reason = f"this table is listed twice ({reason}): merge its entries"
+    place = re.search(r" ?\(at line (\d+), column \d+\)", reason)
+    line = int(place[1]) if place else max(1, text.count("\n"))
+    reason = reason.replace(place[0] if place else "", "")
+    shown = text.split("\n")[line - 1]
+    entry = _ENTRY.match(shown) or _TABLE.match(shown)
+    if entry and reason.startswith("Cannot "):  # overwrite, declare or mutate
+        sentence = f"{entry[1]} is listed twice: remove one of the two, or merge them"
     else:
-        reason = f"expected TOML: {reason}"
-    return InputError(f"{name}:{line}: {reason}")
+        sentence = f"expected TOML, got: {reason}: correct this line"
+    return InputError(f"{name}:{line}: {sentence}")
 
 
-def _explained(message: str, tables: Mapping[str, Any], kind: object) -> tuple[Keys, str]:
+_LONGEST_SHOWN = 100
+_WORDS = {
+    " | null": "",
+    "`str | object`": '"a name in the recording" or { name = ... }',
+    "`str`": "a text in quotes",
+    "`float`": "a number",
+    "`int`": "a whole number",
+    "`object`": "a table",
+    "`array`": "a list",
+}
+
+
+def _explained(message: str, tables: Mapping[str, Any]) -> tuple[Keys, str]:
     """Path and sentence of an error of msgspec, which does not name the keys of dictionaries."""
     sentence, _, place = message.partition(" - at `$")
     path: Keys = ()
     value: Any = tables
+    kind: object = Trial
     for key, _anything in re.findall(r"\.(\w+)|(\[\.\.\.\])", place):
         if key:
             kind, name = get_type_hints(_arm(kind), include_extras=True)[key], key
@@ -186,24 +292,13 @@ def _explained(message: str, tables: Mapping[str, Any], kind: object) -> tuple[K
         return path, str(unknown_name(path[-1], str(value), get_args(kind)))
     if not sentence.startswith("Expected"):
         return path, sentence
-    expected = sentence.partition(", got")[0].removeprefix("Expected ").replace(" | null", "")
+    expected = sentence.partition(", got")[0].removeprefix("Expected ")
     expected = re.sub(r" [<>] -?1000000000000000\.0", "", expected)  # neither infinite nor nan
     for type_, words in _WORDS.items():
         expected = expected.replace(type_, words)
     shown = repr(value)
     shown = shown if len(shown) <= _LONGEST_SHOWN else f"{shown[:_LONGEST_SHOWN]}..."
     return path, f"{path[-1]} must be {expected}, got {shown}: change it"
-
-
-_LONGEST_SHOWN = 100
-_WORDS = {
-    "`str | object`": '"a name in the recording" or { name = ... }',
-    "`str`": "a text in quotes",
-    "`float`": "a number",
-    "`int`": "a whole number",
-    "`object`": "a table",
-    "`array`": "a list",
-}
 
 
 def _fits(value: object, kind: object) -> bool:

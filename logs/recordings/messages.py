@@ -12,7 +12,6 @@ from rosbags.typesys import Stores, get_typestore
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
-    from rosbags.typesys.stores import ros2_humble as ros
 
     from selfmodel.arrays import FloatArray
 
@@ -25,27 +24,33 @@ IMU = "sensor_msgs/msg/Imu"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
 
+TYPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "joints": (JOINT_STATE,),
+        "commands": (JOINT_STATE, ARRAY, TRAJECTORY),
+        "base": (ODOMETRY, POSE),
+        "imu": (IMU,),
+        "touch": (WRENCH, *NUMBERS, ARRAY),
+    }
+)
+"""Message types that can play each role."""
+
 Rows = tuple[tuple[str, ...], "FloatArray"]
 """Names in a message, and a row of numbers for each, ``(names, width)``."""
 
 CDR, ROS1 = "cdr", "ros1"
 """Encodings of messages: that of ROS 2 with DDS, and that of ROS 1."""
 
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""First bytes of a zstd frame. A CDR message begins with 0."""
+
 
 class RefusedError(ValueError):
     """A message contradicts itself; it is counted and left out."""
 
 
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""First bytes of a zstd frame. A CDR message begins with 0."""
-
-
 def decode(data: bytes, kind: str, encoding: str) -> tuple[int, Rows]:
-    """Returns the time stamp of a message, ns (0 if it has none), and its rows.
-
-    Raises:
-        RefusedError: The message contradicts itself.
-    """
+    """Returns the time stamp of a message, ns (0 if it has none), and its rows."""
     if encoding == CDR and data.startswith(ZSTD_MAGIC):
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
             data = reader.readall()
@@ -68,89 +73,74 @@ def _store(store: Stores) -> "Typestore":
     return get_typestore(store)
 
 
-def _joint_state(message: "ros.sensor_msgs__msg__JointState") -> Rows:
-    names = _distinct(message.name)
-    rows = np.full((len(names), 3), np.nan)
-    for column, values in enumerate((message.position, message.velocity, message.effort)):
-        if len(values) == len(names):
-            rows[:, column] = values
-        elif len(values):
+def _named(names: list[str], *columns: "FloatArray") -> Rows:
+    """Columns of numbers by name; an empty one is missing."""
+    if len(set(names)) != len(names):
+        raise RefusedError("with a name twice")
+    rows = np.full((len(names), len(columns)), np.nan)
+    for column, values in enumerate(columns):
+        if len(values) not in (0, len(names)):
             raise RefusedError("with more or fewer numbers than names")
-    return names, rows
+        if len(values):
+            rows[:, column] = values
+    return tuple(names), rows
 
 
-def _trajectory(message: "ros.trajectory_msgs__msg__JointTrajectory") -> Rows:
-    names = _distinct(message.joint_names)
+def _trajectory(message: Any) -> Rows:  # noqa: ANN401  # a class that rosbags makes
     if not message.points:
         raise RefusedError("without a point")
     positions = message.points[0].positions
-    if len(positions) != len(names):
+    if message.joint_names and not len(positions):
         raise RefusedError("with more or fewer numbers than names")
-    return names, np.array(positions, dtype=np.float64).reshape(-1, 1)
+    return _named(message.joint_names, positions)
 
 
-def _distinct(names: list[str]) -> tuple[str, ...]:
-    if len(set(names)) != len(names):
-        raise RefusedError("with a name twice")
-    return tuple(names)
+def _array(message: Any) -> Rows:  # noqa: ANN401
+    return _named([str(column) for column in range(len(message.data))], message.data)
 
 
-def _array(message: "ros.std_msgs__msg__Float64MultiArray") -> Rows:
-    values = np.array(message.data, dtype=np.float64).reshape(-1, 1)
-    return tuple(str(column) for column in range(len(values))), values
+def _one(*numbers: float) -> Rows:
+    """One row, whose column has no name."""
+    return ("",), np.array([numbers], dtype=np.float64)
 
 
-def _number(message: "ros.std_msgs__msg__Float64") -> Rows:
-    return ("",), np.array([[message.data]], dtype=np.float64)
-
-
-def _wrench(message: "ros.geometry_msgs__msg__WrenchStamped") -> Rows:
-    return ("",), np.array([[math.hypot(*_xyz(message.wrench.force))]])
-
-
-def _odometry(message: "ros.nav_msgs__msg__Odometry") -> Rows:
-    twist = message.twist.twist
-    row = [*_pose(message.pose.pose), *_xyz(twist.linear), *_xyz(twist.angular)]
-    return ("",), np.array([row])
-
-
-def _pose_stamped(message: "ros.geometry_msgs__msg__PoseStamped") -> Rows:
-    return ("",), np.array([[*_pose(message.pose), *[np.nan] * 6]])
-
-
-def _imu(message: "ros.sensor_msgs__msg__Imu") -> Rows:
+def _imu(message: Any) -> Rows:  # noqa: ANN401
     # REP 145: a first covariance of -1 means no measurement.
     known = message.orientation_covariance[0] != -1
     turning = message.angular_velocity_covariance[0] != -1
-    row = [
+    return _one(
         *(_wxyz(message.orientation) if known else [np.nan] * 4),
         *(_xyz(message.angular_velocity) if turning else [np.nan] * 3),
-    ]
-    return ("",), np.array([row])
+    )
 
 
-def _pose(pose: "ros.geometry_msgs__msg__Pose") -> list[float]:
+def _odometry(message: Any) -> Rows:  # noqa: ANN401
+    twist = message.twist.twist
+    return _one(*_pose(message.pose.pose), *_xyz(twist.linear), *_xyz(twist.angular))
+
+
+def _pose(pose: Any) -> list[float]:  # noqa: ANN401
     return [*_xyz(pose.position), *_wxyz(pose.orientation)]
 
 
-def _xyz(vector: "ros.geometry_msgs__msg__Point | ros.geometry_msgs__msg__Vector3") -> list[float]:
+def _xyz(vector: Any) -> list[float]:  # noqa: ANN401
     return [vector.x, vector.y, vector.z]
 
 
-def _wxyz(quaternion: "ros.geometry_msgs__msg__Quaternion") -> list[float]:
-    return [quaternion.w, quaternion.x, quaternion.y, quaternion.z]
+def _wxyz(quaternion: Any) -> list[float]:  # noqa: ANN401
+    return [quaternion.w, *_xyz(quaternion)]
 
 
 DECODERS: Mapping[str, Callable[[Any], Rows]] = MappingProxyType(
     {
-        JOINT_STATE: _joint_state,
+        JOINT_STATE: lambda m: _named(m.name, m.position, m.velocity, m.effort),
         TRAJECTORY: _trajectory,
         ARRAY: _array,
         ODOMETRY: _odometry,
-        POSE: _pose_stamped,
+        POSE: lambda m: _one(*_pose(m.pose), *[np.nan] * 6),
         IMU: _imu,
-        WRENCH: _wrench,
-        **dict.fromkeys(NUMBERS, _number),
+        WRENCH: lambda m: _one(math.hypot(*_xyz(m.wrench.force))),
+        **dict.fromkeys(NUMBERS, lambda m: _one(m.data)),
     }
 )
 """Decoders of the supported message types into names and rows of numbers.

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping import NONE
-from selfmodel.logs.recordings.mapping_file import RecordingMapping
+from selfmodel.logs.recordings.mapping import NONE, Trial
 from selfmodel.logs.recordings.recording import Series
 from selfmodel.logs.recordings.resample import MAX_PERIOD_RATIO, Clocked
 from selfmodel.robot.robot import Robot
@@ -70,8 +69,9 @@ class Quality:
         """Returns the quality as JSON values, with the first gaps."""
         longest = max((gap.length for gap in self.gaps), default=0.0)
         where = [list(gap) for gap in self.gaps[:MAX_GAPS_IN_FACTS]]
-        gaps = {"count": len(self.gaps), "longest": longest, "where": where}
-        return asdict(self) | {"gaps": gaps}
+        return asdict(self) | {
+            "gaps": {"count": len(self.gaps), "longest": longest, "where": where}
+        }
 
 
 def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...]) -> Quality:
@@ -80,7 +80,7 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
     times = np.unique(usable)
     periods = np.diff(times) / 1e9
     usual = float(np.median(periods)) if len(periods) else None
-    silent = periods > MAX_PERIOD_RATIO * usual if usual is not None else np.zeros(0, dtype=bool)
+    silent = periods > MAX_PERIOD_RATIO * (usual or 0.0)
     return Quality(
         roles=roles,
         type=series.type,
@@ -102,17 +102,13 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
 
 
 def notes(
-    mapping: RecordingMapping, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
+    trial: Trial, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
     """Returns the warnings, one sentence each, most important first."""
     return (
         *_pose(behaviour, robot),
-        *_travel(behaviour),
-        *_clock(mapping, qualities),
-        *_gaps(behaviour, qualities),
-        *_left_out(qualities),
-        *_lost_encoders(mapping, behaviour),
-        *_unobserved(behaviour),
+        *_of_topics(trial, behaviour, qualities),
+        *_unobserved(trial, behaviour),
     )
 
 
@@ -129,9 +125,6 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
             f"at the start these joints are far from the model's start pose, from which every "
             f"simulation begins (rad): {', '.join(far)}"
         )
-
-
-def _travel(behaviour: Behaviour) -> Iterator[str]:
     x = behaviour["base_position"][:, 0]
     if np.isnan(x).all():
         yield "where the base was is not known, so this trial says nothing of displacement"
@@ -142,38 +135,20 @@ def _travel(behaviour: Behaviour) -> Iterator[str]:
         )
 
 
-def _clock(mapping: RecordingMapping, qualities: Mapping[str, Quality]) -> Iterator[str]:
-    if mapping.trial.clock == "log":
+def _of_topics(
+    trial: Trial, behaviour: Behaviour, qualities: Mapping[str, Quality]
+) -> Iterator[str]:
+    if trial.time is None and trial.clock == "log":
         yield 'all times are log times, as clock = "log" says: latency is part of them'
-        return
+    else:
+        for topic, found in qualities.items():
+            if found.fallbacks:
+                yield (
+                    f"{topic}: {found.fallbacks} of {found.messages} messages have no time stamp "
+                    f"and go by log time, latency included"
+                )
     for topic, found in qualities.items():
-        if found.fallbacks:
-            yield (
-                f"{topic}: {found.fallbacks} of {found.messages} messages have no time stamp and "
-                f"go by log time, latency included"
-            )
-
-
-def _gaps(behaviour: Behaviour, qualities: Mapping[str, Quality]) -> Iterator[str]:
-    end = float(behaviour.time[-1])
-    for topic, found in qualities.items():
-        within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
-        if not within or found.roles == ("commands",):  # a command is held until the next
-            continue
-        listed = [
-            f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:MAX_GAPS_IN_NOTES]
-        ]
-        if len(within) > MAX_GAPS_IN_NOTES:
-            listed.append(f"{len(within) - MAX_GAPS_IN_NOTES} more")
-        starts = np.array([gap.start for gap in within])
-        ends = np.array([gap.start + gap.length for gap in within])
-        first = np.searchsorted(behaviour.time, starts, side="right")
-        last = np.searchsorted(behaviour.time, ends, side="left")
-        rows = int(np.sum(np.maximum(last - first, 0)))
-        yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
-
-
-def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:
+        yield from _gaps(topic, behaviour, found)
     for topic, found in qualities.items():
         reasons = [f"{count} {reason}" for reason, count in found.refused.items()]
         if found.repeated:
@@ -186,11 +161,25 @@ def _left_out(qualities: Mapping[str, Quality]) -> Iterator[str]:
             yield f"{topic}: {found.reordered} messages came out of order and were sorted"
 
 
-def _lost_encoders(mapping: RecordingMapping, behaviour: Behaviour) -> Iterator[str]:
-    joints = {
-        "angle": behaviour["joint_positions"],
-        "velocity": behaviour["joint_velocities"],
-    }
+def _gaps(topic: str, behaviour: Behaviour, found: Quality) -> Iterator[str]:
+    end = float(behaviour.time[-1])
+    within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
+    if not within or found.roles == ("commands",):  # a command is held until the next
+        return
+    listed = [
+        f"{gap.length * 1e3:.0f} ms at {gap.start:.3f} s" for gap in within[:MAX_GAPS_IN_NOTES]
+    ]
+    if len(within) > MAX_GAPS_IN_NOTES:
+        listed.append(f"{len(within) - MAX_GAPS_IN_NOTES} more")
+    starts, lengths = np.array(within).T
+    first = np.searchsorted(behaviour.time, starts, side="right")
+    last = np.searchsorted(behaviour.time, starts + lengths, side="left")
+    rows = int(np.sum(np.maximum(last - first, 0)))
+    yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
+
+
+def _unobserved(trial: Trial, behaviour: Behaviour) -> Iterator[str]:
+    joints = {"angle": behaviour["joint_positions"], "velocity": behaviour["joint_velocities"]}
     for quantity, values in joints.items():
         seen = np.isfinite(values)
         if not seen.any():
@@ -199,14 +188,11 @@ def _lost_encoders(mapping: RecordingMapping, behaviour: Behaviour) -> Iterator[
         for name, column in zip(behaviour.names.hinges, seen.T, strict=True):
             steps = np.flatnonzero(column)
             if not len(steps):
-                reason = f", as {NONE!r} says" if name not in mapping.trial.joints.links else ""
+                reason = f", as {NONE!r} says" if name not in trial.joints.links else ""
                 yield f"no {quantity} of {name} was observed{reason}"
             elif steps[-1] < end:
                 since = behaviour.time[steps[-1] + 1]
                 yield f"no {quantity} of {name} was observed from {since:.3f} s on"
-
-
-def _unobserved(behaviour: Behaviour) -> Iterator[str]:
     nothing = [name for name, rows in behaviour.signals.items() if np.isnan(rows).all()]
     if nothing:
         yield f"not observed at all: {', '.join(nothing)}"

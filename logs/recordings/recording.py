@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,9 +12,6 @@ from selfmodel.arrays import FloatArray
 from selfmodel.isolation import Message
 
 IntArray = NDArray[np.int64]
-
-Numbers = NDArray[Any]
-"""Array of float64 or of int64."""
 
 TABLE = "table"
 """Topic of all columns of a table, which have their times in common."""
@@ -69,23 +66,20 @@ class Recording:
     digests: Mapping[str, str]
 
 
-Content = TypeVar("Content")
+def packed(recording: Recording) -> Message:
+    """Returns a recording as a message between processes."""
 
-
-def packed(content: object) -> Message:
-    """Returns a recording or a table as a message between processes."""
-
-    def encoded(array: Numbers) -> tuple[str, tuple[int, ...], bytes]:
+    def encoded(array: NDArray[Any]) -> tuple[str, tuple[int, ...], bytes]:
         return array.dtype.str, array.shape, array.tobytes()
 
-    return Message({}, {"content": msgspec.msgpack.encode(content, enc_hook=encoded)})
+    return Message({}, {"content": msgspec.msgpack.encode(recording, enc_hook=encoded)})
 
 
-def unpacked(message: Message, kind: type[Content]) -> Content:
-    """Returns what ``packed`` has packed."""
+def unpacked(message: Message) -> Recording:
+    """Returns the recording that ``packed`` has packed."""
 
-    def decoded(_kind: type, item: tuple[str, tuple[int, ...], bytes]) -> Numbers:
+    def decoded(_kind: type, item: tuple[str, tuple[int, ...], bytes]) -> NDArray[Any]:
         dtype, shape, data = item
         return np.frombuffer(data, dtype=dtype).reshape(shape)
 
-    return msgspec.msgpack.decode(message.buffers["content"], type=kind, dec_hook=decoded)
+    return msgspec.msgpack.decode(message.buffers["content"], type=Recording, dec_hook=decoded)

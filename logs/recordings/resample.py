@@ -71,9 +71,6 @@ def clocked(series: Series, clock: str) -> Clocked:
     Args:
         series: Messages of the topic.
         clock: ``header`` for stamps, with log times for messages without a stamp; else log times.
-
-    Raises:
-        ClocksApartError: Stamps and log times differ by more than ``MAX_LATENCY``.
     """
     stamped = series.stamps > 0
     latency = (series.logged - series.stamps)[stamped] / 1e9

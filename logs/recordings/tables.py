@@ -1,59 +1,49 @@
-"""Reader of tables: columns of numbers by name, with a row per sample, as CSV, NPZ or Parquet.
+"""Tables: columns of numbers by name, with a row per sample, as CSV, NPZ or Parquet.
 
-A child process reads the file, whose content may be hostile.
+A child process reads a file, whose content may be hostile.
 """
 
 import csv
+import io
 import re
 import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, file_digest
 from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
-from selfmodel.logs.npz import NPZ_FAILURES
+from selfmodel.logs.controllers import NPZ_FAILURES
+from selfmodel.logs.files import create_file
 from selfmodel.logs.recordings.recording import (
     TABLE,
     Column,
-    Numbers,
     Recording,
     Series,
     packed,
     unpacked,
 )
-
-NO_TIME = np.iinfo(np.int64).min
-"""Missing time among integers; numpy's missing date."""
+from selfmodel.trials.behaviour import Behaviour, columns_of
 
 MAX_TIME = 2**62
 """Largest magnitude of a time, ns; sums still fit 64 bits."""
 
+_NO_TIME = np.iinfo(np.int64).min
+"""Missing time among integers; numpy's missing date."""
 
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Table of a file.
+Columns = Mapping[str, FloatArray]
 
-    Attributes:
-        format: Name of the format.
-        names: Names of all columns that may have numbers, in the order of the file.
-        columns: Wanted columns by name, ``(rows,)`` each; integers in the exact column only.
-        digest: SHA-256 of the file.
-    """
-
-    format: str
-    names: tuple[str, ...]
-    columns: Mapping[str, Numbers]
-    digest: str
+Content = tuple[list[str], dict[str, NDArray[Any]]]
+"""Names of all columns that may have numbers, and the wanted columns."""
 
 
 def is_table(path: Path) -> bool:
@@ -61,77 +51,32 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() in FORMATS
 
 
-def read_table(path: Path, wanted: Collection[str], *, exact: str = "") -> Table:
-    """Returns a table.
+def read_table(path: Path, wanted: Collection[str], *, time: str = "", unit: int = 1) -> Recording:
+    """Returns a table; without a time column, its rows have no times.
 
     Args:
         path: A file with a suffix of ``FORMATS``.
         wanted: Names of the columns to read; a name that the table does not have is left out.
-        exact: Name of the column whose integers are not rounded to float64: times in ns.
-
-    Raises:
-        InputError: The file cannot be read, or a wanted column has no numbers.
-    """
-    if path.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
-        raise InputError(f"{path}: a Parquet file needs pyarrow: pip install 'selfmodel[tables]'")
-    request = Message({"path": str(path), "wanted": sorted(wanted), "exact": exact})
-    task = "selfmodel.logs.recordings.tables:read_in_child"
-    answer = run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS)
-    return unpacked(answer, Table)
-
-
-def recording_of(path: Path, table: Table, time: str, unit: int) -> Recording:
-    """Returns the rows of a table that have a time as a recording.
-
-    Args:
-        path: The file.
-        table: Its content, with the time column as the exact one.
-        time: Name of the time column.
+        time: Name of the time column; rows without a time are left out.
         unit: Unit of its values, ns.
 
     Raises:
-        InputError: A column has another length than the time column, or a time is too large.
+        InputError: The file cannot be read, a wanted column has no numbers or another length than
+            the time column, or a time is too large.
     """
-    values = table.columns[time]
-    for name, column in table.columns.items():
-        if len(column) != len(values):
-            raise InputError(
-                f"{path}: expected {len(values)} rows in {name}, as in {time}, got {len(column)}: "
-                f"write columns of the same length"
-            )
-    rows = np.flatnonzero(np.isfinite(values) & (values != NO_TIME))
-    known = values[rows]
-    if len(far := np.flatnonzero(np.abs(known) >= MAX_TIME // unit)):
-        raise InputError(
-            f"{path}: expected times of at most {MAX_TIME / unit:.3g} in {time}, got "
-            f"{known[far[0]]:.6g} in row {rows[far[0]] + 1}: check the unit in [time]"
-        )
-    # An integer of ns has more digits than float64.
-    times = known * unit if known.dtype.kind == "i" else np.rint(known * unit).astype(np.int64)
-    index = np.arange(len(rows))
-    missing = len(values) - len(rows)
-    series = Series(
-        type=table.format,
-        count=len(values),
-        stamps=np.zeros(len(rows), dtype=np.int64),
-        logged=times,
-        names=table.names,
-        columns={
-            name: Column(index, column[rows, np.newaxis].astype(np.float64))
-            for name, column in table.columns.items()
-        },
-        refused={"without a time": missing} if missing else {},
-    )
-    return Recording({TABLE: series}, {path.name: table.digest})
+    _check_parquet(path)
+    request = Message({"path": str(path), "wanted": sorted(wanted), "time": time, "unit": unit})
+    task = "selfmodel.logs.recordings.tables:read_in_child"
+    return unpacked(run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS))
 
 
 def read_in_child(request: Message) -> Message:
     """Task of the child process; see ``read_table``."""
-    path, exact = Path(request.header["path"]), request.header["exact"]
+    path, time = Path(request.header["path"]), request.header["time"]
     form = FORMATS[path.suffix.lower()]
     check_regular(path, "a table")
     try:
-        names, columns = form.read(path, frozenset(request.header["wanted"]), exact)
+        names, found = form.read(path, frozenset(request.header["wanted"]) | {time}, time)
         digest = file_digest(path)
     except InputError:
         raise
@@ -143,22 +88,60 @@ def read_in_child(request: Message) -> Message:
     for name, count in Counter(names).items():
         if count > 1:
             raise InputError(f"{path}: {count} columns are called {name!r}: rename all but one")
-    arrays = {name: _as_numbers(values, exact=name == exact) for name, values in columns.items()}
-    return packed(Table(form.name, tuple(names), arrays, digest))
+    columns = {name: _numbers(values) for name, values in found.items()}
+    rows, times = np.arange(max(map(len, columns.values()), default=0)), np.zeros(0, dtype=np.int64)
+    if time in found:
+        rows, times = _times(path, time, _exact(found[time]), request.header["unit"])
+    count = len(found[time]) if time in found else len(rows)
+    for name, column in columns.items():
+        if len(column) != count:
+            raise InputError(
+                f"{path}: expected {count} rows in {name}, as in {time or 'the others'}, got "
+                f"{len(column)}: write columns of the same length"
+            )
+    missing = count - len(rows)
+    series = Series(
+        type=form.name,
+        count=count,
+        stamps=np.zeros_like(times),
+        logged=times,
+        names=tuple(names),
+        columns={
+            name: Column(np.arange(len(rows)), column[rows, np.newaxis])
+            for name, column in columns.items()
+        },
+        refused={"without a time": missing} if missing else {},
+    )
+    return packed(Recording({TABLE: series}, {path.name: digest}))
 
 
-Content = tuple[list[str], dict[str, NDArray[Any]]]
-"""Names of all columns that may have numbers, and the wanted columns."""
-
-
-def _as_numbers(values: NDArray[Any], *, exact: bool) -> Numbers:
-    """Numbers as float64, or as int64 if exact; dates and durations are numbers of ns."""
+def _numbers(values: NDArray[Any]) -> FloatArray:
+    """Numbers as float64; dates and durations are numbers of ns."""
     if values.dtype.kind in "mM":
-        whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
-        return whole if exact else np.where(np.isnat(values), np.nan, whole.astype(np.float64))
-    if exact and values.dtype.kind in "iu" and not (values > 2**62).any():
-        return values.astype(np.int64)
+        return np.where(np.isnat(values), np.nan, _exact(values).astype(np.float64))
     return values.astype(np.float64)
+
+
+def _exact(values: NDArray[Any]) -> NDArray[Any]:
+    """Times as int64 if they are integers: those in ns have more digits than float64."""
+    if values.dtype.kind in "mM":
+        return values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
+    whole = values.dtype.kind in "iu" and not (values > MAX_TIME).any()
+    return values.astype(np.int64 if whole else np.float64)
+
+
+def _times(
+    path: Path, name: str, values: NDArray[Any], unit: int
+) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+    """Rows that have a time, and their times, ns."""
+    rows = np.flatnonzero(np.isfinite(values) & (values != _NO_TIME))
+    known = values[rows]
+    if len(far := np.flatnonzero(np.abs(known) >= MAX_TIME // unit)):
+        raise InputError(
+            f"{path}: expected times of at most {MAX_TIME / unit:.3g} in {name}, got "
+            f"{known[far[0]]:.6g} in row {rows[far[0]] + 1}: check the unit in [time]"
+        )
+    return rows, known * unit if known.dtype.kind == "i" else np.rint(known * unit).astype(np.int64)
 
 
 # ---------------------------------------------------------------- CSV
@@ -168,7 +151,7 @@ _WORDS = {"true": 1.0, "false": 0.0}
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d{1,9})?)(?:Z|[+-]00:?00)?")
 
 
-def _read_csv(path: Path, wanted: Collection[str], exact: str) -> Content:
+def _read_csv(path: Path, wanted: Collection[str], time: str) -> Content:
     """Reads a line of names, then a line of numbers per sample.
 
     Fields are separated by commas, semicolons, tabs, bars or spaces. Where the separator is no
@@ -197,7 +180,7 @@ def _read_csv(path: Path, wanted: Collection[str], exact: str) -> Content:
                 )
             for name, place in places.items():
                 try:
-                    value = _number(row[place], exact=name == exact, comma=separator != ",")
+                    value = _number(row[place], exact=name == time, comma=separator != ",")
                 except ValueError:
                     raise InputError(
                         f"{path}, line {line}, column {place + 1} ({name}): expected a number, got "
@@ -209,8 +192,8 @@ def _read_csv(path: Path, wanted: Collection[str], exact: str) -> Content:
 
 def _separator(header: str) -> str:
     bare = re.sub(r'"[^"]*"', "", header)
-    found = max(",;\t|", key=bare.count)
-    return found if bare.count(found) or " " not in bare.strip() else " "
+    separator = max(",;\t|", key=bare.count)
+    return separator if bare.count(separator) or " " not in bare.strip() else " "
 
 
 def _rows(path: Path, rows: Iterator[list[str]]) -> Iterator[tuple[int, list[str]]]:
@@ -236,11 +219,7 @@ def _is_number(text: str) -> bool:
 
 
 def _number(text: str, *, exact: bool, comma: bool) -> float:
-    """Number in a field; NaN for a missing one.
-
-    Raises:
-        ValueError: The field is no number.
-    """
+    """Number in a field; NaN for a missing one."""
     text = text.strip()
     if exact and text.lstrip("+-").isdecimal() and len(text) < 20:
         return int(text)
@@ -262,14 +241,28 @@ def _array(values: list[float]) -> NDArray[Any]:
     """Values as int64 if all that are not missing are integers, else as float64."""
     kinds = {type(value) for value in values if value == value}  # noqa: PLR0124  # no NaN
     if kinds == {int}:
-        return np.array([value if type(value) is int else NO_TIME for value in values])
+        return np.array([value if type(value) is int else _NO_TIME for value in values])
     return np.array(values, dtype=np.float64)
+
+
+def _write_csv(file: IO[bytes], columns: Columns) -> None:
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+    rows = csv.writer(text)
+    rows.writerow(columns)
+    # The shortest text of each number that is read as the same number.
+    lists = [values.tolist() for values in columns.values()]
+    rows.writerows(
+        ["" if number != number else repr(number) for number in row]  # noqa: PLR0124  # NaN
+        for row in zip(*lists, strict=True)
+    )
+    text.flush()
+    text.detach()
 
 
 # ---------------------------------------------------------------- NPZ
 
 
-def _read_npz(path: Path, wanted: Collection[str], _exact: str) -> Content:
+def _read_npz(path: Path, wanted: Collection[str], _time: str) -> Content:
     """Reads arrays by name.
 
     An array ``(rows,)`` is a column. An array ``(rows, n)`` is n columns, called by the array's
@@ -289,30 +282,39 @@ def _read_npz(path: Path, wanted: Collection[str], _exact: str) -> Content:
                     arrays.append((name, np.asarray(archive[name])))
     labels = {n: tuple(map(str, a)) for n, a in arrays if a.ndim == 1 and a.dtype.kind == "U"}
     columns = [
-        (name, values)
-        for array, matrix in arrays
+        column
+        for name, matrix in arrays
         if matrix.dtype.kind in "fiubmM" and 1 <= matrix.ndim <= 2
-        for name, values in _columns(array, matrix, labels)
+        for column in _columns(name, matrix, labels)
     ]
     return [name for name, _ in columns], {n: v for n, v in columns if n in wanted}
 
 
 def _columns(
-    array: str, matrix: NDArray[Any], labels: Mapping[str, tuple[str, ...]]
+    name: str, matrix: NDArray[Any], labels: Mapping[str, tuple[str, ...]]
 ) -> list[tuple[str, NDArray[Any]]]:
     if matrix.ndim == 1:
-        return [(array, matrix)]
-    fitting = {name: some for name, some in labels.items() if len(some) == matrix.shape[1]}
-    own = {some for name, some in fitting.items() if name.startswith(array)}
+        return [(name, matrix)]
+    fitting = {label: texts for label, texts in labels.items() if len(texts) == matrix.shape[1]}
+    own = {texts for label, texts in fitting.items() if label.startswith(name)}
     known = own or set(fitting.values())
-    some = known.pop() if len(known) == 1 else range(matrix.shape[1])
-    return [(f"{array}.{label}", matrix[:, k]) for k, label in enumerate(some)]
+    texts = known.pop() if len(known) == 1 else range(matrix.shape[1])
+    return [(f"{name}.{text}", matrix[:, k]) for k, text in enumerate(texts)]
+
+
+def _write_npz(file: IO[bytes], columns: Columns) -> None:
+    np.savez_compressed(file, allow_pickle=False, **columns)
 
 
 # ---------------------------------------------------------------- Parquet
 
 
-def _read_parquet(path: Path, wanted: Collection[str], _exact: str) -> Content:
+def _check_parquet(path: Path) -> None:
+    if path.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+        raise InputError(f"{path}: a Parquet file needs pyarrow: pip install 'selfmodel[tables]'")
+
+
+def _read_parquet(path: Path, wanted: Collection[str], _time: str) -> Content:
     """Reads columns of numbers, booleans and times; a missing value is NaN."""
     import pyarrow as pa  # noqa: PLC0415  # an extra
     import pyarrow.parquet as pq  # noqa: PLC0415
@@ -336,22 +338,67 @@ def _read_parquet(path: Path, wanted: Collection[str], _exact: str) -> Content:
     return names, columns
 
 
+def _write_parquet(file: IO[bytes], columns: Columns) -> None:
+    import pyarrow as pa  # noqa: PLC0415  # an extra
+    import pyarrow.parquet as pq  # noqa: PLC0415
+
+    table = pa.table({name: np.array(values) for name, values in columns.items()})
+    pq.write_table(table, file, write_page_checksum=True)
+
+
+# ---------------------------------------------------------------- formats
+
+
 class Format(NamedTuple):
-    """Format of a table: its reader, and what to do about a damaged file."""
+    """Format of a table: its reader, what to do about a damaged file, and its writer."""
 
     name: str
     read: Callable[[Path, Collection[str], str], Content]
     advice: str
+    write: Callable[[IO[bytes], Columns], None] | None
 
-
-_CSV = Format("CSV", _read_csv, "save it as text in UTF-8")
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        ".csv": _CSV,
-        ".tsv": _CSV,
-        ".npz": Format("NPZ", _read_npz, "write it again with numpy.savez"),
-        ".parquet": Format("Parquet", _read_parquet, "write it again with DataFrame.to_parquet"),
+        ".csv": Format("CSV", _read_csv, "save it as text in UTF-8", _write_csv),
+        ".tsv": Format("CSV", _read_csv, "save it as text in UTF-8", None),
+        ".npz": Format("NPZ", _read_npz, "write it again with numpy.savez", _write_npz),
+        ".parquet": Format(
+            "Parquet", _read_parquet, "write it again with DataFrame.to_parquet", _write_parquet
+        ),
     }
 )
 """Formats of tables by the suffix of the file."""
+
+
+def export(path: Path, behaviour: Behaviour) -> tuple[str, ...]:
+    """Writes the observed signals of a trial as a table, which ``logs import`` reads again.
+
+    Args:
+        path: Name of the file, which must not exist, with the suffix of a format.
+        behaviour: Behaviour of the trial.
+
+    Returns:
+        Names of the columns.
+
+    Raises:
+        InputError: The file exists, has another suffix, or needs a package that is missing.
+        LogWriteError: The disk is full, or failed.
+    """
+    write = writer_of(path)
+    columns = columns_of(behaviour)
+    with create_file(path) as file:
+        write(file, columns)
+    return tuple(columns)
+
+
+def writer_of(path: Path) -> Callable[[IO[bytes], Columns], None]:
+    """Returns the writer of a table's format, by the suffix of its file."""
+    writers = {suffix: form.write for suffix, form in FORMATS.items() if form.write}
+    suffix = path.suffix.lower()
+    if suffix not in writers:
+        raise InputError(
+            f"{path}: expected a file that ends in {', '.join(writers)}, got {suffix or 'no end'}"
+        )
+    _check_parquet(path)
+    return writers[suffix]

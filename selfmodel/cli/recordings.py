@@ -12,11 +12,11 @@ from selfmodel.cli.output.printing import print_json, print_lines
 from selfmodel.cli.output.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
-from selfmodel.logs.export import export as write_table, writer_of
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.recordings.importer import ImportedTrial, import_recording, write_recording
 from selfmodel.logs.recordings.mapping_file import RecordingMapping, read_mapping
 from selfmodel.logs.recordings.suggest import suggest as suggest_mapping
+from selfmodel.logs.recordings.tables import export as write_table, writer_of
 from selfmodel.robot.robot import Robot
 
 

@@ -13,6 +13,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.recovery.random_streams import repair_stream
 from selfmodel.recovery.scores import TRACKING, UPRIGHT, Reference, Score, tracking, upright_within
@@ -177,15 +178,15 @@ def read_reference(path: Path, robot: Robot) -> Reference:
             f"{path}: expected a log (.mcap) or a table ({', '.join(FORMATS)}) as reference"
         )
     hinges = robot.anatomy.hinges
-    table = read_table(path, (TIME, *hinges))
+    table = read_table(path, (TIME, *hinges)).series[TABLE]
     found = tuple(name for name in hinges if name in table.columns)
     if TIME not in table.columns or not found:
         raise InputError(
             f"{path}: expected a column {TIME} and columns with names of joints of {robot.name} "
             f"({', '.join(hinges)}), got {', '.join(table.names) or 'none'}: rename its columns"
         )
-    time = table.columns[TIME].astype(np.float64)
-    positions = np.stack([table.columns[name].astype(np.float64) for name in found], axis=1)
+    time = table.columns[TIME].values[:, 0]
+    positions = np.concatenate([table.columns[name].values for name in found], axis=1)
     return _checked(found, time, positions, str(path))
 
 

@@ -2,17 +2,15 @@
 
 import errno
 import os
-import stat
 import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs import LogWriteError, read_log, save_controller
-from selfmodel.logs.export import export
+from selfmodel.logs import LogWriteError, read_log
 from selfmodel.logs.files import create_file, make_folder, replace_file, write_new
+from selfmodel.logs.recordings.tables import export
 
 
 def refuse(monkeypatch: pytest.MonkeyPatch, owner: object, name: str, number: int) -> None:
@@ -43,14 +41,6 @@ def test_a_new_file_has_its_name_and_replaces_no_file_that_has_it(tmp_path: Path
     with pytest.raises(InputError, match=r"a\.html exists"), create_file(path) as file:
         file.write(b"new")
     assert sorted(tmp_path.iterdir()) == sorted(names)
-
-
-def test_a_file_of_a_result_may_be_read_by_others_as_the_users_mask_allows(tmp_path: Path):
-    replace_file(tmp_path / "a.csv", b"1")
-    (tmp_path / "b.csv").touch()
-
-    modes = {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
-    assert len(modes) == 1
 
 
 @pytest.mark.parametrize("name", ["results.csv", "results.csv.part"])
@@ -125,12 +115,3 @@ def test_the_names_of_new_folders_are_on_the_disk(tmp_path: Path, monkeypatch: p
 
     assert (tmp_path / "run" / "trials").is_dir()
     assert set(synced) == {tmp_path, tmp_path / "run"}
-
-
-def test_a_controller_is_saved_once(log: Path, tmp_path: Path):
-    controller = read_log(log).trial.plan.controller
-    save_controller(tmp_path / "c.npz", controller)
-
-    with pytest.raises(InputError, match=r"c\.npz exists"):
-        save_controller(tmp_path / "c.npz", controller)
-    assert np.load(tmp_path / "c.npz")["genome"].tolist() == controller.genome.tolist()

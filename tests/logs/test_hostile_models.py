@@ -4,7 +4,6 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -12,7 +11,6 @@ from selfmodel.errors import WorkError
 from selfmodel.logs import LogError, read_log, robots
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
-from selfmodel.robot.mjcf.untrusted import checked_model
 from tests.logs.conftest import MJCF
 
 TASKS = Path(__file__).parents[2] / "tasks"
@@ -67,17 +65,6 @@ def png(width: int, height: int, pixels: bytes | None = None, texts: int = 0) ->
 
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-
-
-@pytest.mark.parametrize("name", ["quadruped", "hexapod"])
-def test_a_checked_model_compiles_to_the_same_bytes(name: str, tmp_path: Path):
-    text = (TASKS / f"{name}.xml").read_text()
-    compiled = []
-    for version, mjcf in enumerate((text, checked_model(text, {}).mjcf)):
-        path = tmp_path / f"{version}.mjb"
-        mujoco.mj_saveModel(mujoco.MjModel.from_xml_string(mjcf), str(path))
-        compiled.append(path.read_bytes())
-    assert compiled[0] == compiled[1]
 
 
 @pytest.mark.parametrize(
@@ -184,39 +171,9 @@ def test_a_damaged_or_unknown_mesh_is_refused(trial: TrialLog, file: str, data: 
         robot_of(attacked(trial, mesh(file), {file: data}))
 
 
-@pytest.mark.parametrize(
-    ("data", "match"),
-    [
-        (b"no picture", "MuJoCo cannot use the model"),
-        (b"\x89PNG\r\n\x1a\n", "cannot be loaded"),
-        (png(8, 8, b"x"), "cannot be loaded"),
-        (png(8, 8)[:-20], "cannot be loaded"),
-        (png(8, 8).replace(b"IDAT", b"IDOT"), "cannot be loaded"),
-        (png(10_000, 10_000, b""), "cannot be loaded"),
-        (png(2**31 - 1, 2**31 - 1, b""), "cannot be loaded"),
-    ],
-)
-def test_a_damaged_picture_is_refused(trial: TrialLog, data: bytes, match: str):
-    mjcf = asset('<texture name="t" type="2d" file="t.png"/>')
-    with pytest.raises(LogError, match=match):
-        robot_of(attacked(trial, mjcf, {"t.png": data}))
-
-
 def test_a_model_that_takes_too_much_memory_is_refused_in_one_sentence(trial: TrialLog):
     with pytest.raises(LogError, match=r"its model cannot be loaded: .*memory"):
         robot_of(attacked(trial, top('<size memory="99999999K"/>')))
-
-
-def test_a_model_that_fails_leaves_no_file(
-    trial: TrialLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    folder = tmp_path / "empty"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
-    for mjcf in (mesh("m.stl"), MJCF.replace('pos="0 0 0.6"', 'pos="0 0 nan"')):
-        with pytest.raises(LogError):
-            robot_of(attacked(trial, mjcf, {"m.stl": b"x" * 99}))
-    assert list(folder.iterdir()) == []
 
 
 def test_a_failure_of_the_child_process_is_not_blamed_on_the_log(

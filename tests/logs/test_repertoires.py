@@ -85,13 +85,6 @@ def test_damaged_bytes_are_an_error_with_the_remedy_or_change_nothing(
     assert "repertoire make`" in sentence
 
 
-def test_a_controller_file_is_no_repertoire(repertoire: Repertoire):
-    file = io.BytesIO()
-    np.savez(file, genome=repertoire.genomes[0])
-    with pytest.raises(InputError, match="it holds 1 other members"):
-        parse_repertoire(file.getvalue(), "here")
-
-
 def test_a_repertoire_is_read_without_mujoco_and_pyribs(repertoire: Repertoire, tmp_path: Path):
     save_repertoire(tmp_path / "gaits.npz", repertoire)
     code = (

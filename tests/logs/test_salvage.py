@@ -2,7 +2,6 @@
 
 import io
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -112,15 +111,6 @@ def test_a_sound_log_is_not_salvaged(log: Path, saved: Path):
         salvage(saved, log.with_name("again.mcap"))
 
 
-@pytest.mark.parametrize("name", ["saved.mcap", "saved.mcap.part"])
-def test_nothing_is_overwritten(log: Path, saved: Path, name: str):
-    spoilt_chunk(log, 3)
-    log.with_name(name).write_text("precious")
-    with pytest.raises(InputError, match=f"{name} exists"):
-        salvage(log, saved)
-    assert log.with_name(name).read_text() == "precious"
-
-
 def test_a_disk_that_fills_leaves_no_half_of_a_log(
     log: Path, saved: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -132,16 +122,3 @@ def test_a_disk_that_fills_leaves_no_half_of_a_log(
     with pytest.raises(LogWriteError, match="the disk is full"):
         salvage(log, saved)
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]
-
-
-@pytest.mark.parametrize(
-    "spoil", [lambda _: b"", lambda _: b"no log at all", lambda d: d[:200], lambda d: d[-200:]]
-)
-def test_where_nothing_is_left_that_is_said(
-    log: Path, saved: Path, spoil: Callable[[bytes], bytes]
-):
-    log.write_bytes(spoil(log.read_bytes()))
-    with pytest.raises(LogError, match=r"trial\.mcap: "):
-        salvage(log, saved)
-    assert salvageable_steps(log) == 0
-    assert not saved.exists()

@@ -14,11 +14,9 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.writer import CompressionType, Writer
-from rosbags.typesys import Stores, get_typestore
 
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.bags import read_bag
-from selfmodel.logs.recordings.messages import DECODERS
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.robot.robot import Robot
 from tests.logs.recordings.bags import (
@@ -98,8 +96,7 @@ def test_other_writers_of_mcap_are_read(
     assert signals(path, biped) == expected
 
 
-@pytest.mark.parametrize("listed", [True, False])
-@pytest.mark.parametrize("form", ["mcap", "sqlite-file"])
+@pytest.mark.parametrize(("form", "listed"), [("mcap", True), ("sqlite-file", False)])
 def test_split_files_are_one_bag(
     form: str, *, listed: bool, biped: Robot, expected: dict, tmp_path: Path
 ):
@@ -138,28 +135,11 @@ def test_genuine_recordings_are_read(path: Path, biped: Robot):
         imported(path, biped)
 
 
-def test_messages_in_a_foreign_encoding_are_counted_and_left_out(biped: Robot, tmp_path: Path):
-    path = tmp_path / "foreign.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros2")
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        channel = writer.register_channel("/joint_states", "wrong_format", schema)
-        writer.add_message(channel, T0, b"?", T0)
-        writer.finish()
-
-    series = read_bag(path).series["/joint_states"]
-    assert (series.count, series.names) == (1, ())
-    with pytest.raises(InputError, match="wrong_format"):
-        imported(path, biped)
-
-
 # ---------------------------------------------------------------- damage
 
 
-@pytest.mark.parametrize("damage", ["flip", "cut", "garbage"])
 @pytest.mark.parametrize("form", [*FORMS, *(f"ros1-{form}" for form in ROS1_FORMS)])
-def test_no_damage_crashes(form: str, damage: str, tmp_path: Path):
+def test_no_damage_crashes(form: str, tmp_path: Path):
     path = (
         write_ros1(tmp_path / "a.bag", recorded(0.1), form[5:])
         if form.startswith("ros1-")
@@ -167,20 +147,10 @@ def test_no_damage_crashes(form: str, damage: str, tmp_path: Path):
     )
     data = path.read_bytes()
     rng = np.random.default_rng(0)
-    for _ in range(12):
-        path.write_bytes(spoilt(data, damage, rng))
+    for k in range(15):
+        path.write_bytes(spoilt(data, ("flip", "cut", "garbage")[k % 3], rng))
         with suppress(InputError):
             read_bag(path)
-
-
-def test_a_damaged_list_of_files_does_not_crash(bag: Path):
-    listing = bag / "metadata.yaml"
-    data = listing.read_bytes()
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        listing.write_bytes(spoilt(data, "flip", rng))
-        with suppress(InputError):
-            assert read_bag(bag, ()).series
 
 
 def test_a_bag_that_is_not_there_is_named(bag: Path, tmp_path: Path):
@@ -319,15 +289,6 @@ def test_messages_that_are_missing_are_missed(
         read_bag(path)
 
 
-def test_a_message_that_does_not_fit_its_type_is_refused(tmp_path: Path):
-    path = storage(write_bag(tmp_path / "bag", [("/x", T0, array([1.5]))]))
-    count = struct.pack("<I4xd", 1, 1.5)
-    assert path.read_bytes().count(count) == 1
-    path.write_bytes(path.read_bytes().replace(count, struct.pack("<I4xd", 3, 1.5)))
-    with pytest.raises(InputError, match="damaged"):
-        read_bag(path)
-
-
 @pytest.mark.process
 def test_a_message_that_unpacks_to_a_terabyte_ends_in_one_sentence(tmp_path: Path):
     path = tmp_path / "bag.mcap"
@@ -346,12 +307,3 @@ def test_a_message_that_unpacks_to_a_terabyte_ends_in_one_sentence(tmp_path: Pat
 
     with pytest.raises(InputError, match=r"bag\.mcap"):
         read_bag(path)
-
-
-@pytest.mark.parametrize("store", [store for store in Stores if store.name.startswith("ROS2")])
-def test_the_types_that_are_read_are_alike_in_every_ros_2(store: Stores):
-    other = get_typestore(store)
-    for kind in DECODERS:
-        assert other.generate_msgdef(kind, ros_version=2) == ROS.generate_msgdef(
-            kind, ros_version=2
-        )

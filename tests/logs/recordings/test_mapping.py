@@ -1,9 +1,7 @@
 """Each mistake in a mapping is refused with its line, its key, and what could have been meant."""
 
-from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
@@ -119,16 +117,6 @@ def test_a_file_that_is_no_mapping_is_named(tmp_path: Path):
             path.write_bytes(content)
         with pytest.raises(InputError, match=r"map\.toml"):
             read_mapping(path)
-
-
-def test_no_misprint_crashes(biped: Robot, bag: Path):
-    rng = np.random.default_rng(0)
-    for _ in range(100):
-        spoilt = list(MAPPING)
-        for _ in range(int(rng.integers(1, 4))):
-            spoilt[rng.integers(len(spoilt))] = chr(rng.integers(32, 127))
-        with suppress(InputError):
-            assert imported(bag, biped, "".join(spoilt)).behaviour.steps >= 2
 
 
 def test_the_mappings_in_the_guide_are_read():

@@ -90,11 +90,3 @@ def test_a_measurement_that_is_held_grows_too_old():
     times, values = np.array([0.0, 1.0, 2.0]), np.ones((3, 1))
     result = hold(times, values, np.array([-0.1, 0.0, 2.4, 3.5, 3.6]), reach(times))
     assert np.array_equal(np.isnan(result[:, 0]), [True, False, False, False, True])
-
-
-def test_a_single_sample_bears_out_nothing_between():
-    times, values = np.zeros(1), np.ones((1, 4)) / 2
-    for method in (linear, slerp):
-        result = method(times, values, np.array([0.0, 0.1]), reach(times))
-        assert np.isnan(result[1]).all()
-        assert not np.isnan(result[0]).any()

@@ -1,16 +1,17 @@
 """A simulated trial, recorded as a driver would and imported again, still tells what is wrong."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner, Result
 
+from selfmodel.cli import app
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
@@ -57,10 +58,8 @@ def driven(
     return record(folder / "bag", quadruped, truth, gait, STEPS)
 
 
-def selfmodel(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "selfmodel", *arguments], capture_output=True, text=True, check=False
-    )
+def selfmodel(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def test_what_is_imported_is_what_was_simulated(
@@ -94,7 +93,7 @@ def test_the_right_fault_is_found_in_an_imported_trial(
     done = selfmodel(
         "logs", "import", driven, "--mapping", driven.parent / "map.toml", "-o", log, "--json"
     )
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     facts = json.loads(done.stdout)
     assert facts["valid"]["joint_positions"] == facts["valid"]["base_position"] == 1
     assert facts["topics"]["/odom"]["latency"] == pytest.approx(0.015)
@@ -122,21 +121,19 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
     assert import_recording(driven, mapped, quadruped).behaviour.steps > STEPS
 
 
-@pytest.mark.process
 def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
     done = selfmodel("logs", "import", driven, "--suggest", "--robot", "quadruped")
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     path = tmp_path / "map.toml"
     path.write_text(done.stdout)
     log = tmp_path / "trial.mcap"
     arguments = ("logs", "import", driven, "--mapping", path, "-o", log)
     done = selfmodel(*arguments)
-    assert done.returncode == 0, done.stderr
+    assert done.exit_code == 0, done.stderr
     assert max(map(len, done.stdout.partition("note:")[0].splitlines())) <= 80
     assert "start pose" in done.stdout  # the suggestion knows no offsets
     again = selfmodel(*arguments)
-    assert again.returncode == 2
-    assert again.stderr == f"error: {log} exists, and is not overwritten: choose another name\n"
+    assert str(again.exception) == f"{log} exists, and is not overwritten: choose another name"
 
 
 @pytest.mark.parametrize(
@@ -163,25 +160,8 @@ def test_what_a_mapping_names_must_be_there(
     rest = mapping(quadruped, STEPS, None).partition("\n")[2]
     path.write_text(f"{text}\n{rest}")
     done = selfmodel("logs", "import", driven, "--mapping", path, "-o", tmp_path / "t.mcap")
-    assert done.returncode == 2
     assert not (tmp_path / "t.mcap").exists()
     first, _, second = message.partition(".*")
-    assert first in done.stderr
-    assert second in done.stderr
-
-
-@pytest.mark.process
-def test_options_that_do_not_go_together_are_told(driven: Path):
-    for arguments, message in (
-        ((), "an import needs --out TRIAL.mcap and --mapping MAP.toml"),
-        (("--suggest",), "--suggest needs --robot"),
-        (("--robot", "quadruped"), "--robot is for --suggest"),
-    ):
-        done = selfmodel("logs", "import", driven, *arguments)
-        assert done.returncode == 2
-        assert message in done.stderr
-
-
-def test_help_does_not_wait_for_ros_messages():
-    code = "import sys, selfmodel.cli; assert not {'rosbags', 'ruamel'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    assert isinstance(done.exception, InputError)
+    assert first in str(done.exception)
+    assert second in str(done.exception)

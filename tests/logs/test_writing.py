@@ -1,0 +1,502 @@
+"""A log holds what a trial was, to the bit, and keeps it whatever ends the trial."""
+
+import dataclasses
+import errno
+import io
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from hypothesis.extra.numpy import arrays
+
+from selfmodel.controllers.controller import Controller
+from selfmodel.errors import InputError, TrialError
+from selfmodel.logs import LogError, LogWriteError, TruncatedError, log_file, read_log, read_truth
+from selfmodel.logs.log_file import read_contents, read_undamaged
+from selfmodel.logs.messages import TIMING, topics
+from selfmodel.logs.physical_trial import MIN_STEPS, TrialRunner, run_trial
+from selfmodel.logs.records import MAX_TEXT, RESULT, TRIAL, TrialHeader
+from selfmodel.logs.salvage import salvage
+from selfmodel.logs.writer import FLUSH_STEPS, TrialWriter, write_trial
+from selfmodel.physical.safety import HangError
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trials.behaviour import Behaviour, Sample, collect
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import TrialPlan
+from tests.logs.conftest import STEPS, made_up, plan_of, timed
+
+ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)
+SCRIPT = """
+import sys, time
+from pathlib import Path
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writer import write_trial
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from tests.logs.conftest import MJCF, made_up, plan_of
+
+robot = Robot("biped", MJCF, 0.01)
+stop_at = int(sys.argv[2])
+
+def samples():
+    for k, sample in enumerate(made_up(robot, 1000)):
+        if k == stop_at:
+            print("there", flush=True)
+            time.sleep(60)
+        yield sample
+
+write_trial(Path(sys.argv[1]), robot, plan_of(robot, 1000), samples(), TrialHeader(Settings()))
+"""
+
+
+def write(
+    path: Path, robot: Robot, samples: Iterator[Sample], steps: int = STEPS, **header: object
+) -> Path:
+    return write_trial(
+        path, robot, plan_of(robot, steps), samples, TrialHeader(Settings(), **header)
+    )
+
+
+def stopping(robot: Robot, at: int, error: BaseException, *, clock: bool) -> Iterator[Sample]:
+    samples = made_up(robot, STEPS)
+    for k, sample in enumerate(timed(samples) if clock else samples):
+        if k == at:
+            raise error
+        yield sample
+
+
+def steps_kept(part: Path, robot: Robot) -> int:
+    """Number of complete steps in an unfinished file, which must be the true ones."""
+    with pytest.raises(TruncatedError, match="selfmodel logs salvage"):
+        read_log(part)
+    contents = read_undamaged(part)[0]
+    assert set(contents.attachments) == {"model.xml", "controller.npz", "settings.json"}
+    for topic in topics(robot.anatomy.names, robot.root):
+        messages = contents.topics[topic.name]
+        rows = topic.unpack(topic.template.decode(messages.payloads)[1])
+        for k, sample in enumerate(made_up(robot, len(messages.payloads))):
+            for name in set(rows) & set(sample.values):
+                assert rows[name][k].tobytes() == sample.values[name].tobytes()
+    return len(messages.payloads)
+
+
+def full(*_: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+# ---------------------------------------------------------------- what a log holds
+
+
+def assert_same_bits(behaviour: Behaviour, expected: Behaviour):
+    assert behaviour.names == expected.names
+    assert behaviour.time.tobytes() == expected.time.tobytes()
+    assert set(behaviour.signals) == set(SIGNALS)
+    for name in SIGNALS:
+        assert behaviour[name].tobytes() == expected[name].tobytes(), name
+
+
+@settings(max_examples=12, deadline=None)
+@given(data=st.data(), steps=st.integers(1, 60))
+def test_every_signal_comes_back_to_the_bit_whatever_its_value(
+    biped: Robot, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject, steps: int
+):
+    names = biped.anatomy.names
+    series = {
+        name: data.draw(arrays(np.float64, (steps, names.width(name)), elements=ANYTHING))
+        for name in SIGNALS
+    }
+    samples = [
+        Sample(k * biped.control_timestep, {name: series[name][k] for name in SIGNALS})
+        for k in range(steps)
+    ]
+    with np.errstate(invalid="ignore"):  # infinity minus infinity, a displacement of nowhere
+        path = write(tmp_path_factory.mktemp("logs") / "a.mcap", biped, samples, steps)
+        assert_same_bits(read_log(path).trial.behaviour, collect(names, samples))
+
+
+def test_a_simulated_trial_of_every_robot_comes_back_to_the_bit(robot: Robot, tmp_path: Path):
+    samples = list(SimulatedRobot(robot).run(plan_of(robot, 101).controller, 101))
+    path = write(tmp_path / "a.mcap", robot, samples, 101)
+    assert_same_bits(read_log(path).trial.behaviour, collect(robot.anatomy.names, samples))
+
+
+def test_a_log_has_its_plan_and_the_same_trial_the_same_bytes(
+    log: Path, biped: Robot, plan: TrialPlan
+):
+    read = read_log(log)
+    assert (read.trial.plan, read.trial.robot, read.trial.path) == (plan, "biped", str(log))
+    assert (read.mjcf, read.control_timestep) == (biped.mjcf, biped.control_timestep)
+    assert (read.settings, read.status, read.reason) == (Settings(), "finished", "")
+    assert (read.timing, read.trial.behaviour.late) == (None, None)
+    assert set(read.software) == {"selfmodel", "mujoco", "numpy", "python", "mcap"}
+    way = [float(sample.values["base_position"][0]) for sample in made_up(biped, STEPS)]
+    assert read.trial.displacement == way[-1] - way[0]
+    contents = read_contents(log)
+    assert contents.metadata[TRIAL]["format"] == "1"
+    assert set(contents.metadata[RESULT]) == {"status", "steps", "displacement"}
+    again = write(log.with_name("b.mcap"), biped, made_up(biped, STEPS), hidden="intact")
+    assert again.read_bytes() == log.read_bytes()
+
+
+def test_the_truth_is_read_only_by_who_asks_for_it(log: Path, biped: Robot, tmp_path: Path):
+    logs = {"intact": read_log(log)}
+    for hidden in (None, "neuron:0"):
+        (tmp_path / str(hidden)).mkdir()
+        path = tmp_path / str(hidden) / "trial.mcap"
+        write(path, biped, made_up(biped, STEPS), hidden=hidden)
+        logs[hidden] = read_log(path)
+        assert read_truth(path) == hidden
+    assert read_truth(log) == "intact"
+    assert len({json.dumps(visible(read), sort_keys=True) for read in logs.values()}) == 1
+
+
+def visible(value: object) -> object:
+    """Everything that can be reached from a value, but the folder of its file, as JSON."""
+    if isinstance(value, np.ndarray):
+        return [value.shape, value.tobytes().hex()]
+    if hasattr(value, "items"):
+        return {key: visible(item) for key, item in value.items()}
+    if hasattr(value, "__dict__"):
+        return {key: visible(item) for key, item in vars(value).items() if key != "path"}
+    return [visible(item) for item in value] if isinstance(value, tuple) else repr(value)
+
+
+def test_a_clock_comes_back_to_the_bit(biped: Robot, tmp_path: Path):
+    samples = timed(made_up(biped, STEPS))
+    read = read_log(write(tmp_path / "a.mcap", biped, samples, timed=True))
+    moments = [sample.moment for sample in timed(made_up(biped, STEPS))]
+
+    assert read.timing is not None
+    assert read.timing.elapsed.tolist() == [moment.elapsed for moment in moments]
+    assert read.timing.late.tolist() == [moment.late for moment in moments]
+    assert read.timing.missing.tolist() == [moment.missing for moment in moments]
+    assert np.array_equal(read.trial.behaviour.late, read.timing.late)
+
+
+@pytest.mark.parametrize(("column", "value"), [(0, 0.0), (0, np.inf), (1, 0.5), (2, -1.0)], ids=str)
+def test_a_clock_that_cannot_be_is_refused(
+    biped: Robot, tmp_path: Path, column: int, value: float, monkeypatch: pytest.MonkeyPatch
+):
+    def decode(template: object, payloads: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
+        stamps, values = original(template, payloads)
+        if template is TIMING.template:
+            values = values.copy()
+            values[60, column] = value
+        return stamps, values
+
+    path = write(tmp_path / "a.mcap", biped, timed(made_up(biped, STEPS)), timed=True)
+    original = type(TIMING.template).decode
+    monkeypatch.setattr(type(TIMING.template), "decode", decode)
+    with pytest.raises(LogError, match="on /timing: expected"):
+        read_log(path)
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("spoil", "match"),
+    [
+        (lambda s: Sample(s.time + 1e-12, s.values), r"step 1 of 3 is due at 0\.01 s"),
+        (lambda s: Sample(s.time, {}), "must have sensors of shape .* got nothing"),
+        (lambda s: Sample(s.time, {**s.values, "commands": np.zeros(1)}), r"got \(1,\)"),
+        (lambda s: next(timed([s])), "step 1 has a moment"),
+    ],
+)
+def test_a_sample_that_does_not_fit_is_refused(
+    biped: Robot, tmp_path: Path, spoil: Callable[[Sample], Sample], match: str
+):
+    first, second = made_up(biped, 2)
+    with pytest.raises(InputError, match=match):
+        write(tmp_path / "a.mcap", biped, [first, spoil(second)], 3)
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_a_controller_of_another_robot_and_a_name_of_no_file_are_refused(
+    biped: Robot, quadruped: Robot, tmp_path: Path
+):
+    header = TrialHeader(Settings())
+    with pytest.raises(InputError, match="expected a controller for quadruped"):
+        TrialWriter(tmp_path / "a.mcap", quadruped, plan_of(biped, 3), header)
+    for name in ("", "../evil", "a.b", "ä", "x" * 101, "a\n"):
+        with pytest.raises(InputError, match="letters, digits and '-'"):
+            TrialWriter(tmp_path / "a.mcap", biped, plan_of(biped, 3, name), header)
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "a.mcap.part"])
+def test_an_existing_file_is_neither_overwritten_nor_run_for(
+    biped: Robot, tmp_path: Path, name: str
+):
+    (tmp_path / name).write_text("precious")
+    samples = stopping(biped, 0, AssertionError("the robot was run"), clock=False)
+    with pytest.raises(InputError, match=rf"{name} exists, and is not overwritten"):
+        write(tmp_path / "a.mcap", biped, samples)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "precious"
+
+
+def test_a_file_that_is_created_meanwhile_is_not_overwritten(biped: Robot, tmp_path: Path):
+    path = tmp_path / "a.mcap"
+
+    def intruding() -> Iterator[Sample]:
+        for k, sample in enumerate(made_up(biped, STEPS)):
+            if k == 5:
+                path.write_text("precious")
+            yield sample
+        raise AssertionError("more samples than planned were read")
+
+    with pytest.raises(InputError, match=r"the finished file is .*a\.mcap\.part"):
+        write(path, biped, intruding())
+    assert path.read_text() == "precious"
+    assert read_log(tmp_path / "a.mcap.part").status == "finished"
+
+
+# ---------------------------------------------------------------- what ends a trial
+
+
+@pytest.mark.parametrize("error", [RuntimeError("the robot fell off"), KeyboardInterrupt()])
+@pytest.mark.parametrize("at", [1, 50, 77])
+def test_what_ends_a_trial_passes_on_and_every_step_until_then_stays(
+    biped: Robot, tmp_path: Path, error: BaseException, at: int
+):
+    with pytest.raises(type(error)) as caught:
+        write(tmp_path / "a.mcap", biped, stopping(biped, at, error, clock=False))
+    assert caught.value is error
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert steps_kept(tmp_path / "a.mcap.part", biped) == at
+
+
+@pytest.mark.parametrize("at", [60, 149])
+def test_a_kill_costs_at_most_the_steps_of_one_flush(biped: Robot, tmp_path: Path, at: int):
+    process = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, tmp_path / "a.mcap", str(at)],
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "there\n"
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert at - FLUSH_STEPS < steps_kept(tmp_path / "a.mcap.part", biped) <= at
+
+
+class FallError(Exception):
+    """What a robot may end with."""
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (FallError("the leg\n came  off"), "FallError: the leg came off"),
+        (KeyboardInterrupt(), "KeyboardInterrupt"),
+        (FallError("x" * 9999), f"FallError: {'x' * (MAX_TEXT - 11)}"),
+        (FallError("/dev/\udcff"), r"FallError: /dev/\udcff"),
+    ],
+    ids=["error", "Ctrl-C", "long", "no text"],
+)
+@pytest.mark.parametrize("at", [1, 51])
+def test_a_trial_with_a_clock_that_is_stopped_is_a_whole_log(
+    biped: Robot, tmp_path: Path, error: BaseException, reason: str, at: int
+):
+    with pytest.raises(type(error)) as caught:
+        write(tmp_path / "a.mcap", biped, stopping(biped, at, error, clock=True), timed=True)
+    log = read_log(tmp_path / "a.mcap")
+
+    assert caught.value is error
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+    assert (log.status, log.trial.behaviour.steps, log.reason) == ("stopped", at, reason)
+    with pytest.raises(InputError, match="the trial in it is stopped"):
+        salvage(tmp_path / "a.mcap", tmp_path / "b.mcap")
+
+
+def test_a_trial_that_stops_before_its_first_step_has_no_log(biped: Robot, tmp_path: Path):
+    with pytest.raises(FallError):
+        write(tmp_path / "a.mcap", biped, stopping(biped, 0, FallError(), clock=True), timed=True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_steps_are_written_leaves_what_can_be_salvaged(
+    biped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def samples() -> Iterator[Sample]:
+        for k, sample in enumerate(timed(made_up(biped, STEPS))):
+            if k == 50:  # the next one is written with the 49 before
+                monkeypatch.setattr(log_file.LogFile, "messages", interrupt)
+            yield sample
+
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path / "a.mcap", biped, samples(), timed=True)
+    monkeypatch.undo()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.part"]
+    assert salvage(tmp_path / "a.mcap.part", tmp_path / "b.mcap").steps == 1
+
+
+def test_a_disk_that_is_full_as_a_trial_is_stopped_does_not_hide_why(
+    biped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def samples() -> Iterator[Sample]:
+        yield from timed(made_up(biped, 20))
+        monkeypatch.setattr(log_file.LogFile, "metadata", full)
+        raise FallError
+
+    with pytest.raises(FallError) as caught:
+        write(tmp_path / "a.mcap", biped, samples(), timed=True)
+    assert os.strerror(errno.ENOSPC) in caught.value.__notes__[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.part"]
+
+
+class FullDisk(io.FileIO):
+    """A file on a disk that has room for so many bytes."""
+
+    room = 0
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Writes, while there is room."""
+        size = memoryview(data).nbytes
+        if self.room < size:
+            full()
+        self.room -= size
+        return super().write(data) or 0
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.999])
+def test_a_full_disk_is_named_with_the_file(
+    biped: Robot, log: Path, monkeypatch: pytest.MonkeyPatch, share: float
+):
+    room, folder = int(share * log.stat().st_size), log.parent / "full"
+    folder.mkdir()
+
+    def opened(path: Path, mode: str) -> io.BufferedWriter:
+        raw = FullDisk(path, mode)
+        raw.room = room
+        return io.BufferedWriter(raw)
+
+    monkeypatch.setattr(Path, "open", opened)
+    with pytest.raises(LogWriteError, match=r"a\.mcap\.part: the disk is full") as caught:
+        write(folder / "a.mcap", biped, made_up(biped, STEPS), hidden="intact")
+    assert caught.value.errno == errno.ENOSPC
+    assert [file.name for file in folder.iterdir()] == ["a.mcap.part"]
+
+
+def test_a_size_limit_is_named_with_the_file(tmp_path: Path):
+    result = subprocess.run(
+        [sys.executable, "-c", SCRIPT, tmp_path / "a.mcap", "2000"],
+        check=False,
+        capture_output=True,
+        cwd=Path(__file__).parents[2],
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000)),
+    )
+    assert "a.mcap.part: the file has reached the size that this system allows" in result.stderr
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mcap.part"]
+
+
+class Wrapped:
+    """Samples that are looked at on their way; no generator."""
+
+    def __init__(self, samples: Generator[Sample]) -> None:
+        self.samples = samples
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Returns the samples."""
+        return self.samples
+
+    def close(self) -> None:
+        """Closes the samples."""
+        self.samples.close()
+
+
+def test_the_robot_stops_before_the_log_is_closed(biped: Robot, tmp_path: Path):
+    order = []
+
+    def samples(name: str) -> Iterator[Sample]:
+        try:
+            yield from made_up(biped, STEPS)
+            yield Sample(-1.0, {})  # nobody asks for it
+        finally:
+            order.append((tmp_path / name).exists())
+
+    write(tmp_path / "a.mcap", biped, samples("a.mcap"))
+    write(tmp_path / "c.mcap", biped, Wrapped(samples("c.mcap")))
+    assert order == [False, False]
+
+
+# ---------------------------------------------------------------- physical robots
+
+
+class Untimed:
+    """A physical robot with made-up samples, which may end with an error."""
+
+    def __init__(self, robot: Robot, steps: int = 10**6, error: Exception | None = None) -> None:
+        self._robot, self._steps, self._error = robot, steps, error
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields made-up samples that depend on the controller."""
+        seed = int(controller.genome.sum() * 100) % 1000
+        yield from made_up(self._robot, min(steps, self._steps), seed)
+        if self._error is not None:
+            raise self._error
+
+
+class Timed(Untimed):
+    """A physical robot with a clock of its own."""
+
+    def clock(self) -> float:
+        """Returns a time."""
+        return 0.0
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields made-up samples with their timing."""
+        return timed(super().run(controller, steps))
+
+
+@pytest.mark.parametrize("kind", [Untimed, Timed])
+def test_a_physical_trial_is_that_of_its_log_and_timed_as_the_robot_is(
+    biped: Robot, tmp_path: Path, kind: type[Untimed]
+):
+    path = tmp_path / "trial.mcap"
+    header = TrialHeader(Settings(), timed=kind is Untimed)  # the robot decides
+    trial = run_trial(kind(biped), plan_of(biped, 20), path, biped, header)
+    log = read_log(path)
+
+    assert (log.timing is not None) == (kind is Timed)
+    assert (trial.plan, trial.path) == (log.trial.plan, str(path))
+    assert_same_bits(trial.behaviour, log.trial.behaviour)
+
+
+@pytest.mark.parametrize("case", ["whole", "short", "hanging", "not stopped", "before"])
+def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
+    biped: Robot, tmp_path: Path, case: str
+):
+    error = HangError("step hangs") if case == "hanging" else TrialError("it fell")
+    if case == "not stopped":
+        error.add_note("the safe command could not be sent")
+    robot = Untimed(biped, MIN_STEPS - (case == "short"), error)
+    stage = "before" if case == "before" else "recovery"
+    plan = dataclasses.replace(plan_of(biped, 2 * MIN_STEPS, "02-recovery"), stage=stage)
+    run = TrialRunner(tmp_path, biped, Settings())
+    if case != "whole":
+        with pytest.raises(TrialError, match=str(error)):
+            run(robot, plan)
+        return
+    trial, log = run(robot, plan), read_log(tmp_path / "02-recovery.mcap")
+
+    assert (trial.plan.steps, trial.behaviour.steps) == (2 * MIN_STEPS, MIN_STEPS)
+    assert (log.status, log.reason) == ("stopped", "TrialError: it fell")
