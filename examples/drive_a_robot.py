@@ -19,7 +19,7 @@ from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
-from selfmodel.physical.safety import joint_limits, tilt_limit
+from selfmodel.physical.interface import joint_limits, tilt_limit
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -28,7 +28,7 @@ OPTIONS = "options.json"
 class FolderJournal:
     """Journal of a recovery in a folder; ``create_journal`` makes the folder.
 
-    See ``selfmodel.recovery.database.Journal``.
+    See ``selfmodel.recovery.Journal``.
 
     Attributes:
         folder: Folder with ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.

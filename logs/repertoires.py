@@ -28,7 +28,8 @@ from selfmodel.logs.controllers import (
     read_arrays,
 )
 from selfmodel.logs.files import replace_file
-from selfmodel.recovery.repertoire import Modelled, Origin, Repertoire, model_digest
+from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
+from selfmodel.robot.robot import Robot
 
 MAX_BYTES = 2**28
 """Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have
@@ -71,7 +72,7 @@ def save_repertoire(path: Path, repertoire: Repertoire) -> None:
     replace_file(path, repertoire_bytes(repertoire))
 
 
-def load_repertoire(path: Path, robot: Modelled | None = None) -> Repertoire:
+def load_repertoire(path: Path, robot: Robot | None = None) -> Repertoire:
     """Returns the verified repertoire in a file.
 
     Args:
@@ -87,7 +88,7 @@ def load_repertoire(path: Path, robot: Modelled | None = None) -> Repertoire:
     return repertoire
 
 
-def check_model(repertoire: Repertoire, robot: Modelled, source: str) -> None:
+def check_model(repertoire: Repertoire, robot: Robot, source: str) -> None:
     """Checks that a repertoire is of a robot.
 
     Args:

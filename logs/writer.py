@@ -62,8 +62,8 @@ from selfmodel.logs.viewers import (
     to_micrometres,
     urdf,
 )
-from selfmodel.physical.safety import cleanup
-from selfmodel.physical.stop_signals import (
+from selfmodel.physical.safety import (
+    cleanup,
     handle_stop_signals,
     hold_stop_signals,
     release_stop_signals,

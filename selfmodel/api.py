@@ -38,12 +38,16 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.events import Event
-from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair, diagnose_trials
+from selfmodel.recovery.recover import (
+    NextTrial,
+    RecoveryLoop,
+    by_repair,
+    diagnose_trials,
+    random_stream,
+)
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
@@ -103,7 +107,7 @@ def evolve_controller(
     chosen = plugins.design(design, robot) if isinstance(design, str) else design
     repair = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     assumed, faults = partial(assumed_uncertainty, robot), (hypothesis_of(hypothesis, robot),)
-    return repair(faults, assumed, seeds, repair_stream(seed, 0), on_event)[0].controller
+    return repair(faults, assumed, seeds, random_stream(seed, "repair"), on_event)[0].controller
 
 
 def run_trial(

@@ -1,8 +1,9 @@
-"""The generational EA of the paper, with the interface ``ask``, ``tell``, ``stop``."""
+"""The generational EA of the paper, and the loop that runs any search over genomes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 
@@ -36,8 +37,30 @@ GenerationCallback = Callable[[Generation], None]
 """Callback, called after each generation."""
 
 
+class GenomeSearch(Protocol):
+    """Search over genomes; fitness is maximised. ``evolve`` runs it.
+
+    Attributes:
+        evaluations: Number of genomes evaluated so far.
+    """
+
+    evaluations: int
+
+    def ask(self) -> FloatArray:
+        """Returns the genomes to evaluate, ``(n, length)``; the same ones until ``tell``."""
+        ...
+
+    def tell(self, fitness: FloatArray) -> None:
+        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``."""
+        ...
+
+    def candidates(self, count: int) -> FloatArray:
+        """Returns at most ``count`` genomes that may be the best, ``(n, length)``."""
+        ...
+
+
 class Evolution:
-    """Generational EA with the interface ``ask``, ``tell``, ``stop``; fitness is maximised.
+    """Generational EA, a ``GenomeSearch``; fitness is maximised.
 
     The best half of the population survives. The other half are children: copies of tournament
     winners among the survivors, mutated, some pairs with one-point crossover. Source: the paper,
@@ -67,7 +90,6 @@ class Evolution:
         self._settings, self._draw, self._rng, self._noisy = settings, draw, rng, noisy
         self._asked = first_generation(settings.population, length, draw, rng, seeds)
         self._genomes, self._fitness = np.empty((0, length)), np.empty(0)
-        self.generations = settings.generations
         self.generation = 0
         self.evaluations = 0
 
@@ -104,11 +126,9 @@ class Evolution:
         """Returns at most ``count`` of the best genomes, best first, ``(n, length)``."""
         return self._genomes[:count]
 
-    def stop(self) -> dict[str, int]:
-        """Returns the stop reason, such as ``{"generations": 30}``; empty while the search runs."""
-        if self.generation >= self.generations:
-            return {"generations": self.generations}
-        return {}
+    def generations_left(self) -> int:
+        """Returns the number of generations that remain."""
+        return self._settings.generations - self.generation
 
 
 def first_generation(
@@ -189,26 +209,28 @@ def reproduce(
 
 
 def evolve(
-    search: Evolution,
+    search: GenomeSearch,
     fitness: Callable[[FloatArray], FloatArray],
     on_generation: GenerationCallback,
+    generations_left: Callable[[], int],
+    *,
+    noisy: bool = False,
 ) -> None:
-    """Runs a search to its end.
+    """Runs a search to its end: at least one generation.
 
     Args:
-        search: The search; after the call, ``search.best`` is the best genome found.
+        search: The search.
         fitness: Fitness function, from genomes ``(n, length)`` to ``(n,)``.
         on_generation: Called after each generation.
+        generations_left: Returns the number of generations that remain, such as
+            ``Evolution.generations_left``.
+        noisy: Whether fitness is comparable within a generation only.
     """
-    start = perf_counter()
-    while not search.stop():
-        search.tell(fitness(search.ask()))
-        on_generation(
-            Generation(
-                number=search.generation,
-                total=search.generations,
-                best=search.best_fitness,
-                evaluations=search.evaluations,
-                seconds=perf_counter() - start,
-            )
-        )
+    start, number, best, left = perf_counter(), 0, -np.inf, 1
+    while left:
+        values = fitness(search.ask())
+        search.tell(values)
+        best = float(values.max() if noisy else max(best, values.max()))
+        number, left = number + 1, generations_left()
+        seconds = perf_counter() - start
+        on_generation(Generation(number, number + left, best, search.evaluations, seconds))

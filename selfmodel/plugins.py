@@ -21,10 +21,16 @@ from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
-from selfmodel.recovery.repair import MakeRepair, RepairSearch
+from selfmodel.recovery.repair import (
+    MakeRepair,
+    MakeSearch,
+    RepairSearch,
+    RobustRepair,
+    from_repertoire,
+)
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.robust_repair import MakeSearch, RobustRepair, from_repertoire
-from selfmodel.recovery.scores import DISPLACEMENT, ENERGY, TRACKING, UPRIGHT, Score, checked
+from selfmodel.recovery.scores import DISPLACEMENT, SCORES, UPRIGHT, Score, checked
+from selfmodel.recovery.tracking import TRACKING
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
@@ -237,11 +243,10 @@ def score(name: str, robot: str, entry: Entry) -> Score:
             robot has no task with rewards. The function of a plug-in's score raises it if it
             returns other than one number per run.
     """
-    by_name = {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY)}
-    if name in by_name:
-        return by_name[name]
+    if name in SCORES:
+        return SCORES[name]
     if name != RETURN:
-        found = _plug_in("score", name, SCORE_GROUP, (*by_name, RETURN, TRACKING))
+        found = _plug_in("score", name, SCORE_GROUP, (*SCORES, RETURN, TRACKING))
         if not isinstance(found, Score):
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"

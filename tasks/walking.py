@@ -14,8 +14,14 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.gap import Measurement, NoisyMeasurement, draw_gap
-from selfmodel.physical.simulated import detached_limbs, physical_embodiment, place_debris
+from selfmodel.physical.simulated import (
+    Measurement,
+    NoisyMeasurement,
+    detached_limbs,
+    draw_gap,
+    physical_embodiment,
+    place_debris,
+)
 from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot

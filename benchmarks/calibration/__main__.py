@@ -20,9 +20,8 @@ import numpy as np
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.random_streams import gap_stream, repair_stream
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
+from selfmodel.recovery.recover import random_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
@@ -61,7 +60,9 @@ def main() -> None:
         robot = ROBOTS[name].robot()
         gaits = [_gait(robot, number, options.bank) for number in range(SEEN + 1)]
         for seed in range(options.seeds):
-            rows += _compare(robot, gaits, draw_gap(robot, options.gap, gap_stream(seed)), ways)
+            rows += _compare(
+                robot, gaits, draw_gap(robot, options.gap, random_stream(seed, "gap")), ways
+            )
             print(json.dumps(rows[-len(ways) - 3 :]), flush=True)
     text = json.dumps({"gap": options.gap, "rows": rows}, indent=1)
     options.out.write_text(text + "\n", encoding="utf-8")
@@ -155,7 +156,7 @@ def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
     if bank is not None:
         return bank_gait(bank, robot.name, number)
     repair = RepairSearch(Simulator(robot, threads=1), Settings())
-    assumed, stream = partial(assumed_uncertainty, robot), repair_stream(number, 0)
+    assumed, stream = partial(assumed_uncertainty, robot), random_stream(number, "repair")
     return repair((INTACT,), assumed, (), stream, lambda _generation: None)[0].controller
 
 

@@ -26,12 +26,13 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
 from selfmodel.recovery.cma_es import CmaEs
-from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
-from selfmodel.recovery.robust_repair import RobustFitness
+from selfmodel.recovery.repair import RobustFitness
+from selfmodel.recovery.repertoire import make_repertoire, simulated_evaluation
 from selfmodel.recovery.scores import UPRIGHT
-from selfmodel.recovery.uncertainty import noise_of_gap
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
+from selfmodel.simulation.domain import DomainDistribution, start_spread
+from selfmodel.simulation.model_factors import exact
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
@@ -220,7 +221,14 @@ def noisy_fitness(
 
     Each call has new noise, which its controllers share.
     """
-    noise, rng = noise_of_gap(simulator.robot, level), np.random.default_rng(key)
+    robot, rng = simulator.robot, np.random.default_rng(key)
+    touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
+    noise = DomainDistribution(
+        models=exact(robot),
+        reading_noise=np.where(touch, 0.0, level),
+        wrong_touches=np.where(touch, level / 2, 0.0),
+        start=start_spread(level),
+    )
     fitness = RobustFitness(simulator, UPRIGHT, (hypothesis,), noise)
 
     def of(controllers: Sequence[Controller]) -> FloatArray:

@@ -12,7 +12,7 @@ from selfmodel.cli.output.plain import plain
 from selfmodel.cli.output.printing import print_lines, print_notes
 from selfmodel.cli.output.streams import flush_output, open_streams
 from selfmodel.errors import InputError, WorkError, describe
-from selfmodel.physical.stop_signals import handle_stop_signals, status_of
+from selfmodel.physical.safety import handle_stop_signals, status_of
 
 SUITE = group(
     "suite",

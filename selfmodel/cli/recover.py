@@ -21,8 +21,8 @@ from selfmodel.logs.files import replace_file
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.results import RESULT, as_json as values_of, write_searches
 from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
-from selfmodel.report.page import REPORT, html_of
 from selfmodel.report.progress import Progress
 from selfmodel.report.subject import subject_of_run
 from selfmodel.robot.robot import Robot

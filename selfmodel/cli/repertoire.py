@@ -14,12 +14,12 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
-from selfmodel.recovery.map_elites import (
+from selfmodel.recovery.repertoire import (
     Filling,
+    Repertoire,
     make_repertoire,
     simulated_evaluation,
 )
-from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.simulation.simulator import Simulator
 
 NOTES = 10

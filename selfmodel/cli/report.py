@@ -13,9 +13,8 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.files import refuse_existing, write_new
 from selfmodel.report.campaign import is_campaign, report_of_campaign
-from selfmodel.report.charts import Report
+from selfmodel.report.charts import REPORT, Report, html_of
 from selfmodel.report.content import report_of
-from selfmodel.report.page import REPORT, html_of
 from selfmodel.report.subject import Subject, is_run, subject_of_logs, subject_of_run
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.trials.trial import trial_names

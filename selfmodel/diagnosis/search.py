@@ -90,7 +90,7 @@ def evolved(
         rng,
         [space.encode(hypothesis, settings.genes) for hypothesis in seeds],
     )
-    evolve(search, fitness, on_generation)
+    evolve(search, fitness, on_generation, search.generations_left)
     return by_distance(totals), search.evaluations
 
 

@@ -1,13 +1,10 @@
 from .environment import EnvironmentRobot as EnvironmentRobot
-from .gap import draw_gap as draw_gap
-from .interface import PhysicalRobot as PhysicalRobot, TimedRobot as TimedRobot
-from .safety import (
+from .interface import (
     Limit as Limit,
+    PhysicalRobot as PhysicalRobot,
+    TimedRobot as TimedRobot,
     joint_limits as joint_limits,
     tilt_limit as tilt_limit,
 )
-from .simulated import SimulatedRobot as SimulatedRobot
-from .stop_signals import (
-    Terminated as Terminated,
-    handle_stop_signals as handle_stop_signals,
-)
+from .safety import Terminated as Terminated, handle_stop_signals as handle_stop_signals
+from .simulated import SimulatedRobot as SimulatedRobot, draw_gap as draw_gap

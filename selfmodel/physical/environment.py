@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from typing import Any
 
@@ -14,8 +15,14 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError
-from selfmodel.physical.safety import HangError, Limit, Watchdog, cleanup
-from selfmodel.physical.stop_signals import HeldIterator, release_stop_signals
+from selfmodel.physical.interface import Limit
+from selfmodel.physical.safety import (
+    HangError,
+    HeldIterator,
+    Watchdog,
+    cleanup,
+    release_stop_signals,
+)
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Sample, StepTiming
@@ -57,6 +64,7 @@ def signals_by_name(
     return signals
 
 
+@dataclass(eq=False, repr=False)
 class EnvironmentRobot:
     """Physical robot that is stepped through an environment; see ``PhysicalRobot``.
 
@@ -72,7 +80,7 @@ class EnvironmentRobot:
     a caller that stops iterating, or a signal: Ctrl-C, and within ``handle_stop_signals``, as in
     ``run_trial`` and ``recover``, SIGTERM and SIGHUP. A signal does not interrupt the safe command.
 
-    Args:
+    Attributes:
         env: The environment. Its actions are the motor targets, in the order of the model's motors.
         robot: The robot as its model describes it.
         observe: Converts an observation to signals.
@@ -99,47 +107,44 @@ class EnvironmentRobot:
             of motors, or a watchdog has no ``stop`` or no positive time.
     """
 
-    def __init__(
-        self,
-        env: dm_env.Environment,
-        robot: Robot,
-        *,
-        observe: Observe = signals_by_name,
-        stop: Callable[[], object] | None = None,
-        safe: FloatArray | None = None,
-        limits: Sequence[Limit] = (),
-        critical: Sequence[Signal] = (),
-        patience: int = 5,
-        watchdog: float | None = None,
-        tolerance: float = 0.25,
-        silent_neurons: Iterable[int] = (),
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        motors = (len(robot.anatomy.motors),)
-        targets = _nearest_to_zero(robot) if safe is None else np.array(safe, dtype=np.float64)
+    env: dm_env.Environment
+    robot: Robot
+    _: KW_ONLY
+    observe: Observe = signals_by_name
+    stop: Callable[[], object] | None = None
+    safe: FloatArray | None = None
+    limits: Sequence[Limit] = ()
+    critical: Sequence[Signal] = ()
+    patience: int = 5
+    watchdog: float | None = None
+    tolerance: float = 0.25
+    silent_neurons: Iterable[int] = ()
+    clock: Callable[[], float] = time.monotonic
+    _dog: Watchdog | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        anatomy = self.robot.anatomy
+        motors = (len(anatomy.motors),)
+        given = _nearest_to_zero(self.robot) if self.safe is None else self.safe
+        targets = np.array(given, dtype=np.float64)
         for what, shape in (
-            ("the environment's actions", tuple(env.action_spec().shape)),
+            ("the environment's actions", tuple(self.env.action_spec().shape)),
             ("the safe targets", targets.shape),
         ):
             if shape != motors:
                 raise InputError(
-                    f"{what} must be targets of the {motors[0]} motors of {robot.name} "
-                    f"({', '.join(robot.anatomy.motors)}), got the shape {shape}"
+                    f"{what} must be targets of the {motors[0]} motors of {self.robot.name} "
+                    f"({', '.join(anatomy.motors)}), got the shape {shape}"
                 )
-        if watchdog is not None and (stop is None or not 0 < watchdog < float("inf")):
+        seconds = self.watchdog
+        if seconds is not None and (self.stop is None or not 0 < seconds < math.inf):
             raise InputError(
                 f"a watchdog needs a time of more than 0 s, and stop=, a function that stops the "
-                f"robot while the environment hangs; got {watchdog!r} and "
-                f"{'no function' if stop is None else 'a function'}"
+                f"robot while the environment hangs; got {seconds!r} and "
+                f"{'no function' if self.stop is None else 'a function'}"
             )
-        self._env, self._robot, self._observe = env, robot, observe
-        self._halt = stop or partial(_step_to, env, targets)
-        self._limits, self._critical = tuple(limits), tuple(critical)
-        self._patience, self._tolerance = patience, tolerance
-        self._watchdog_seconds = watchdog
-        self._watchdog: Watchdog | None = None
-        self._silent_neurons = frozenset(silent_neurons)
-        self.clock = clock
+        self.silent_neurons = frozenset(self.silent_neurons)
+        self._halt = self.stop or partial(_step_to, self.env, targets)
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller; see ``PhysicalRobot``.
@@ -169,13 +174,13 @@ class EnvironmentRobot:
         Raises:
             TrialError: The driver still hangs in a call of an earlier trial.
         """
-        if self._watchdog_seconds is None:
+        if self.watchdog is None:
             yield lambda _, function: function()
             return
-        if self._watchdog is not None and self._watchdog.hangs:
+        if self._dog is not None and self._dog.hangs:
             raise TrialError("the driver has not returned from a call of an earlier trial")
-        with Watchdog(self._watchdog_seconds, self._send_safe) as self._watchdog:
-            yield self._watchdog.call
+        with Watchdog(self.watchdog, self._send_safe) as self._dog:
+            yield self._dog.call
 
     def _make_safe(self) -> None:
         try:
@@ -194,11 +199,11 @@ class EnvironmentRobot:
             ) from error
 
     def _steps(self, call: Call, controller: CommandSource, steps: int) -> Iterator[Sample]:
-        robot = self._robot
+        robot = self.robot
         names, timestep = robot.anatomy.names, robot.control_timestep
-        controllers = make_batch([controller], [self._silent_neurons], len(names.sensors))
+        controllers = make_batch([controller], [frozenset(self.silent_neurons)], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
-        needed = {signal for limit in self._limits for signal in limit.signals}
+        needed = {signal for limit in self.limits for signal in limit.signals}
         if not isinstance(controller, Playback):
             needed.add("sensors")
         missing_steps: dict[Signal, IndexArray] = {
@@ -206,7 +211,7 @@ class EnvironmentRobot:
             for signal in SIGNALS
             if signal in needed or signal == "sensors"
         }
-        timer = StepTimer(timestep, self._tolerance)
+        timer = StepTimer(timestep, self.tolerance)
         ended = False
         for k in range(steps):
             if ended:
@@ -216,7 +221,7 @@ class EnvironmentRobot:
                 )
             result = self._step_environment(call, commands[0] if k else None)
             ended = result is not None and result.last()
-            observation = self._observe(result.observation) if result is not None else None
+            observation = self.observe(result.observation) if result is not None else None
             timing = timer.update(self.clock(), observation)
             values = _rows(names, {} if timing.missing or observation is None else observation)
             for signal, counts in missing_steps.items():
@@ -234,8 +239,8 @@ class EnvironmentRobot:
         try:
             with release_stop_signals():
                 if targets is None:
-                    return call("reset", self._env.reset)
-                return call("step", partial(self._env.step, targets.copy()))
+                    return call("reset", self.env.reset)
+                return call("step", partial(self.env.step, targets.copy()))
         except TimeoutError:
             return None
         except HangError:
@@ -263,9 +268,9 @@ class EnvironmentRobot:
             TrialError: A required signal is missing for too long, a number is invalid, or a limit
                 is exceeded.
         """
-        patience = self._patience if k else 0  # at step 0 there are no previous readings
+        patience = self.patience if k else 0  # at step 0 there are no previous readings
         for signal, counts in missing_steps.items():
-            columns = self._robot.anatomy.names.columns(signal)
+            columns = self.robot.anatomy.names.columns(signal)
             pairs = zip(columns, counts > patience, strict=True)
             if lacking := ", ".join(name for name, is_missing in pairs if is_missing):
                 if signal != "sensors":
@@ -276,9 +281,9 @@ class EnvironmentRobot:
         for signal, row in values.items():
             if np.any(np.isinf(row)):
                 raise TrialError(f"{signal} is infinite at step {k}")
-            if signal in self._critical and not missing and np.any(np.isnan(row)):
+            if signal in self.critical and not missing and np.any(np.isnan(row)):
                 raise TrialError(f"{signal} is not a number at step {k}")
-        for limit in self._limits:
+        for limit in self.limits:
             if reason := limit.reason(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
 

@@ -1,84 +1,207 @@
-"""When and how a robot is stopped: limits, cleanup, a watchdog of its driver."""
+"""How a robot is stopped: by signals, by cleanup, by a watchdog of its driver.
 
+Python raises ``KeyboardInterrupt`` at SIGINT, between any two instructions, and exits at once at
+SIGTERM and SIGHUP. Here all three raise an exception that is a ``KeyboardInterrupt``, once, and not
+in a critical section: while a safe command is sent, or while a log is written or closed.
+"""
+
+import os
+import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from types import TracebackType
-from typing import Any, Self
+from types import FrameType, TracebackType
+from typing import Any, Generic, Self, TypeVar
 
-import numpy as np
-
-from selfmodel.arrays import FloatArray
 from selfmodel.errors import TrialError, WorkError, describe
-from selfmodel.robot.robot import Robot
-from selfmodel.trials.signals import Signal
 
-NORM_TOLERANCE = 0.01
-"""Largest deviation of a measured quaternion's norm from 1."""
+Item = TypeVar("Item")
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+REPETITION = 0.2
+"""Seconds after a stop signal in which another one counts as the same one: ``timeout``, systemd and
+a terminal that closes send two within milliseconds."""
 
 
-@dataclass(frozen=True)
-class Limit:
-    """Safety limit: a condition under which a robot is stopped.
+class Terminated(KeyboardInterrupt, SystemExit):
+    """The process received SIGTERM or SIGHUP.
+
+    Whatever handles Ctrl-C handles it as well. Uncaught, it ends the program as ``SystemExit``
+    does: without a traceback, and with the exit status of the signal, 143 or 129.
+    """
+
+    def __init__(self, number: signal.Signals) -> None:
+        super().__init__(number.name)
+        self.code = self.status = _exit_status(number)
+
+
+def status_of(interruption: KeyboardInterrupt) -> int:
+    """Returns the exit status of a program that an interruption ends."""
+    if isinstance(interruption, Terminated):
+        return interruption.status
+    return _exit_status(signal.SIGINT)
+
+
+def _exit_status(number: int) -> int:
+    """Returns the exit status that a shell reports for a program that a signal ended."""
+    return 128 + number
+
+
+class _Handler:
+    """Handler of the stop signals of a process: the first is raised, a later one ends the process.
+
+    Because only one signal is ever raised, its exception may leave ``held`` as it is.
 
     Attributes:
-        signals: Required signals; a robot that does not observe them is stopped too.
-        reason: Returns the reason to stop the robot, or "" if no limit is exceeded. The argument
-            is the row of each signal, ``(width,)``, NaN where not observed.
+        held: Whether a signal waits for the end of the critical section; None outside of any.
+        waiting: Signal of a critical section that has not ended it yet.
     """
 
-    signals: tuple[Signal, ...]
-    reason: Callable[[Mapping[Signal, FloatArray]], str]
+    def __init__(self) -> None:
+        self.held: bool | None = None
+        self.waiting: signal.Signals | None = None
+        self._received: float | None = None
+
+    def __call__(self, number: int, _frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if self._received is not None:
+            if now - self._received > REPETITION:
+                os._exit(_exit_status(number))
+            return
+        self._received, self.waiting = now, signal.Signals(number)
+        if not self.held:
+            self.raise_waiting(forget=self.held is None)
+
+    def raise_waiting(self, *, forget: bool) -> None:
+        """Raises the waiting signal.
+
+        Args:
+            forget: Whether code that catches the exception has handled the signal. Otherwise it is
+                raised again at the end of the critical section, because a driver may catch any.
+        """
+        number = self.waiting
+        if forget:
+            self.waiting = None
+        if number is not None:
+            raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
 
 
-def joint_limits(robot: Robot, margin: float) -> Limit:
-    """Returns a limit on the joint positions: the ranges of the robot's model plus a margin.
+_handler: _Handler | None = None
 
-    Args:
-        robot: The robot; a hinge without a range has no limit.
-        margin: Allowed distance beyond the range, rad; m for a slide joint.
+
+@contextmanager
+def handle_stop_signals() -> Iterator[None]:
+    """Context manager in which SIGINT, SIGTERM and SIGHUP end the program in order.
+
+    The first of them raises ``KeyboardInterrupt`` (SIGINT) or its subclass ``Terminated`` in the
+    main thread: a robot's safe command is sent, and its log is closed. Another one after 0.2 s ends
+    the process at once, with the exit status 130, 143 or 129.
+
+    A signal that is ignored, as SIGHUP under ``nohup``, or for which the program has a handler of
+    its own, keeps its treatment. Outside of the main thread the context manager has no effect,
+    because Python allows handlers of signals only there.
+
+    ``run_trial``, ``recover`` and the command line enter it. Other programs that run a robot do so
+    themselves, to be protected between two trials as well.
+
+    Example:
+        >>> from selfmodel.physical import handle_stop_signals
+        >>> with handle_stop_signals():
+        ...     pass  # trials, and the program's own code between them
     """
-    names = robot.anatomy.hinges
-    hinges = [robot.model.joint(name) for name in names]
-    ranges = np.array(
-        [hinge.range if hinge.limited[0] else (-np.inf, np.inf) for hinge in hinges]
-    ).reshape(-1, 2)
-    lowest, highest = ranges[:, 0] - margin, ranges[:, 1] + margin
+    global _handler  # noqa: PLW0603  # handlers of signals belong to the process
+    defaults = (signal.SIG_DFL, signal.default_int_handler)
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    replaced = {number: kept for number, kept in before.items() if kept in defaults}
+    if not replaced or not _in_main_thread():
+        yield
+        return
+    outer, handler = _handler, _Handler()
+    try:
+        _handler = handler
+        for number in replaced:
+            signal.signal(number, handler)
+        yield
+    finally:
+        handler.held = True  # until all handlers are restored
+        for number, kept in replaced.items():
+            signal.signal(number, kept)
+        _handler = outer
+        handler.raise_waiting(forget=True)
 
-    def reason(observed: Mapping[Signal, FloatArray]) -> str:
-        angles = observed["joint_positions"]
-        beyond = np.flatnonzero((angles < lowest) | (angles > highest))
-        if not len(beyond):
-            return ""
-        k = int(beyond[0])
-        return (
-            f"{names[k]} is at {angles[k]:.3f}, beyond its range of {ranges[k, 0]:.3f} to "
-            f"{ranges[k, 1]:.3f} and the margin of {margin:g}"
-        )
 
-    return Limit(("joint_positions",), reason)
+class _Section:
+    """Part of a program in which stop signals are held or not, if the main thread has a handler.
 
-
-def tilt_limit(max_tilt: float) -> Limit:
-    """Returns a limit on the tilt of the base.
-
-    Args:
-        max_tilt: Largest angle between the z axes of the base and the world, rad.
+    It is no ``contextlib.contextmanager``: a signal between such a one's code and the block would
+    leave it open.
     """
 
-    def reason(observed: Mapping[Signal, FloatArray]) -> str:
-        _, x, y, _ = orientation = observed["base_orientation"]
-        norm = float(np.linalg.norm(orientation))
-        if abs(norm - 1) > NORM_TOLERANCE:
-            return f"base_orientation must be a unit quaternion, got the norm {norm:.2f}"
-        tilt = float(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
-        if tilt > max_tilt:  # False for NaN: the orientation was not observed
-            return f"the base is tilted by {tilt:.2f} rad, more than {max_tilt:g} rad"
-        return ""
+    def __init__(self, *, held: bool) -> None:
+        self._held = held
 
-    return Limit(("base_orientation",), reason)
+    def __enter__(self) -> None:
+        self._handler = handler = _handler if _in_main_thread() else None
+        if handler is not None:
+            self._outer = handler.held
+            handler.held = self._held if self._held or self._outer is not None else None
+            # In this order: a signal in between would wait while the code of the section blocks.
+            if not self._held:
+                handler.raise_waiting(forget=self._outer is None)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leaves the section, and raises the signal that was held or whose exception was lost."""
+        if (handler := self._handler) is not None:
+            handler.held = self._outer
+            if isinstance(error, KeyboardInterrupt):
+                handler.waiting = None
+            elif not self._outer:
+                handler.raise_waiting(forget=True)
+
+
+def hold_stop_signals() -> _Section:
+    """Returns a critical section: a context manager that holds stop signals until its end."""
+    return _Section(held=True)
+
+
+def release_stop_signals() -> _Section:
+    """Returns a context manager in which stop signals that were held are raised at once.
+
+    It is for code that may block, such as a driver, inside of a critical section. It has no effect
+    outside of one.
+    """
+    return _Section(held=False)
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
+class HeldIterator(Generic[Item]):
+    """Iterator over a generator whose code is a critical section; ``close`` closes it."""
+
+    def __init__(self, generator: Generator[Item, None, None]) -> None:
+        self._generator = generator
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> Item:
+        with hold_stop_signals():
+            return next(self._generator)
+
+    def close(self) -> None:
+        """Closes the generator."""
+        with hold_stop_signals():
+            self._generator.close()
 
 
 @contextmanager
@@ -86,9 +209,8 @@ def cleanup(action: Callable[[], object]) -> Iterator[None]:
     """Context manager that runs an action at the end of its block.
 
     An exception of the block, such as Ctrl-C, is raised in any case: a failure of the action is
-    added to it as a note. After a block without an exception, or in a closed generator, a failure
-    of the action is raised itself. ``contextlib.ExitStack`` would replace the exception of the
-    block by the failure of the action.
+    added to it as a note, where ``contextlib.ExitStack`` would raise the failure instead. After
+    a block without an exception, or in a closed generator, a failure of the action is raised.
 
     Args:
         action: The action; it may raise ``OSError`` or ``WorkError``.

@@ -96,10 +96,10 @@ class CmaEs:
             # A diverged simulation is worse than all others by a finite number.
             finite = fitness[np.isfinite(fitness)]
             worst = finite.min() - 1.0 if len(finite) else 0.0
-            ranked = np.where(np.isfinite(fitness), fitness, worst)
-            parts = (np.split(values, len(self._runs)) for values in (fitness, ranked))
-            for run, own, finite_own in zip(self._runs, *parts, strict=True):
-                run.tell(own, finite_own)
+            bounded = np.where(np.isfinite(fitness), fitness, worst)
+            parts = (np.split(values, len(self._runs)) for values in (fitness, bounded))
+            for run, values, finite_values in zip(self._runs, *parts, strict=True):
+                run.tell(values, finite_values)
             if self.generation in PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
                 self._runs = order[: len(order) // 2]
@@ -125,19 +125,14 @@ class CmaEs:
         than any genome evaluated.
         """
         means = [run.mean for run in self._runs]
-        recent = sorted((own for run in self._runs for own in run.recent), key=lambda own: -own[0])
+        recent = sorted(
+            (best for run in self._runs for best in run.recent), key=lambda best: -best[0]
+        )
         return np.array([*means, *(genome for _, genome in recent)][:count])
 
 
 class _Run:
-    """One run of CMA-ES.
-
-    Args:
-        start: Initial mean, ``(length,)``.
-        deviation: Standard deviation of the first generation.
-        population: Genomes of a generation.
-        rng: Source of all random numbers.
-    """
+    """One run of CMA-ES from an initial mean, with a deviation and a size of its generations."""
 
     def __init__(
         self, start: FloatArray, deviation: float, population: int, rng: np.random.Generator

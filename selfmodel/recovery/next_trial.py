@@ -6,6 +6,7 @@ The next test is the test on which models disagree most, as in Bongard, Zykov an
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -16,10 +17,10 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.events import DiscriminatingTrial
-from selfmodel.recovery.falls import first_falls
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
 from selfmodel.recovery.repair import mutants
+from selfmodel.recovery.result import DiscriminatingTrial
+from selfmodel.recovery.scores import first_falls
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Cache, Simulator
@@ -104,24 +105,25 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     return (diagnosis.best, *to_separate)[:MAX_HYPOTHESES]
 
 
+@dataclass(eq=False)
 class Disagreement:
     """Disagreement of some hypotheses on controllers, cached by controller.
 
-    All hypotheses are simulated with the same commands: those of the controller under the first
-    hypothesis. In closed loop, a difference in one reading changes the whole motion, and
-    a comparator that is given the commands gains no evidence from such a change.
-
-    Args:
+    Attributes:
         hypotheses: Hypotheses to separate, best first.
         simulator: Self-model.
         steps: Control steps of a trial. Falls count in all steps, disagreement in the first
             ``EARLY_STEPS``.
     """
 
-    def __init__(self, hypotheses: Sequence[Hypothesis], simulator: Simulator, steps: int) -> None:
-        self._hypotheses, self._simulator, self._steps = tuple(hypotheses), simulator, steps
-        self._early = min(steps, EARLY_STEPS)
-        self._cache: Cache[Controller] = Cache()
+    hypotheses: Sequence[Hypothesis]
+    simulator: Simulator
+    steps: int
+    _cache: Cache[Controller] = field(default_factory=Cache, init=False)
+
+    @property
+    def _early(self) -> int:
+        return min(self.steps, EARLY_STEPS)
 
     def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to separate the hypotheses best.
@@ -137,9 +139,8 @@ class Disagreement:
         for i in order:
             if falls[i] < self._early:
                 break  # the remaining ones fall early, too
-            whole = self._predicted([candidates[i]], self._steps)
-            falls[i] = self._first_falls(whole)[0]
-            if falls[i] == self._steps:
+            falls[i] = self._first_falls(self._predicted([candidates[i]], self.steps))[0]
+            if falls[i] == self.steps:
                 return candidates[i]
         return candidates[int(falls.argmax())]
 
@@ -153,8 +154,8 @@ class Disagreement:
 
     def _ordered(self, candidates: Sequence[Controller]) -> tuple[IndexArray, list[int]]:
         """First fall per controller, and the controllers' indices by decreasing disagreement."""
-        found = self._cache.get_or_compute(candidates, self._evaluate)
-        falls, disagreement = np.array(found).T
+        rows = self._cache.get_or_compute(candidates, self._evaluate)
+        falls, disagreement = np.array(rows).T
         return falls.astype(np.intp), np.lexsort((-disagreement, -falls)).tolist()
 
     def _evaluate(self, candidates: Sequence[Controller]) -> FloatArray:
@@ -164,25 +165,58 @@ class Disagreement:
         upright = np.flatnonzero(falls == self._early)
         disagreement = np.zeros(len(candidates))
         if upright.size:
-            names, commands = early.behaviour.names, early.behaviour["commands"][upright, 0]
-            same_commands = [Playback(names.motors, rows) for rows in commands]
-            found = self._predicted(same_commands, self._early)
-            computed = disagreements(found.behaviour)
-            disagreement[upright] = np.where(found.diverged.any(axis=1), -1.0, computed)
+            commands = early.behaviour["commands"][upright, 0]
+            known = disagreements_on(commands, self.hypotheses, self.simulator)
+            disagreement[upright] = np.where(np.isnan(known), -1.0, known)
         return np.stack([falls, disagreement], axis=1)
 
-    def _predicted(self, drivers: Sequence[CommandSource], steps: int) -> SimulationResult:
-        """Each driver's rollouts by hypothesis, ``(drivers, hypotheses, steps, width)``."""
-        runs = [(hypothesis, driver) for driver in drivers for hypothesis in self._hypotheses]
-        outcome = self._simulator.run(runs, steps, (*DISAGREEMENT_SCALES, "commands"))
-        return outcome.grouped(len(drivers), len(self._hypotheses))
+    def _predicted(self, drivers: Sequence[Controller], steps: int) -> SimulationResult:
+        return _predicted(self.simulator, drivers, self.hypotheses, steps)
 
     def _first_falls(self, simulated: SimulationResult) -> IndexArray:
         """First fall under any hypothesis, ``(drivers,)``; 0 for a simulation that diverges."""
-        robot = self._simulator.robot
-        normals = np.array([build(robot, hypothesis).normal for hypothesis in self._hypotheses])
+        robot = self.simulator.robot
+        normals = np.array([build(robot, hypothesis).normal for hypothesis in self.hypotheses])
         falls = first_falls(simulated.behaviour, normals, robot.standing_height)
         return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
+
+
+def disagreements_on(
+    commands: FloatArray, hypotheses: Sequence[Hypothesis], simulator: Simulator
+) -> FloatArray:
+    """Returns the disagreement of hypotheses on given commands, 0 to 1, ``(runs,)``.
+
+    All hypotheses are simulated with the same commands. In closed loop, a difference in one reading
+    changes the whole motion, and a comparator that is given the commands gains no evidence from
+    such a change.
+
+    Args:
+        commands: Commands of each run, such as those of a controller under the best hypothesis,
+            ``(runs, steps, motors)``.
+        hypotheses: Hypotheses to separate.
+        simulator: Self-model.
+
+    Returns:
+        The disagreements; NaN where a simulation diverged.
+    """
+    motors = simulator.robot.anatomy.names.motors
+    drivers = [Playback(motors, rows) for rows in commands]
+    outcome = _predicted(simulator, drivers, hypotheses, commands.shape[1])
+    with np.errstate(invalid="ignore", over="ignore"):  # values of a diverged simulation
+        values = disagreements(outcome.behaviour)
+    return np.where(outcome.diverged.any(axis=1), np.nan, values)
+
+
+def _predicted(
+    simulator: Simulator,
+    drivers: Sequence[CommandSource],
+    hypotheses: Sequence[Hypothesis],
+    steps: int,
+) -> SimulationResult:
+    """Each driver's rollouts by hypothesis, ``(drivers, hypotheses, steps, width)``."""
+    runs = [(hypothesis, driver) for driver in drivers for hypothesis in hypotheses]
+    outcome = simulator.run(runs, steps, (*DISAGREEMENT_SCALES, "commands"))
+    return outcome.grouped(len(drivers), len(hypotheses))
 
 
 def disagreements(behaviour: Behaviour) -> FloatArray:

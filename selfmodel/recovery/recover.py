@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import Literal, Protocol
 
 import numpy as np
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
+from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -21,28 +21,22 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.random_streams import (
-    choice_stream,
-    diagnosis_stream,
-    posterior_stream,
-    repair_stream,
+from selfmodel.recovery.repair import (
+    CandidateController,
+    MakeRepair,
+    Repair,
+    RobustRepair,
+    mutants,
 )
-from selfmodel.recovery.repair import CandidateController, MakeRepair, mutants
-from selfmodel.recovery.result import Database, Recovery
-from selfmodel.recovery.robust_repair import RobustRepair
-from selfmodel.recovery.scores import UPRIGHT, Score
+from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
+from selfmodel.recovery.scores import UPRIGHT, Score, fall_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
-
-Value = TypeVar("Value")
 
 RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 """Runs a physical trial and returns it; with a log, as read back from the log."""
@@ -57,14 +51,11 @@ class Journal(Protocol):
 
 
 def by_repair(loop: "RecoveryLoop") -> Controller:
-    """Returns the best candidate of the repair that was not tried yet.
-
-    If all candidates were tried, a mutant of the best one is returned.
-    """
-    found = [candidate.controller for candidate in loop.repaired()]
+    """Returns the best candidate of the repair that was not tried yet, or a mutant of the best."""
+    candidates = [candidate.controller for candidate in loop.repaired()]
     tried = loop.known.controllers
-    untried = [controller for controller in found if controller not in tried]
-    return (untried or untried_mutants(found[:1], tried, loop.settings, loop.rng))[0]
+    untried = [controller for controller in candidates if controller not in tried]
+    return (untried or untried_mutants(candidates[:1], tried, loop.settings, loop.rng))[0]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -114,7 +105,12 @@ class RecoveryLoop:
     rng: np.random.Generator = field(init=False)
 
     def run(self, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
-        """Runs the recovery, once: a healthy trial, a failing one, then diagnosis and repair.
+        """Runs the recovery, once.
+
+        The robot walks with a gait that was evolved in simulation, and the self-model is fitted to
+        the log. It fails, and the same gait is logged again. Then diagnosis and trial alternate:
+        the diagnosis explains all logs since the failure, and the next trial tries a controller
+        that the repair evolved in simulation for the diagnosed robot.
 
         Args:
             healthy: Physical robot before the failure.
@@ -123,18 +119,17 @@ class RecoveryLoop:
         Returns:
             The trials, the last diagnosis and the number of evaluations.
         """
-        HypothesisSpace.of(self.kinds, self.simulator.robot.anatomy)  # before any physical trial
-        self._prepare_repair()
-        gait = self.gait or self.evolved((INTACT,), self._assumed)[0].controller
-        self._run_trial(healthy, "before", gait)
-        self._calibrate()
-        self._run_trial(damaged, "after", gait)
+        self._begin()
+        gait = self.gait or self._evolve_gait()
+        self._log_trial(healthy, "before", gait)
+        self._fit_self_model()
+        self._log_trial(damaged, "after", gait)
         self._choose_comparator()
-        self.trials_left = self.settings.trials
-        while self.trials_left:
+        for left in range(self.settings.trials, 0, -1):
+            self.trials_left = left
             self._diagnose()
-            self._run_trial(damaged, "recovery", self.next_trial(self))
-            self.trials_left -= 1
+            controller = self.next_trial(self)  # by default, the first of ``repaired``
+            self._log_trial(damaged, "recovery", controller)
         self._diagnose()
         return self._result()
 
@@ -142,116 +137,103 @@ class RecoveryLoop:
         """Evolves controllers that compensate for the last diagnosis; returns them best first."""
         diagnosis = self.known.diagnoses[-1]
         uncertainty = partial(self._posterior.after, self.known.trials, diagnosis.best)
-        return self.evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
+        return self._evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
 
-    def evolved(
-        self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
-    ) -> tuple[CandidateController, ...]:
-        """Evolves controllers for hypotheses; returns them best first."""
-        self.on_event(SearchBegins("repair", hypotheses[0]))
-        rng = repair_stream(self.seed, len(self.known.diagnoses))
-        found = self._repair(hypotheses, uncertainty, self.known.controllers, rng, self.on_event)
-        self._predictions.update({one.controller: one.predicted for one in found})
-        return found
-
-    def _assumed(self) -> DomainDistribution:
-        return assumed_uncertainty(self.simulator.robot)
-
-    def _prepare_repair(self) -> None:
-        self._tried: list[Hypothesis] = []
-        self._predictions: dict[Controller, float] = {}
-        self._predicted: list[float] = []
-        self._repair_evaluations = 0
+    def _begin(self) -> None:
+        HypothesisSpace.of(self.kinds, self.simulator.robot.anatomy)  # refused before any trial
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(self.simulator.robot)
-        self._repair = self.make_repair(self.simulator, self.settings, self._design, self.score)
+        self._repairs = [self._new_repair()]
+        self._predictions: dict[Controller, float] = {}
+        self._predicted: list[float] = []
 
-    def _run_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
-        number, settings = len(self.known.trials), self.settings
-        plan = TrialPlan(f"{number:02d}-{stage}", stage, controller, settings.steps, self.seed)
-        diagnoses = self.known.diagnoses
-        self._tried.append(diagnoses[-1].best if diagnoses else INTACT)
+    def _new_repair(self) -> Repair:
+        return self.make_repair(self.simulator, self.settings, self._design, self.score)
+
+    def _evolve_gait(self) -> Controller:
+        assumed = partial(assumed_uncertainty, self.simulator.robot)
+        return self._evolved((INTACT,), assumed)[0].controller
+
+    def _evolved(
+        self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
+    ) -> tuple[CandidateController, ...]:
+        """Evolves controllers for hypotheses, best first; returns them best first."""
+        self.on_event(SearchBegins("repair", hypotheses[0]))
+        rng = random_stream(self.seed, "repair", len(self.known.diagnoses))
+        repair, seeds = self._repairs[-1], self.known.controllers
+        candidates = repair(hypotheses, uncertainty, seeds, rng, self.on_event)
+        self._predictions.update({each.controller: each.predicted for each in candidates})
+        return candidates
+
+    def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
+        name = f"{len(self.known.trials):02d}-{stage}"
         predicted = math.nan if stage == "after" else self._predictions.get(controller, math.nan)
         self._predicted.append(predicted)
+        plan = TrialPlan(name, stage, controller, self.settings.steps, self.seed)
         trial = self.run_trial(robot, plan)
         self.known = self.known.with_trial(trial)
         self.on_event(trial)
 
-    def _calibrate(self) -> None:
-        """Fits the self-model to the healthy trials, and begins a repair with the fitted one."""
+    def _fit_self_model(self) -> None:
+        """Fits the self-model to the healthy trials; a new repair simulates the fitted one."""
         healthy_trials, nominal = self.known.trials, self.simulator
-        self.choose_comparator(nominal.robot, healthy_trials)  # raises before the failure
+        self.choose_comparator(nominal.robot, healthy_trials)  # refused before the failure
         self._calibration = self.calibrate(healthy_trials) if self.calibrate else None
         if self._calibration is not None:
             self.on_event(self._calibration)
             if self._calibration.robot is not nominal.robot:
-                fitted = self._calibration.robot
-                self.simulator = Simulator(fitted, nominal.threads, nominal.stats)
-                self._repair_evaluations = self._repair.evaluations
-                self._repair = self.make_repair(
-                    self.simulator, self.settings, self._design, self.score
-                )
+                self.simulator = Simulator(self._calibration.robot, nominal.threads, nominal.stats)
+                self._repairs.append(self._new_repair())
+        rng = random_stream(self.seed, "posterior")
         self._posterior = Posterior(
-            self.simulator,
-            healthy_trials,
-            self._calibration,
-            self.settings,
-            posterior_stream(self.seed),
+            self.simulator, healthy_trials, self._calibration, self.settings, rng
         )
 
     def _choose_comparator(self) -> None:
-        self._comparator: ChosenComparator = self.choose_comparator(
-            self.simulator.robot, self.known.trials
-        )
+        robot, trials = self.simulator.robot, self.known.trials
+        self._comparator = self.choose_comparator(robot, trials)
         self.on_event(self._comparator)
         self._search = DiagnosticSearch(
             self.simulator,
             self._comparator.comparator,
             self.settings,
             self.kinds,
-            healthy_trials=self.known.trials[:1],
+            healthy_trials=trials[:1],
         )
 
     def _diagnose(self) -> None:
+        """Explains all trials since the failure; the last hypotheses seed the search."""
         self.on_event(SearchBegins("diagnostic"))
         number, known = len(self.known.diagnoses) + 1, self.known
-        rng = diagnosis_stream(self.seed, number)
+        rng = random_stream(self.seed, "diagnosis", number)
         diagnosis = self._search(known.evidence, known.hypotheses, rng, self.on_event)
         self.journal.add(diagnosis)
         self.known = known.with_diagnosis(diagnosis)
-        self.rng = choice_stream(self.seed, number)
+        self.rng = random_stream(self.seed, "choice", number)
         self.on_event(diagnosis)
 
     def _result(self) -> Recovery:
-        known, robot = self.known, self.simulator.robot
+        trials, diagnoses = self.known.trials, self.known.diagnoses
+        robot, best = self.simulator.robot, diagnoses[-1].best
+        faults = [INTACT, *[best] * (len(trials) - 1)]  # the first trial is of the healthy robot
         return Recovery(
-            trials=known.trials,
-            tried=tuple(self._tried),
-            diagnosis=known.diagnoses[-1],
-            repair_evaluations=self._repair_evaluations + self._repair.evaluations,
+            trials=trials,
+            tried=(INTACT, INTACT, *(diagnosis.best for diagnosis in diagnoses[:-1])),
+            diagnosis=diagnoses[-1],
+            repair_evaluations=sum(repair.evaluations for repair in self._repairs),
             diagnostic_evaluations=self._search.evaluations,
             distinct_hypotheses=self._search.distinct_hypotheses,
             comparator=self._comparator,
             calibration=self._calibration,
             score=self.score,
             predicted=tuple(self._predicted),
-            scores=_of_trials(self.score.of_trial, robot, known),
-            falls=_of_trials(fall_of, robot, known),
+            scores=tuple(map(partial(self.score.of_trial, robot), faults, trials)),
+            falls=tuple(map(partial(fall_of, robot), faults, trials)),
         )
 
 
 NextTrial = Callable[[RecoveryLoop], Controller]
 """Chooses the controller of the next physical trial of a recovery."""
-
-
-def _of_trials(
-    value: Callable[[Robot, Hypothesis, Trial], Value], robot: Robot, known: Database
-) -> tuple[Value, ...]:
-    """Returns a value of each trial under the last diagnosis; the first trial is healthy."""
-    best = known.diagnoses[-1].best
-    return tuple(
-        value(robot, best if number else INTACT, trial) for number, trial in enumerate(known.trials)
-    )
 
 
 def untried_mutants(
@@ -269,10 +251,10 @@ def untried_mutants(
         rng: Random number generator of all random choices.
     """
     distinct = dict.fromkeys(mutants(parents, settings.population, settings, rng))
-    found = [controller for controller in distinct if controller not in tried]
+    untried = [controller for controller in distinct if controller not in tried]
     # Every mutant may equal its parent, as without mutation.
     design = parents[0].design
-    return found or [Controller(design, draw_genomes(rng, (design.weights,)))]
+    return untried or [Controller(design, draw_genomes(rng, (design.weights,)))]
 
 
 def diagnose_trials(
@@ -304,8 +286,33 @@ def diagnose_trials(
     known = Database()
     for number in range(1, len(trials) + 1) if after is None else sorted(after):
         on_event(SearchBegins("diagnostic"))
-        rng = diagnosis_stream(seed, number)
+        rng = random_stream(seed, "diagnosis", number)
         diagnosis = diagnose(trials[:number], known.hypotheses, rng, on_event)
         known = Database(diagnoses=(diagnosis,))
         on_event(diagnosis)
     return diagnosis
+
+
+Purpose = Literal["repair", "diagnosis", "choice", "posterior", "gap"]
+
+
+def random_stream(seed: int, purpose: Purpose, number: int = 0) -> np.random.Generator:
+    """Returns one of the independent random number streams of a recovery, one per search.
+
+    The draws of a search do not affect the other streams, so each search can be repeated alone.
+
+    Args:
+        seed: Seed of the recovery.
+        purpose: A repair (number 0 evolves the gait, 1 follows the first diagnosis), a diagnosis
+            (from 1), the choice of the trial after a diagnosis, the sample of models that trials
+            weight, or the reality gap of a simulated physical robot.
+        number: Number of the search.
+    """
+    keys = {
+        "repair": 2 * number,
+        "diagnosis": 2 * number - 1,
+        "choice": 2**30 + number,  # above the keys of any number of searches
+        "posterior": 2**31 - 1,
+        "gap": 2**31,
+    }
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(keys[purpose],)))

@@ -1,8 +1,7 @@
-"""What has been tried and diagnosed in a recovery, and its result."""
+"""Events of a recovery, what is known in it so far, and its result."""
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,21 +9,51 @@ from selfmodel.arrays import data_frame
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
 
-@dataclass(frozen=True, eq=False)
-class Database:
-    """Controllers, their logged trials and the best hypotheses: the seeds of the next EA.
-
-    Source: the paper, section III.
+@dataclass(frozen=True)
+class SearchBegins:
+    """Start of a search.
 
     Attributes:
-        trials: Physical trials with their controllers, in the order in which they were run.
-        diagnoses: Diagnoses, in the order in which they were made.
+        kind: Name of the EA: ``repair`` or ``diagnostic``.
+        hypothesis: Hypothesis that a repair compensates; None for a diagnosis.
+    """
+
+    kind: str
+    hypothesis: Hypothesis | None = None
+
+
+@dataclass(frozen=True)
+class DiscriminatingTrial:
+    """Start of a search for the controller whose trial separates hypotheses, best first."""
+
+    hypotheses: tuple[Hypothesis, ...]
+
+
+Event = (
+    SearchBegins
+    | Generation
+    | ChosenComparator
+    | Calibration
+    | DiscriminatingTrial
+    | Trial
+    | Diagnosis
+)
+"""What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
+a search, the chosen comparator, the calibration, a finished trial, a diagnosis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Database:
+    """Logged trials with their controllers, and the diagnoses, in order: the seeds of the next EA.
+
+    Source: the paper, section III.
     """
 
     trials: tuple[Trial, ...] = ()
@@ -44,9 +73,8 @@ class Database:
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """Hypotheses of the newest diagnosis, best first; empty before the first diagnosis."""
-        if not self.diagnoses:
-            return ()
-        return tuple(candidate.hypothesis for candidate in self.diagnoses[-1].ranked)
+        ranked = self.diagnoses[-1].ranked if self.diagnoses else ()
+        return tuple(candidate.hypothesis for candidate in ranked)
 
     def with_trial(self, trial: Trial) -> "Database":
         """Returns a copy with one trial more."""
@@ -69,13 +97,13 @@ class Recovery:
         diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
         distinct_hypotheses: Number of distinct hypotheses among them.
         comparator: Comparator of the diagnoses, and the reason for its choice.
-        calibration: Fit of the self-model to the trials before the failure; None without one.
-        score: Fitness of the repair.
         predicted: Score that the self-model predicted of each trial's controller; NaN if none was
             predicted, as for the first trial after the failure.
         scores: Score of each trial; those after the failure under the last diagnosis, which matters
             for a score that depends on the ground or on detached limbs.
         falls: Step at which the robot fell in each trial; None if it did not.
+        calibration: Fit of the self-model to the trials before the failure; None without one.
+        score: Fitness of the repair.
     """
 
     trials: tuple[Trial, ...]
@@ -92,6 +120,12 @@ class Recovery:
     score: Score = DISPLACEMENT
 
     @property
+    def _best(self) -> int:
+        """Number of the recovery trial with the largest score; of the first if all are NaN."""
+        known = [-math.inf if math.isnan(score) else score for score in self.scores]
+        return max(range(2, len(known)), key=known.__getitem__)
+
+    @property
     def fell(self) -> bool:
         """Whether the robot fell in the recovery trial with the largest score."""
         return self.falls[self._best] is not None
@@ -99,7 +133,7 @@ class Recovery:
     @property
     def best_score(self) -> float:
         """Largest score of the recovery trials; NaN if unobserved in all."""
-        return _largest(self.scores[2:])
+        return self.scores[self._best]
 
     @property
     def before(self) -> float:
@@ -118,12 +152,6 @@ class Recovery:
         NaN if the base was not observed in that trial.
         """
         return self.trials[self._best].displacement
-
-    @property
-    def _best(self) -> int:
-        """Number of the recovery trial with the largest score; of the first if all are NaN."""
-        scores = [-math.inf if math.isnan(score) else score for score in self.scores[2:]]
-        return 2 + scores.index(max(scores))
 
     def __repr__(self) -> str:
         lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
@@ -162,6 +190,7 @@ class Recovery:
         return data_frame(self._rows())
 
     def _rows(self) -> list[dict[str, Any]]:
+        columns = zip(self.trials, self.tried, self.scores, self.predicted, strict=True)
         return [
             {
                 "trial": trial.plan.name,
@@ -172,16 +201,10 @@ class Recovery:
                 "predicted_score": _observed(predicted),
                 "log": trial.path,
             }
-            for trial, tried, score, predicted in zip(
-                self.trials, self.tried, self.scores, self.predicted, strict=True
-            )
+            for trial, tried, score, predicted in columns
         ]
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max((value for value in values if not math.isnan(value)), default=math.nan)
-
-
-def _observed(displacement: float) -> float | None:
+def _observed(value: float) -> float | None:
     """JSON has no NaN, which is the displacement of an unobserved base."""
-    return displacement if math.isfinite(displacement) else None
+    return value if math.isfinite(value) else None

@@ -1,40 +1,49 @@
-"""Scores of rollouts and trials: the fitness of a repair.
+"""Scores of rollouts and trials: the fitness of a repair; and the falls that end a score.
 
-Built-in scores are ``DISPLACEMENT``, ``UPRIGHT``, ``ENERGY``, ``upright_within`` limits and
-``tracking``; any other ``Score`` works as well.
+``SCORES`` has those that need no argument; ``upright_within`` limits returns another, and so does
+``tracking``. Any other ``Score`` works as well.
 """
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.falls import falls_of, first_lasting, steps_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trial import Trial
 
-WORK_WEIGHT = 0.1
-"""Metres that a work of the robot's weight times a metre costs: a gait with a cost of transport of
-3, that of a fast legged robot, keeps 70 % of its displacement."""
+FALLEN_HEIGHT = 0.5
+"""Height below which a base has fallen, as a fraction of its standing height. A base that starts on
+the ground, as a swimmer's, cannot fall by this rule."""
+
+FALLEN_TILT = np.radians(60)
+"""Tilt above which a base has fallen, relative to its initial orientation, rad."""
+
+FALLEN_TIME = 0.25
+"""Time over which a fall is judged, s: a base that has fallen is low or tilted in more than half of
+the measurements. A low stride or a wrong measurement is shorter."""
 
 COLLISION_TIME = 0.05
 """Time over which a self-collision is judged, s: two bodies are too deep in each other in more than
 half of the measurements. Wrong measurements of single steps are shorter; legs that pass through
 each other at the pace of a walk are longer."""
 
-TRACKING = "tracking"
-"""Name of the score."""
+WORK_WEIGHT = 0.1
+"""Metres that a work of the robot's weight times a metre costs: a gait with a cost of transport of
+3, that of a fast legged robot, keeps 70 % of its displacement."""
 
 LARGEST = 1e10
 """Magnitude above which MuJoCo takes a simulation as diverged."""
@@ -79,71 +88,150 @@ class Score:
 
 
 def scores_of(
-    score: Score,
-    robot: Robot,
-    hypothesis: Hypothesis,
-    outcome: SimulationResult,
-    column: int | None = None,
+    score: Score, robot: Robot, hypotheses: Sequence[Hypothesis], outcome: SimulationResult
 ) -> FloatArray:
-    """Returns the scores of simulated rollouts, ``(n,)``; negative infinity for a diverged one.
+    """Returns the scores of simulated rollouts; negative infinity for a diverged one.
 
     Args:
         score: The score.
         robot: The healthy robot.
-        hypothesis: Faults of the robot.
-        outcome: The rollouts, ``(n,)`` or ``(n, columns)``.
-        column: Column of the rollouts; None for those without columns.
+        hypotheses: Faults of the robot in each column of the rollouts.
+        outcome: The rollouts, ``(n, hypotheses)``, which is the shape of the scores.
     """
-    diverged = outcome.diverged if column is None else outcome.diverged[:, column]
-    scores, rows = np.full(len(diverged), -np.inf), ~diverged
-    if rows.any():
-        which = rows if column is None else (rows, column)
-        simulated = outcome.behaviour
-        signals = {name: values[which] for name, values in simulated.signals.items()}
-        behaviour = Behaviour(simulated.names, simulated.time, signals)
-        scores[rows] = score.of(robot, hypothesis, behaviour)
+    scores, simulated = np.full(outcome.diverged.shape, -np.inf), outcome.behaviour
+    for column, hypothesis in enumerate(hypotheses):
+        rows = ~outcome.diverged[:, column]
+        if rows.any():
+            signals = {name: values[rows, column] for name, values in simulated.signals.items()}
+            finite = Behaviour(simulated.names, simulated.time, signals)
+            scores[rows, column] = score.of(robot, hypothesis, finite)
     return scores
+
+
+def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> IndexArray:
+    """Returns the first step at which each run has fallen, or the number of steps without a fall.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the robot, of which a slope tilts the ground.
+        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
+
+    Returns:
+        Step indices, ``(...)``.
+    """
+    return first_falls(behaviour, build(robot, hypothesis).normal, robot.standing_height)
+
+
+def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:
+    """Returns the first step at which the robot has fallen, or the number of steps without a fall.
+
+    At that step the base is low or tilted, and so it is for most of ``FALLEN_TIME``; see
+    ``first_lasting``.
+
+    Args:
+        behaviour: Position and orientation of the base, ``(..., steps, width)`` each; NaN where not
+            observed.
+        normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
+            ground passes through the origin.
+        standing_height: Height of the base in the initial pose, m.
+
+    Returns:
+        Step indices, ``(...)``.
+    """
+    height = np.einsum("...sk,...k->...s", behaviour["base_position"], normals)
+    # The world's upward direction in the frame of the base, against the first one that is known.
+    upward = directions(behaviour["base_orientation"])[..., 2:]
+    first = np.isfinite(upward).all(axis=-1).argmax(axis=-1)
+    reference = np.take_along_axis(upward, first[..., np.newaxis, np.newaxis], axis=-2)
+    cosine = (upward * reference).sum(axis=-1)
+    low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
+    down = low | (cosine < np.cos(FALLEN_TILT))
+    up = ~down & (np.isfinite(height) | np.isfinite(cosine))
+    return first_lasting(down, up, _steps_in(FALLEN_TIME, behaviour))
+
+
+def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
+    """Returns the step at which the robot fell in a trial; None if it did not, or cannot fall.
+
+    A fixed base cannot fall, and a base that was not observed is not known to have fallen. A trial
+    that ended early may have ended by a fall: its last pose counts as if it remained.
+
+    Args:
+        robot: The healthy robot.
+        hypothesis: Faults of the physical robot.
+        trial: The trial.
+    """
+    if robot.has_fixed_base:
+        return None
+    logged = trial.behaviour
+    whole = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
+    fall = int(falls_of(robot, hypothesis, whole))
+    return fall if fall < logged.steps else None
+
+
+def held_at_the_end(behaviour: Behaviour) -> Behaviour:
+    """Returns the signals of a run that ended early as if the last ones remained.
+
+    A robot that is stopped as it falls has few measurements of the fall.
+
+    Args:
+        behaviour: One run, ``(steps, width)`` each.
+    """
+    more, time = _steps_in(FALLEN_TIME, behaviour), behaviour.time
+    step = time[-1] - time[-2] if behaviour.steps > 1 else FALLEN_TIME
+    signals = {
+        name: np.pad(values, ((0, more), (0, 0)), mode="edge")
+        for name, values in behaviour.signals.items()
+    }
+    later = time[-1] + step * np.arange(1, more + 1)
+    return Behaviour(behaviour.names, np.concatenate([time, later]), signals)
+
+
+def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
+    """Returns the first step of a state that lasts, or the number of steps without one, ``(...)``.
+
+    Args:
+        state: Steps of the state, ``(..., steps)``; it lasts if it is more frequent than the other
+            in the window of the step.
+        other: Steps of the other state; a step of neither is not known.
+        steps: Length of a window, which begins at the step itself. The end of the run cuts no
+            window: near it, the window is that of the last ``steps``, or the whole of a run that is
+            shorter.
+    """
+    run = state.shape[-1]
+    first = np.minimum(np.arange(run), max(run - steps, 0))
+    last = np.minimum(first + steps, run) - 1
+
+    def in_window(one: BoolArray) -> IndexArray:
+        total = np.cumsum(one, axis=-1)
+        return np.asarray(total[..., last] - total[..., first] + one[..., first])
+
+    lasting = state & (in_window(state) > in_window(other))
+    return np.asarray(np.where(lasting.any(axis=-1), lasting.argmax(axis=-1), run))
+
+
+def _steps_in(duration: float, behaviour: Behaviour) -> int:
+    """Returns the control steps in a time, s, at least 1."""
+    time = behaviour.time
+    return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
 
 
 def _displacement(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
     return forward_displacement(behaviour)
 
 
-DISPLACEMENT = Score(
-    "displacement",
-    ("base_position",),
-    _displacement,
-    unit="m",
-    grows_with_time=True,
-    needs_free_base=True,
-)
-"""Forward displacement, m. Source: the paper, section III."""
-
-
-def _displacement_until_a_fall(
-    robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour
-) -> FloatArray:
+def _upright(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
     x = behaviour["base_position"][..., 0]
     last = np.maximum(falls_of(robot, hypothesis, behaviour) - 1, 0)
     end = np.take_along_axis(x, last[..., np.newaxis], axis=-1)[..., 0]
     return np.asarray(end - x[..., 0])
 
 
-UPRIGHT = Score(
-    "upright",
-    ("base_position", "base_orientation"),
-    _displacement_until_a_fall,
-    unit="m",
-    grows_with_time=True,
-    needs_free_base=True,
-)
-"""Forward displacement up to the last step before the robot falls, m.
-
-A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` (near the
-end, of the last ``FALLEN_TIME`` of the run), tilted by more than ``FALLEN_TILT`` from its initial
-orientation, or lower than ``FALLEN_HEIGHT`` of its standing height. What follows a fall counts
-nothing: a controller that tips the robot over and crawls on its back earns what it walked before.
-"""
+def _upright_less_work(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+    model = build(robot, hypothesis).model
+    weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
+    cost = joint_work(robot, behaviour) / weight if weight else 0.0
+    return np.asarray(_upright(robot, hypothesis, behaviour) - WORK_WEIGHT * cost)
 
 
 def joint_work(robot: Robot, behaviour: Behaviour) -> FloatArray:
@@ -160,16 +248,35 @@ def joint_work(robot: Robot, behaviour: Behaviour) -> FloatArray:
     return np.asarray(np.where(observed, work, np.nan))
 
 
-def _upright_less_work(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-    model = build(robot, hypothesis).model
-    weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
-    cost = joint_work(robot, behaviour) / weight if weight else 0.0
-    return np.asarray(UPRIGHT.of(robot, hypothesis, behaviour) - WORK_WEIGHT * cost)
+DISPLACEMENT = Score(
+    "displacement",
+    ("base_position",),
+    _displacement,
+    unit="m",
+    grows_with_time=True,
+    needs_free_base=True,
+)
+"""Forward displacement, m. Source: the paper, section III."""
 
+UPRIGHT = Score(
+    "upright",
+    ("base_position", "base_orientation"),
+    _upright,
+    unit="m",
+    grows_with_time=True,
+    needs_free_base=True,
+)
+"""Forward displacement up to the last step before the robot falls, m.
+
+A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` (near the
+end, of the last ``FALLEN_TIME`` of the run), tilted by more than ``FALLEN_TILT`` from its initial
+orientation, or lower than ``FALLEN_HEIGHT`` of its standing height. What follows a fall counts
+nothing: a controller that tips the robot over and crawls on its back earns what it walked before.
+"""
 
 ENERGY = Score(
     "energy",
-    ("base_position", "base_orientation", "joint_efforts", "joint_velocities"),
+    (*UPRIGHT.record, "joint_efforts", "joint_velocities"),
     _upright_less_work,
     unit="m",
     needs_free_base=True,
@@ -179,6 +286,11 @@ ENERGY = Score(
 The work over the weight and the distance is the cost of transport (Gabrielli and von Karman, *What
 price speed?*, 1950).
 """
+
+SCORES: Mapping[str, Score] = MappingProxyType(
+    {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY)}
+)
+"""Scores by name."""
 
 
 def upright_within(
@@ -215,28 +327,23 @@ def upright_within(
         moved = np.diff(_held(behaviour["base_position"][..., 0]), axis=-1)
         # A joint that has come off lies on the ground, and is not the robot's.
         detached = build(robot, hypothesis).detached
-        own = [j for j, name in enumerate(robot.anatomy.hinges) if name not in detached]
-        over = _over(behaviour["joint_velocities"][..., own], max_speed)
-        over |= _over(behaviour["joint_efforts"][..., own], max_torque)
+        attached = [j for j, name in enumerate(robot.anatomy.hinges) if name not in detached]
+        # NaN is not over a limit.
+        speeding = np.abs(behaviour["joint_velocities"][..., attached]) > max_speed
+        straining = np.abs(behaviour["joint_efforts"][..., attached]) > max_torque
+        over: BoolArray = np.any(speeding | straining, axis=-1)
         counted = np.where(over[..., 1:], np.minimum(moved, 0.0), moved)
         end = falls_of(robot, hypothesis, behaviour)
         if compares_bodies:
             deep = _depths(robot, hypothesis, behaviour) > max_self_collision
-            steps = steps_of(COLLISION_TIME, behaviour)
+            steps = _steps_in(COLLISION_TIME, behaviour)
             end = np.minimum(end, first_lasting(deep, ~deep, steps))
         before = np.arange(1, behaviour.steps) < end[..., np.newaxis]
         return np.asarray(np.where(before, counted, 0.0).sum(axis=-1))
 
-    limits = [
-        f"{limit:g} {unit}"
-        for limit, unit in (
-            (max_speed, "rad/s"),
-            (max_torque, "N m"),
-            (max_self_collision, "m of self-collision"),
-        )
-        if math.isfinite(limit)
-    ]
-    name = " ".join([UPRIGHT.name, *(["within", " and ".join(limits)] if limits else [])])
+    limits = {"rad/s": max_speed, "N m": max_torque, "m of self-collision": max_self_collision}
+    texts = [f"{limit:g} {unit}" for unit, limit in limits.items() if math.isfinite(limit)]
+    name = f"{UPRIGHT.name} within {' and '.join(texts)}" if texts else UPRIGHT.name
     record = (*UPRIGHT.record, "joint_velocities", "joint_efforts")
     signals = (*record, "joint_positions") if compares_bodies else record
     return Score(name, signals, of, unit="m", grows_with_time=True, needs_free_base=True)
@@ -246,11 +353,7 @@ def _depths(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> Float
     """Returns the depth of self-collision at each step, m, ``(..., steps)``.
 
     A joint without a measurement is where it was last measured, or else in the initial pose.
-
-    Args:
-        robot: The healthy robot.
-        hypothesis: Faults of the robot: detached bodies do not count, and encoders have offsets.
-        behaviour: Joint positions, ``(..., steps, hinges)``.
+    Detached bodies do not count, and encoders have the offsets of the hypothesis.
     """
     logged = np.moveaxis(_held(np.moveaxis(behaviour["joint_positions"], -1, -2)), -2, -1)
     angles = logged - build(robot, hypothesis).encoder_offset
@@ -262,109 +365,9 @@ def _depths(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> Float
 
 
 def _held(values: FloatArray) -> FloatArray:
-    """Returns values with those that are not known replaced by the last known one.
-
-    Args:
-        values: ``(..., steps)``; NaN where not known. It remains where none is known before.
-    """
+    """Returns values, ``(..., steps)``, with each NaN replaced by the last known value before."""
     steps = np.where(np.isfinite(values), np.arange(values.shape[-1]), 0)
     return np.take_along_axis(values, np.maximum.accumulate(steps, axis=-1), axis=-1)
-
-
-def _over(values: FloatArray, limit: float) -> BoolArray:
-    """Returns whether the value of a joint is over a limit, ``(..., steps)``; NaN is not."""
-    return np.asarray((np.abs(values) > limit).any(axis=-1))
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A joint trajectory to follow.
-
-    Attributes:
-        hinges: Names of the hinges, at least one.
-        time: Seconds since the start of the run, ``(rows,)``, strictly increasing, at least two.
-        positions: Joint positions, ``(rows, hinges)``, rad.
-
-    Raises:
-        InputError: A shape is inconsistent, a number is not finite, or time does not increase.
-    """
-
-    hinges: tuple[str, ...]
-    time: FloatArray
-    positions: FloatArray
-
-    def __post_init__(self) -> None:
-        expected = (len(self.time), len(self.hinges))
-        if self.positions.shape != expected or len(self.time) < 2 or not self.hinges:
-            raise InputError(
-                f"a reference trajectory needs two rows or more, and a column per joint, got "
-                f"{self.positions.shape} positions of {len(self.hinges)} joints"
-            )
-        if not (np.isfinite(self.time).all() and np.isfinite(self.positions).all()):
-            raise InputError("a reference trajectory needs finite numbers, and has others")
-        if not np.all(np.diff(self.time) > 0):
-            raise InputError("the time of a reference trajectory must be strictly increasing")
-
-
-def tracking(reference: Reference, robot: Robot) -> Score:
-    """Returns the score of following a reference trajectory.
-
-    The score is the negative root mean square error of the joint positions, rad, over the steps
-    within the time of the reference and the joints of both the reference and the robot; 0 is
-    perfect. Between its rows the reference is interpolated linearly. Joints of a limb that is
-    detached under a hypothesis are left out, unless no joint would remain; positions that a
-    physical robot did not observe are left out.
-
-    Args:
-        reference: The trajectory.
-        robot: The healthy robot.
-
-    Raises:
-        InputError: The reference has no joint of the robot, or begins after the first step.
-    """
-    known = robot.anatomy.hinges
-    hinges = tuple(name for name in reference.hinges if name in known)
-    if not hinges:
-        raise InputError(
-            f"the reference trajectory has the joints {', '.join(reference.hinges)}, and "
-            f"{robot.name} has {', '.join(known)}: name its columns as the joints"
-        )
-    if reference.time[0] > 0:
-        raise InputError(
-            f"the reference trajectory must begin at 0 s or before, got {reference.time[0]:g} s"
-        )
-    return Score(TRACKING, ("joint_positions",), partial(_tracked, reference, hinges), "rad")
-
-
-def _tracked(
-    reference: Reference,
-    hinges: Sequence[str],
-    robot: Robot,
-    hypothesis: Hypothesis,
-    behaviour: Behaviour,
-) -> FloatArray:
-    """Returns the scores of a batch of runs, ``(n,)``; NaN for a run without any observation."""
-    detached = build(robot, hypothesis).detached
-    compared = [name for name in hinges if name not in detached] or hinges
-    steps = behaviour.time <= reference.time[-1]
-    wanted = np.stack(
-        [
-            np.interp(
-                behaviour.time[steps],
-                reference.time,
-                reference.positions[:, reference.hinges.index(name)],
-            )
-            for name in compared
-        ],
-        axis=-1,
-    )
-    columns = [robot.anatomy.hinges.index(name) for name in compared]
-    squares = np.square(behaviour["joint_positions"][:, steps][..., columns] - wanted)
-    observed = np.isfinite(squares)
-    count = observed.sum(axis=(1, 2))
-    total = np.where(observed, squares, 0.0).sum(axis=(1, 2))
-    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
-    return np.asarray(0.0 - np.sqrt(mean))  # not -sqrt: a perfect score is 0, not -0
 
 
 def checked(score: Score, name: str) -> Score:
@@ -378,7 +381,7 @@ def checked(score: Score, name: str) -> Score:
         InputError: ``record`` is no tuple of known signals. A call of the new score raises it if
             the function reads another signal, or returns other than one number per run.
     """
-    record = score.record
+    record: object = score.record
     if not isinstance(record, tuple) or not record or any(one not in SIGNALS for one in record):
         raise InputError(
             f"the score {name!r} has record={record!r}: expected a tuple of one or more of "
@@ -393,7 +396,7 @@ def _checked(
     runs = len(behaviour[score.record[0]])
     expected = f"the score {name!r}: expected one number for each of {runs} runs"
     try:
-        found: object = score.of(robot, hypothesis, behaviour)
+        result: object = score.of(robot, hypothesis, behaviour)
     except KeyError as error:
         if "was not recorded" not in str(error):
             raise
@@ -402,10 +405,10 @@ def _checked(
             f"signal to `record` of the score"
         ) from error
     try:
-        values = np.asarray(found, dtype=np.float64)
+        values = np.asarray(result, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"{expected}, got {type(found).__name__} ({error}); return an array of numbers from "
+            f"{expected}, got {type(result).__name__} ({error}); return an array of numbers from "
             f"`of` of the score"
         ) from error
     if values.shape != (runs,):
@@ -413,16 +416,13 @@ def _checked(
             f"{expected}, an array of shape ({runs},), got shape {values.shape}; `of` of the score "
             f"gets signals of shape (runs, steps, width): sum over the steps, not over the runs"
         )
-    wrong = np.isnan(values) | np.isposinf(values)
-    if wrong.any() and (wrong := wrong & _known(score, behaviour)).any():
+    # A run that was not observed whole, or diverged, may have no number.
+    known = [np.abs(behaviour[signal]) <= LARGEST for signal in score.record]
+    whole = np.all([signal.all(axis=(1, 2)) for signal in known], axis=0)
+    wrong = whole & (np.isnan(values) | np.isposinf(values))
+    if wrong.any():
         raise InputError(
             f"{expected}, got {values[wrong][0]:g} for {wrong.sum()} of them, whose signals are "
             f"all finite; return a number, the lowest for the worst run, from `of` of the score"
         )
     return values
-
-
-def _known(score: Score, behaviour: Behaviour) -> BoolArray:
-    """Returns the runs that were observed whole and did not diverge, ``(n,)``."""
-    signals = [np.abs(behaviour[signal]) <= LARGEST for signal in score.record]
-    return np.asarray(np.all([values.all(axis=(1, 2)) for values in signals], axis=0))

@@ -9,6 +9,7 @@ self-modeling* (Science 2006).
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -20,19 +21,13 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
-from selfmodel.simulation.domain import (
-    DomainDistribution,
-    DomainSample,
-    StartSpread,
-    draw_samples,
-    start_spread,
-)
+from selfmodel.simulation.domain import DomainDistribution, DomainSample, StartSpread, draw_samples
 from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
 from selfmodel.simulation.rollout import batch_bytes
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import encoder_noise
 from selfmodel.trials.rotation import directions
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
 ASSUMED_NOISE = 0.05
@@ -67,6 +62,9 @@ ASSUMED_DELAYS = (0, 1, 2)
 MIN_SHARE = 0.5
 """Smallest deviation of the initial pose, as a fraction of the noise with which it was measured: a
 pose within the noise is not distinguished from the reference pose."""
+
+NOISY: tuple[Signal, ...] = ("sensors", "joint_positions", "base_orientation")
+"""Signals of a trial whose noise is estimated."""
 
 MODELS = 128
 """Largest number of models of the sample. Each trial is simulated once per model."""
@@ -113,22 +111,6 @@ def assumed_uncertainty(robot: Robot) -> DomainDistribution:
     )
 
 
-def noise_of_gap(robot: Robot, level: float) -> DomainDistribution:
-    """Returns the noise of a reality gap alone: the parameters are those of the robot's model.
-
-    Args:
-        robot: The robot.
-        level: Level of the reality gap.
-    """
-    touch = _touch(robot.anatomy)
-    return DomainDistribution(
-        models=exact(robot),
-        reading_noise=np.where(touch, 0.0, level),
-        wrong_touches=np.where(touch, level / 2, 0.0),
-        start=start_spread(level),
-    )
-
-
 def estimated_uncertainty(
     simulator: Simulator, trials: Sequence[Trial], calibration: Calibration | None
 ) -> DomainDistribution:
@@ -145,15 +127,10 @@ def estimated_uncertainty(
     """
     robot, assumed = simulator.robot, assumed_uncertainty(simulator.robot)
     touch = _touch(robot.anatomy)
-    noise, wrong, angles, tilts = [], [], [], []
-    for trial in trials:
-        logged, simulated = trial.behaviour, _simulated(simulator, trial)
-        noise.append(_excess(_variance, logged["sensors"], simulated["sensors"]))
-        wrong.append(_excess(_flips, logged["sensors"], simulated["sensors"]))
-        angles.append(_start_variance(logged["joint_positions"], simulated["joint_positions"]))
-        tilts.append(_start_variance(_tilts(logged), _tilts(simulated)))
+    variances = [_variances(simulator, trial) for trial in trials]
+    noise, wrong, angles, tilts = zip(*variances, strict=True)
     angle = _deviation(angles)
-    found = DomainDistribution(
+    measured = DomainDistribution(
         models=exact(robot),
         reading_noise=np.where(touch, 0.0, np.sqrt(np.mean(noise, axis=0))),
         wrong_touches=np.where(touch, np.mean(wrong, axis=0), 0.0),
@@ -161,33 +138,39 @@ def estimated_uncertainty(
         start=StartSpread(angle, angle / 2 if np.isnan(tilts).all() else _deviation(tilts)),
     )
     if calibration is None:
-        known = dataclasses.replace(found, models=assumed.models, delays=assumed.delays)
-        return found if found.is_none else known
+        if measured.is_none:
+            return measured
+        return dataclasses.replace(measured, models=assumed.models, delays=assumed.delays)
     if calibration.error_before < EXACT_ERROR:
-        return found
+        return measured
     deviations = CALIBRATED * calibration.deviations
     bodies = np.full(robot.model.nbody, BODIES)
     contacts = CONTACTS if robot.has_fitted_contacts else 0.0
-    return dataclasses.replace(found, models=LogNormal(deviations, bodies, contacts))
+    return dataclasses.replace(measured, models=LogNormal(deviations, bodies, contacts))
 
 
 def _touch(anatomy: Anatomy) -> BoolArray:
     return np.array([sensor.kind == "touch" for sensor in anatomy.sensors], dtype=bool)
 
 
-def _simulated(simulator: Simulator, trial: Trial) -> Behaviour:
-    outcome = simulator.run(
-        [(INTACT, trial.plan.controller)],
-        trial.behaviour.steps,
-        ("sensors", "joint_positions", "base_orientation"),
+def _variances(simulator: Simulator, trial: Trial) -> tuple[FloatArray, FloatArray, float, float]:
+    """Returns the excess over a simulation of a trial: of readings, of the initial pose.
+
+    Returns:
+        Variance of the readings and frequency of their flips, ``(sensors,)`` each; variance of the
+        initial joint angles, and of the initial roll and pitch, NaN if not observed.
+    """
+    logged = trial.behaviour
+    runs = simulator.run([(INTACT, trial.plan.controller)], logged.steps, NOISY).behaviour
+    pairs = [(logged[signal], runs[signal][0]) for signal in NOISY]
+    readings, angles, orientations = pairs
+    roll_and_pitch = [directions(each)[:, 2:4] for each in orientations]
+    return (
+        _excess(_variance, *readings),
+        _excess(_flips, *readings),
+        _start_variance(*angles),
+        _start_variance(*roll_and_pitch),
     )
-    signals = {signal: values[0] for signal, values in outcome.behaviour.signals.items()}
-    return Behaviour(outcome.behaviour.names, outcome.behaviour.time, signals)
-
-
-def _tilts(behaviour: Behaviour) -> FloatArray:
-    """Returns roll and pitch as direction cosines, ``(steps, 2)``."""
-    return directions(behaviour["base_orientation"])[:, 2:4]
 
 
 def _excess(
@@ -202,8 +185,8 @@ def _variance(series: FloatArray) -> FloatArray:
 
 def _flips(series: FloatArray) -> FloatArray:
     """Returns the fraction of the steps at which a reading differs from both of its neighbours."""
-    before, own, after = series[:-2], series[1:-1], series[2:]
-    return np.asarray(((before == after) & (own != before)).mean(axis=0))
+    before, middle, after = series[:-2], series[1:-1], series[2:]
+    return np.asarray(((before == after) & (middle != before)).mean(axis=0))
 
 
 def _start_variance(logged: FloatArray, simulated: FloatArray) -> float:
@@ -221,10 +204,11 @@ def _deviation(variances: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(known))) if known else 0.0
 
 
+@dataclass(eq=False)
 class Posterior:
     """The uncertainty of a self-model, updated by trials. It simulates nothing until it is needed.
 
-    Args:
+    Attributes:
         simulator: Self-model, calibrated if there is a calibration.
         healthy: Trials of the healthy robot, at least one.
         calibration: Fit of the self-model to the healthy trials; None without one.
@@ -232,29 +216,27 @@ class Posterior:
         rng: Random number generator of the sample.
     """
 
-    def __init__(
-        self,
-        simulator: Simulator,
-        healthy: Sequence[Trial],
-        calibration: Calibration | None,
-        settings: Settings,
-        rng: np.random.Generator,
-    ) -> None:
-        self._models = max(2, min(MODELS, round(SAMPLE_COST * settings.evaluations)))
-        self._simulator, self._healthy, self._calibration = simulator, healthy, calibration
-        self._rng = rng
-        self._likelihoods: dict[Any, FloatArray] = {}  # by hypothesis, and content of the trial
+    simulator: Simulator
+    healthy: Sequence[Trial]
+    calibration: Calibration | None
+    settings: Settings
+    rng: np.random.Generator
+    _likelihoods: dict[tuple[Hypothesis, Any], FloatArray] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def _models(self) -> int:
+        return max(2, min(MODELS, round(SAMPLE_COST * self.settings.evaluations)))
 
     @cached_property
     def _uncertainty(self) -> DomainDistribution:
-        return estimated_uncertainty(self._simulator, self._healthy, self._calibration)
+        return estimated_uncertainty(self.simulator, self.healthy, self.calibration)
 
     @cached_property
     def _conditions(self) -> tuple[DomainSample, ...]:
         """A condition per model, then ``REPEATS`` with the model of the first one."""
         count = self._models + REPEATS
-        drawn = draw_samples((INTACT,), self._uncertainty, count, self._rng)
-        repeats = [dataclasses.replace(own, model=drawn[0].model) for own in drawn[self._models :]]
+        drawn = draw_samples((INTACT,), self._uncertainty, count, self.rng)
+        repeats = [dataclasses.replace(one, model=drawn[0].model) for one in drawn[self._models :]]
         return (*drawn[: self._models], *repeats)
 
     def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> DomainDistribution:
@@ -268,27 +250,26 @@ class Posterior:
         sample = [condition.model for condition in self._conditions[: self._models]]
         if not any(model.differs for model in sample):
             return self._uncertainty
-        known = [trial for trial in trials if np.isfinite(_observed(trial)).all()]
         likelihood = np.zeros(self._models)
-        for trial in known:
-            likelihood += self._likelihood(
-                trial, INTACT if trial.plan.stage == "before" else hypothesis
-            )
+        for trial in trials:
+            track = _observed(trial)
+            if np.isfinite(track).all():
+                faults = INTACT if trial.plan.stage == "before" else hypothesis
+                likelihood += self._likelihood(trial, track, faults)
         models = Weighted(sample, flattened_weights(likelihood))
         return dataclasses.replace(self._uncertainty, models=models)
 
-    def _likelihood(self, trial: Trial, hypothesis: Hypothesis) -> FloatArray:
+    def _likelihood(self, trial: Trial, track: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         key = (hypothesis, trial.content)
         if key not in self._likelihoods:
             conditions = [
-                dataclasses.replace(own, hypothesis=hypothesis) for own in self._conditions
+                dataclasses.replace(each, hypothesis=hypothesis) for each in self._conditions
             ]
-            paths = _paths(self._simulator, self._uncertainty, trial, conditions)
-            observed = _observed(trial)
+            paths = _paths(self.simulator, self._uncertainty, trial, conditions)
             # Relative to the first step, a value has the noise of two measurements.
-            measured = np.sqrt(2) * np.repeat(encoder_noise(observed), MARKS)
+            measured = np.sqrt(2) * np.repeat(encoder_noise(track), MARKS)
             self._likelihoods[key] = log_likelihood(
-                _path(observed), paths[: self._models], paths[self._models :], measured
+                _path(track), paths[: self._models], paths[self._models :], measured
             )
         return self._likelihoods[key]
 
@@ -355,8 +336,8 @@ def _paths(
         simulated = outcome.behaviour
         position, orientation = simulated["base_position"][0], simulated["base_orientation"][0]
         paths += [
-            np.full(3 * MARKS, np.nan) if diverged else _path(_track(*own))
-            for *own, diverged in zip(position, orientation, outcome.diverged[0], strict=True)
+            np.full(3 * MARKS, np.nan) if diverged else _path(_track(*run))
+            for *run, diverged in zip(position, orientation, outcome.diverged[0], strict=True)
         ]
     return np.array(paths)
 

@@ -12,7 +12,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,11 +71,11 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
             f"{folder}: expected the folder of a run, or of a campaign with a table such as "
             f"results.csv, got neither"
         )
-    judged = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
-    rows = next(filter(None, judged), [])
+    scored = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
+    rows = next(filter(None, scored), [])
     every = {**other_lists(folder), **tables}
     shown = tuple(_table(name, records) for name, records in every.items())
-    found = [
+    sections = [
         _shares(rows) if rows else None,
         Section("tables", "Tables", ("A heading sorts its table by that column.",), shown),
         _figures(folder, most_figures),
@@ -83,7 +83,7 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     return Report(
         title=f"campaign: {encodable(folder.resolve().name)}",
         headline=_headline(tables, rows),
-        sections=tuple(section for section in found if section is not None),
+        sections=tuple(section for section in sections if section is not None),
     )
 
 
@@ -147,7 +147,12 @@ def _table(name: str, records: Sequence[Record]) -> Table:
 def _figures(folder: Path, most: int) -> Section | None:
     shown: list[Picture] = []
     left_out: list[str] = []
-    for path in _figure_files(folder):
+    figures: dict[str, Path] = {}
+    for place in (folder, folder / FIGURES):
+        for suffix in MEDIA_TYPES:
+            for path in sorted(place.glob(f"*{suffix}")):
+                figures.setdefault(path.stem, path)
+    for path in figures.values():
         check_regular(path, "a figure")
         if path.stat().st_size > most:
             left_out.append(encodable(path.name))
@@ -160,15 +165,6 @@ def _figures(folder: Path, most: int) -> Section | None:
     if not shown and not left_out:
         return None
     return Section("figures", "Figures", (text,) if left_out else (), tuple(shown))
-
-
-def _figure_files(folder: Path) -> Iterator[Path]:
-    found: dict[str, Path] = {}
-    for place in (folder, folder / FIGURES):
-        for suffix in MEDIA_TYPES:
-            for path in sorted(place.glob(f"*{suffix}")):
-                found.setdefault(path.stem, path)
-    yield from found.values()
 
 
 def _table_files(folder: Path) -> list[Path]:
@@ -190,8 +186,8 @@ def read_table(path: Path) -> list[dict[str, Cell]]:
         text = data.decode("utf-8-sig")  # spreadsheets begin a CSV file with a byte order mark
         if path.suffix == ".csv":
             return _typed(list(csv.DictReader(io.StringIO(text))))
-        found = [parse_json(line.encode()) for line in text.split("\n") if line.strip()]
-        return [_flat(item) for item in found if isinstance(item, dict)]
+        items = [parse_json(line.encode()) for line in text.split("\n") if line.strip()]
+        return [_flat(item) for item in items if isinstance(item, dict)]
     except (ValueError, RecursionError, csv.Error) as error:
         raise _unreadable(path, "a table of results", error) from error
 
@@ -229,20 +225,21 @@ def _unreadable(path: Path, what: str, error: Exception) -> InputError:
 
 def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
     """Returns the values of a JSON object, those of inner objects under joined names."""
-    found: dict[str, Cell] = {}
+    flat: dict[str, Cell] = {}
     for key, value in item.items():
         name = encodable(f"{prefix}{key}")
-        if isinstance(value, dict):
-            found |= _flat(value, f"{name} ")
-        elif isinstance(value, list):
-            found[name] = encodable(", ".join(map(str, value)))
-        elif isinstance(value, str):
-            found[name] = encodable(value)
-        elif isinstance(value, int) and abs(value) > MAX_INTEGER:
-            found[name] = str(value)
-        else:
-            found[name] = value
-    return found
+        match value:
+            case dict():
+                flat |= _flat(value, f"{name} ")
+            case list():
+                flat[name] = encodable(", ".join(map(str, value)))
+            case str():
+                flat[name] = encodable(value)
+            case int() if abs(value) > MAX_INTEGER:
+                flat[name] = str(value)
+            case _:
+                flat[name] = value
+    return flat
 
 
 def _typed(rows: Sequence[Mapping[str, str | None]]) -> list[dict[str, Cell]]:

@@ -1,10 +1,12 @@
-"""Content of a report as plain data, which the page draws: sections of charts and tables.
+"""A report as plain data, which the page draws: sections of charts and tables; and its HTML file.
 
 Every record is JSON as ``as_json`` writes it: an item has its ``kind``; numbers are those of the
-logs and results, and NaN or infinite numbers are null.
+logs and results, and NaN or infinite numbers are null. Labels have the unit.
 """
 
+import html
 from collections.abc import Mapping
+from importlib.resources import files
 from typing import Any
 
 import msgspec
@@ -12,35 +14,29 @@ import msgspec
 FORMAT = "selfmodel-report-1"
 """Format of the JSON in the page."""
 
+REPORT = "report.html"
+"""File of the report in the folder of a run or of a campaign."""
+
+TEMPLATE = "template.html"
+"""The page: ``make page`` builds it from the folder ``report_page``."""
+
+DATA, TITLE = "<!--selfmodel-report-data-->", "<!--selfmodel-report-title-->"
+"""Places in the page for the JSON of the report and for its title."""
+
 Cell = float | int | str | bool | None
 """Cell of a table; None if it is empty."""
 
 Numbers = tuple[float, ...]
 
 
-class Record(msgspec.Struct, frozen=True):
-    """A part of an item."""
-
-
 class Item(msgspec.Struct, frozen=True, tag_field="kind"):
-    """What a section shows.
-
-    Attributes:
-        title: Title.
-    """
+    """What a section shows, under a title."""
 
     title: str
 
 
-class Mark(Record, frozen=True):
-    """A time or a value that a chart marks.
-
-    Attributes:
-        label: Text of the mark.
-        value: Position on the horizontal axis.
-        low: Lower bound of the position; None without an interval.
-        high: Upper bound of the position.
-    """
+class Mark(msgspec.Struct, frozen=True):
+    """A position on the horizontal axis that a chart marks; bounds are None without an interval."""
 
     label: str
     value: float
@@ -48,14 +44,8 @@ class Mark(Record, frozen=True):
     high: float | None = None
 
 
-class Series(Record, frozen=True):
-    """One line of a chart.
-
-    Attributes:
-        name: Name in the legend.
-        x: Positions on the horizontal axis.
-        y: Values, as many; NaN or None where unknown.
-    """
+class Series(msgspec.Struct, frozen=True):
+    """One line of a chart; ``y`` is NaN or None where unknown."""
 
     name: str
     x: Numbers
@@ -63,7 +53,7 @@ class Series(Record, frozen=True):
 
 
 class LineChart(Item, frozen=True, tag="line"):
-    """Values over a horizontal axis; labels have the unit."""
+    """Values over a horizontal axis."""
 
     x_label: str
     y_label: str
@@ -71,42 +61,23 @@ class LineChart(Item, frozen=True, tag="line"):
     marks: tuple[Mark, ...] = ()
 
 
-class Group(Record, frozen=True):
-    """Bars with one label.
-
-    Attributes:
-        label: Label of the bars.
-        values: Value of each bar, in the order of ``BarChart.names``; NaN where unknown.
-    """
+class Group(msgspec.Struct, frozen=True):
+    """Bars with one label, in the order of ``BarChart.names``; NaN where unknown."""
 
     label: str
     values: Numbers
 
 
 class BarChart(Item, frozen=True, tag="bars"):
-    """Horizontal bars in groups.
-
-    Attributes:
-        x_label: Label of the values, with their unit.
-        names: Names of the bars of a group.
-        groups: The groups.
-    """
+    """Horizontal bars in groups; ``names`` are those of the bars of a group."""
 
     x_label: str
     names: tuple[str, ...]
     groups: tuple[Group, ...]
 
 
-class Estimate(Record, frozen=True):
-    """A value with an interval.
-
-    Attributes:
-        label: Name of the quantity.
-        value: Estimated value.
-        low: Lower bound of the interval.
-        high: Upper bound of the interval.
-        note: Remark, such as ``not determined by these trials``.
-    """
+class Estimate(msgspec.Struct, frozen=True):
+    """A value with an interval and a remark, such as ``not determined by these trials``."""
 
     label: str
     value: float
@@ -119,7 +90,7 @@ class IntervalChart(Item, frozen=True, tag="intervals"):
     """Values with intervals, one below the other.
 
     Attributes:
-        x_label: Label of the values, with their unit.
+        x_label: Label of the values.
         estimates: The values.
         reference: Value that is marked, such as 1 for factors; None without one.
         limits: Ends of the axis, such as 0 and 1 for shares; None for those of the values.
@@ -131,7 +102,7 @@ class IntervalChart(Item, frozen=True, tag="intervals"):
     limits: tuple[float, float] | None = None
 
 
-class Row(Record, frozen=True):
+class Row(msgspec.Struct, frozen=True):
     """A row of a heat map: its name, and its value in each column, NaN where unknown."""
 
     label: str
@@ -142,8 +113,8 @@ class HeatMap(Item, frozen=True, tag="heat"):
     """Values by row and time.
 
     Attributes:
-        x_label: Label of the horizontal axis, with its unit.
-        value_label: Label of the values, with their unit.
+        x_label: Label of the horizontal axis.
+        value_label: Label of the values.
         begin: Beginning of each column on the horizontal axis.
         end: End of each column.
         rows: The rows.
@@ -160,7 +131,7 @@ class HeatMap(Item, frozen=True, tag="heat"):
     marks: tuple[Mark, ...] = ()
 
 
-class Lane(Record, frozen=True):
+class Lane(msgspec.Struct, frozen=True):
     """A lane of a gait diagram: name of the sensor, beginning and end of each contact, s."""
 
     label: str
@@ -175,7 +146,7 @@ class GaitDiagram(Item, frozen=True, tag="gait"):
 
 
 class Table(Item, frozen=True, tag="table"):
-    """A table that the reader can sort; names of columns have the unit."""
+    """A table that the reader can sort."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -195,15 +166,8 @@ class Attachment(Item, frozen=True, tag="file"):
     data: str
 
 
-class Section(Record, frozen=True):
-    """A section of a report.
-
-    Attributes:
-        key: Identifier in the page, a word in lower case.
-        title: Heading.
-        text: Paragraphs before the items.
-        items: Charts, tables and pictures, in order.
-    """
+class Section(msgspec.Struct, frozen=True):
+    """A section: an identifier in lower case, a heading, paragraphs, then charts and tables."""
 
     key: str
     title: str
@@ -211,7 +175,7 @@ class Section(Record, frozen=True):
     items: tuple[Item, ...] = ()
 
 
-class Report(Record, frozen=True, kw_only=True):
+class Report(msgspec.Struct, frozen=True, kw_only=True):
     """A report.
 
     Attributes:
@@ -235,3 +199,14 @@ class Report(Record, frozen=True, kw_only=True):
 def as_json(report: Report) -> bytes:
     """Returns the JSON of a report; a number that is not finite is null."""
     return msgspec.json.encode(report, enc_hook=dict)  # a read-only mapping
+
+
+def html_of(report: Report) -> bytes:
+    """Returns the HTML file of a report; it makes no network request."""
+    page = (files("selfmodel.report") / TEMPLATE).read_text(encoding="utf-8")
+    # The text of a script ends at "</script", and "<!--" changes how it is read.
+    values = as_json(report).decode().replace("<", "\\u003c").replace("\u2028", "\\u2028")
+    data = f'<script type="application/json" id="report">{values}</script>'
+    head, _, rest = page.partition(TITLE)
+    middle, _, tail = rest.partition(DATA)
+    return f"{head}{html.escape(report.title)}{middle}{data}{tail}".encode()

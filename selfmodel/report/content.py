@@ -1,23 +1,27 @@
-"""Content of the report of a subject: its scene, its first sentences and its sections."""
+"""Content of a report: its first sentences and its sections, from a subject."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.results import RecoveryResult, Search
+from selfmodel.logs.results import RecoveryResult, Search, TrialResult
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.report import charts
-from selfmodel.report.charts import Report, Section
+from selfmodel.report.charts import Item, Report, Section
 from selfmodel.report.evidence import residual_section, separation_section
-from selfmodel.report.scene import scene_of
+from selfmodel.report.scene import Motion, Shot, scene_of
 from selfmodel.report.subject import Subject
-from selfmodel.report.trials import gait_section, shots_of, trials_section
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
+from selfmodel.simulation.trial_replay import replay
+from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import Trial
 
 NOT_FINISHED = "The recovery is not finished"
 """Beginning of the headline of a recovery that goes on, or that was interrupted."""
@@ -25,19 +29,17 @@ NOT_FINISHED = "The recovery is not finished"
 MAX_LINES = 4
 """Hypotheses in the chart over diagnoses."""
 
+MAX_DIAGRAMS = 12
+"""Trials with a gait diagram, at most: the last ones."""
+
 Z = 1.96
 """Half width of a 95 % interval of a normal distribution, in standard deviations."""
 
 
 def report_of(subject: Subject, *, finished: bool = True) -> Report:
-    """Returns the report of trials and their diagnoses.
-
-    Args:
-        subject: The trials and diagnoses.
-        finished: Whether the recovery that they are of is finished.
-    """
+    """Returns the report of trials and their diagnoses, of a recovery that is finished or not."""
     shots = shots_of(subject)
-    found = [
+    sections = [
         trials_section(subject, shots),
         hypotheses_section(subject),
         residual_section(subject),
@@ -46,51 +48,39 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
         calibration_section(subject.calibration),
         gait_section(subject, shots),
     ]
-    said = headline(subject)
+    sentence = headline(subject)
     return Report(
         title=subject.title,
-        headline=said if finished else f"{NOT_FINISHED}: {said}",
+        headline=sentence if finished else f"{NOT_FINISHED}: {sentence}",
         verdict=details(subject),
-        sections=tuple(section for section in found if section is not None),
+        sections=tuple(section for section in sections if section is not None),
         scene=scene_of(subject.robot, shots),
         made_with=subject.made_with,
     )
-
-
-def report_before_diagnosis(title: str, happened: str, searches: Sequence[Search]) -> Report:
-    """Returns the report of a recovery without a diagnosis yet.
-
-    Args:
-        title: Title of the report.
-        happened: What happened last, as a clause.
-        searches: Progress of the searches so far.
-    """
-    section = searches_section(searches)
-    sections = () if section is None else (section,)
-    return Report(title=title, headline=f"{NOT_FINISHED}: {happened}.", sections=sections)
 
 
 def headline(subject: Subject) -> str:
     """Returns what happened, in one sentence."""
     verdict, result = _verdict(subject.diagnosis), subject.result
     if result is None:
-        count = len(subject.damaged)
-        trials = f"{count} {'trial' if count == 1 else 'trials'}"
-        return f"{trials} of the {subject.robot.name}: it {verdict}."
+        return f"{_counted(len(subject.damaged))} of the {subject.robot.name}: it {verdict}."
     score = result.score
     before, after, recovered = (
         f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
         for value in (score.before, score.after, score.recovered)
     )
     is_distance = score.name in (DISPLACEMENT.name, UPRIGHT.name)
-    name = "" if is_distance else f" ({score.name})"
-    achieved = "moved" if is_distance else "scored"
+    name, achieved = ("", "moved") if is_distance else (f" ({score.name})", "scored")
     fall = ", and fell" if result.fell else ""
-    since = f"{result.physical_trials} {'trial' if result.physical_trials == 1 else 'trials'}"
     return (
         f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
-        f"it; it {verdict}, and {achieved} {recovered} at best in {since} since{fall}."
+        f"it; it {verdict}, and {achieved} {recovered} at best in "
+        f"{_counted(result.physical_trials)} since{fall}."
     )
+
+
+def _counted(trials: int) -> str:
+    return f"{trials} {'trial' if trials == 1 else 'trials'}"
 
 
 def details(subject: Subject) -> tuple[str, ...]:
@@ -116,10 +106,85 @@ def _verdict(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"has the fault {diagnosis.best}, which explains its trials"
         case "ambiguous":
-            found = [str(one) for one in (diagnosis.best, *diagnosis.indistinguishable)]
-            more = f" or one of {len(found) - 3} others" if len(found) > 3 else ""
-            return f"has {' or '.join(found[:3])}{more}"
+            faults = [str(one) for one in (diagnosis.best, *diagnosis.indistinguishable)]
+            more = f" or one of {len(faults) - 3} others" if len(faults) > 3 else ""
+            return f"has {' or '.join(faults[:3])}{more}"
     return f"moves in a way that no searched hypothesis explains; the nearest is {diagnosis.best}"
+
+
+def shots_of(subject: Subject) -> tuple[Shot, ...]:
+    """Returns every trial of a report with its simulations."""
+    after = [("best hypothesis", subject.diagnosis.best)]
+    if subject.runner_up is not None:
+        after.append(("runner-up", subject.runner_up))
+    before = [("self-model", INTACT)]
+    return tuple(
+        _shot(subject, trial, hypotheses)
+        for trials, hypotheses in ((subject.healthy, before), (subject.damaged, after))
+        for trial in trials
+    )
+
+
+def _shot(subject: Subject, trial: Trial, hypotheses: Sequence[tuple[str, Hypothesis]]) -> Shot:
+    rollouts = []
+    for name, hypothesis in hypotheses:
+        result = replay(trial, hypothesis, subject.simulator)
+        signals = {signal: result.simulated[signal] for signal in SIGNALS}
+        behaviour = Behaviour(result.simulated.names, trial.behaviour.time, signals)
+        rollouts.append(Motion(name, hypothesis, behaviour, result.diverged))
+    change = subject.change_of(trial)
+    mark = None if change is None else change[0]
+    return Shot(subject.names[trial.path], trial, tuple(rollouts), mark)
+
+
+def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
+    """Returns the section of the trials: displacement, predicted against observed."""
+    text = (
+        "A prediction is a simulation of the whole trial by the self-model, with the same "
+        "controller, from its initial pose. Trials before the failure are predicted without a "
+        "fault, all others under the hypotheses of the last diagnosis."
+    )
+    items: list[Item] = []
+    if not subject.robot.has_fixed_base:
+        items.append(
+            charts.BarChart(
+                title="Forward displacement of each trial, observed and predicted",
+                x_label="forward displacement, m",
+                names=("observed", "best hypothesis or self-model", "runner-up"),
+                groups=tuple(charts.Group(one.name, _displacements(one)) for one in shots),
+            )
+        )
+    items.append(_trials_table(subject, shots))
+    return Section("trials", "Trials", (text,), tuple(items))
+
+
+def _displacements(shot: Shot) -> tuple[float, ...]:
+    predicted = [rollout.displacement for rollout in shot.rollouts]
+    return (shot.trial.displacement, *(*predicted, math.nan)[:2])
+
+
+def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
+    columns = ["trial", "stage", "steps", "observed displacement, m"]
+    columns += ["predicted displacement, m", "predicted under"]
+    result = subject.result
+    results = {} if result is None else {one.name: one for one in result.trials or ()}
+    if result is not None:
+        columns += [f"{result.score.name}, {result.score.unit}".removesuffix(", ")]
+        columns += ["predicted before the trial", "hypothesis at the time", "fell at step"]
+    rows = []
+    for one in shots:
+        first = one.rollouts[0]
+        row: list[charts.Cell] = [one.name, one.trial.plan.stage, one.trial.behaviour.steps]
+        row += [one.trial.displacement, first.displacement, str(first.hypothesis)]
+        row += [] if result is None else _scores(results.get(one.name))
+        rows.append(tuple(row))
+    return charts.Table("Trials", tuple(columns), tuple(rows))
+
+
+def _scores(trial: TrialResult | None) -> list[charts.Cell]:
+    if trial is None:
+        return [None] * 4
+    return [trial.score, trial.predicted_score, trial.hypothesis, trial.fell_at_step]
 
 
 def hypotheses_section(subject: Subject) -> Section:
@@ -238,3 +303,41 @@ def _estimate(row: dict[str, Any]) -> charts.Estimate:
     with np.errstate(over="ignore"):  # a deviation of a changed file may be of any size
         low, high = (float(value * np.exp(sign * Z * deviation)) for sign in (-1, 1))
     return charts.Estimate(row["name"], value, low, high, "" if row["determined"] else UNDETERMINED)
+
+
+def gait_section(subject: Subject, shots: Sequence[Shot]) -> Section | None:
+    """Returns the section of the gait, contacts over time; None without touch sensors."""
+    sensors = subject.robot.anatomy.sensors
+    touch = {one.name: i for i, one in enumerate(sensors) if one.kind == "touch"}
+    diagrams = tuple(_diagram(one, touch) for one in shots[-MAX_DIAGRAMS:] if touch)
+    shown = tuple(one for one in diagrams if one.groups)
+    text = (
+        "A bar is the time in which a touch sensor has contact (after Hildebrand, 1965). The "
+        "sensors of a detached limb have none."
+    )
+    return Section("gait", "Gait diagram", (text,), shown) if shown else None
+
+
+def _diagram(shot: Shot, touch: dict[str, int]) -> charts.GaitDiagram:
+    motions = [("measured", shot.trial.behaviour)]
+    motions += [(one.name, one.behaviour) for one in shot.rollouts[:1] if not one.diverged]
+    return charts.GaitDiagram(
+        title=f"Contacts in {shot.name}",
+        groups={
+            name: tuple(
+                charts.Lane(sensor, tuple(_spans(behaviour.time, behaviour["sensors"][:, i])))
+                for sensor, i in touch.items()
+            )
+            for name, behaviour in motions
+            if np.isfinite(behaviour["sensors"][:, list(touch.values())]).any()
+        },
+        end=float(shot.trial.behaviour.time[-1]),
+    )
+
+
+def _spans(time: FloatArray, readings: FloatArray) -> Iterator[tuple[float, float]]:
+    """Yields the times from the first step with contact to the first without."""
+    contact = np.concatenate([[False], readings > 0.5, [False]])
+    edges = np.flatnonzero(contact[1:] != contact[:-1])
+    for begin, end in edges.reshape(-1, 2):
+        yield float(time[begin]), float(time[min(end, len(time) - 1)])

@@ -12,10 +12,9 @@ from selfmodel.errors import WorkError
 from selfmodel.evolution import Generation
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.results import Search, write_searches
-from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.report.charts import Report
-from selfmodel.report.content import report_before_diagnosis, report_of
-from selfmodel.report.page import REPORT, html_of
+from selfmodel.recovery.result import Event, SearchBegins
+from selfmodel.report.charts import REPORT, Report, html_of
+from selfmodel.report.content import NOT_FINISHED, report_of, searches_section
 from selfmodel.report.subject import Subject, title_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
@@ -86,10 +85,13 @@ class Progress:
         """Returns the report of what happened so far, which states that it is not finished."""
         name = self.folder.resolve().name
         if not self._diagnoses or self._comparator is None:
-            happened = (
-                f"the trial {self._trials[-1].plan.name} was run" if self._trials else "it begins"
+            last = f"the trial {self._trials[-1].plan.name} was run" if self._trials else ""
+            section = searches_section(self.searches)
+            return Report(
+                title=title_of(self.robot, name),
+                headline=f"{NOT_FINISHED}: {last or 'it begins'}.",
+                sections=() if section is None else (section,),
             )
-            return report_before_diagnosis(title_of(self.robot, name), happened, self.searches)
         healthy = [trial for trial in self._trials if trial.plan.stage == "before"]
         damaged = [trial for trial in self._trials if trial.plan.stage != "before"]
         subject = Subject(

@@ -240,10 +240,10 @@ def simplified(
         faces: Indices of the corners of each triangle, ``(faces, 3)``.
         most_faces: Largest number of triangles, at least 200.
     """
-    found, cells = (vertices, faces), FINEST_GRID
-    while len(found[1]) > most_faces and cells >= 1:
-        found, cells = _clustered(vertices, faces, cells), cells * 3 // 4
-    return found
+    mesh, cells = (vertices, faces), FINEST_GRID
+    while len(mesh[1]) > most_faces and cells >= 1:
+        mesh, cells = _clustered(vertices, faces, cells), cells * 3 // 4
+    return mesh
 
 
 def _clustered(

@@ -4,21 +4,27 @@ A subject is read from the folder of a run, or from logs and the file of their d
 a file is imported: plug-ins that are no entry points have to be given.
 """
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import Generic, TypeVar
 
-from selfmodel import arguments
+import numpy as np
+
+from selfmodel import arguments, plugins
 from selfmodel.api import by_stage
 from selfmodel.arguments import AUTO, comparator_choice, fitted
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.files import encodable
+from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.files import encodable, file_digest
 from selfmodel.logs.journal import (
     DIAGNOSES,
     TRIALS,
@@ -28,27 +34,24 @@ from selfmodel.logs.journal import (
 )
 from selfmodel.logs.results import (
     RESULT,
+    CalibrationResult,
+    DiagnosisResult,
     RecoveryResult,
     Search,
+    as_json,
+    converted,
     read_as,
     read_searches,
 )
-from selfmodel.report.recorded import (
-    DiagnosisFile,
-    comparator_name,
-    recorded_calibration,
-    recorded_space,
-)
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
+from selfmodel.simulation.fit import NOMINAL
+from selfmodel.simulation.model_factors import Parameters, factor_names, with_parameters
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.trials.trial import Trial, trial_names
 
-WHAT, REMEDY = (
-    "the result of a recovery",
-    "move it away, and the report is made of the logs and diagnoses",
-)
-"""What a result.json is, and the remedy for one that is damaged, for errors."""
+Result = TypeVar("Result", bound=DiagnosisResult)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +118,8 @@ class Subject:
     @property
     def runner_up(self) -> Hypothesis | None:
         """The hypothesis to compare with the best: an indistinguishable one, or the next."""
-        others = [*self.diagnosis.indistinguishable]
-        others += [candidate.hypothesis for candidate in self.diagnosis.ranked]
+        ranked = (candidate.hypothesis for candidate in self.diagnosis.ranked)
+        others = (*self.diagnosis.indistinguishable, *ranked)
         return next((one for one in others if one != self.diagnosis.best), None)
 
     @property
@@ -171,13 +174,16 @@ def subject_of_run(
     logs = arguments.read_logs(paths)
     robot = arguments.robot_of_logs(logs, None)
     damaged, healthy = by_stage([log.trial for log in logs])
-    path, result, count = folder / RESULT, None, thread_count(threads)
-    if path.exists():
-        result = read_as(path, RecoveryResult, WHAT, REMEDY)
-        comparator = comparator_name(path, result.comparator, comparator)
-    diagnoses = read_diagnoses(
-        folder, recorded_space(path, robot, result.kinds if result else (), kinds)
-    )
+    count, space, file = thread_count(threads), hypothesis_space(robot, kinds), None
+    if (folder / RESULT).exists():
+        file = DiagnosisFile(
+            folder / RESULT,
+            RecoveryResult,
+            "the result of a recovery",
+            "move it away, and the report is made of the logs and diagnoses",
+        )
+        comparator, space = file.comparator_name(comparator), file.space(robot, kinds)
+    diagnoses = read_diagnoses(folder, space)
     if not diagnoses or not damaged:
         raise InputError(
             f"{folder}: expected a run with a diagnosis, got none yet: wait for its first "
@@ -185,13 +191,11 @@ def subject_of_run(
         )
     _check_counts(folder / DIAGNOSES, diagnoses, len(damaged))
     explained = damaged[: diagnoses[-1].trials]
-    if result is None:
+    if file is not None:
+        calibration = file.calibration(robot, healthy, count)
+    else:
         fits = bool(healthy) and is_calibrated(folder)
         calibration = fitted(robot, healthy, count) if fits else None
-    else:
-        calibration = recorded_calibration(
-            path, result, robot, healthy, threads=count, words=(WHAT, REMEDY)
-        )
     return Subject(
         name=folder.resolve().name,
         robot=robot,
@@ -200,11 +204,30 @@ def subject_of_run(
         diagnoses=diagnoses,
         comparator=comparator_choice(comparator)(robot, [*healthy, *explained]).comparator,
         calibration=calibration,
-        result=result,
+        result=None if file is None else file.result,
         searches=read_searches(folder),
         made_with=logs[0].software,
         threads=count,
     )
+
+
+def _check_counts(path: Path, diagnoses: Sequence[Diagnosis], trials: int) -> None:
+    """Checks that each diagnosis is of logs that are there: a damaged run may lack some.
+
+    Raises:
+        InputError: A diagnosis is of no or of more trials, or has a change in none of its trials.
+    """
+    for diagnosis in diagnoses:
+        change = diagnosis.change
+        if not 1 <= diagnosis.trials <= trials or (
+            change is not None and not 0 <= change.index < diagnosis.trials
+        ):
+            place = "" if change is None else f", with a change in trial {change.index}"
+            raise InputError(
+                f"{path}: expected diagnoses of 1 to {trials} trials, as many as the folder "
+                f"{TRIALS} has after the failure, got one of {diagnosis.trials}{place}: put back "
+                f"the logs that were moved away, or give the logs instead of the folder"
+            )
 
 
 def subject_of_logs(
@@ -231,45 +254,196 @@ def subject_of_logs(
         InputError: The diagnosis is of other logs, of another self-model or with another
             comparator, or a file is damaged.
     """
-    file = DiagnosisFile(diagnosis)
+    file: DiagnosisFile[DiagnosisResult] = DiagnosisFile(diagnosis)
     explained, intact = file.matched(paths)
     logs = arguments.read_logs([*explained, *intact])
     model = arguments.robot_of_logs(logs, robot)
     file.check_self_model(model)
-    found = file.diagnosis(recorded_space(diagnosis, model, file.result.kinds, kinds))
+    explanation = file.diagnosis(file.space(model, kinds))
     trials = [log.trial for log in logs]
     damaged, healthy = tuple(trials[: len(explained)]), tuple(trials[len(explained) :])
-    name = comparator_name(diagnosis, file.result.comparator, comparator)
-    count = thread_count(threads)
+    name, count = file.comparator_name(comparator), thread_count(threads)
     return Subject(
         name=", ".join(trial_names(damaged).values()),
         robot=model,
         healthy=healthy,
         damaged=damaged,
-        diagnoses=(found,),
+        diagnoses=(explanation,),
         comparator=comparator_choice(name)(model, [*healthy, *damaged]).comparator,
-        calibration=recorded_calibration(
-            diagnosis, file.result, model, healthy, threads=count, words=(file.WHAT, file.REMEDY)
-        ),
+        calibration=file.calibration(model, healthy, count),
         made_with=logs[0].software,
         threads=count,
     )
 
 
-def _check_counts(path: Path, diagnoses: Sequence[Diagnosis], trials: int) -> None:
-    """Checks that each diagnosis is of logs that are there: a damaged run may lack some.
+def hypothesis_space(robot: Robot, kinds: Iterable[FaultKind]) -> HypothesisSpace:
+    """Returns the hypotheses of built-in and of given kinds."""
+    return HypothesisSpace(robot.anatomy, tuple(dict.fromkeys((*ALL_KINDS, *kinds))))
+
+
+class DiagnosisFile(Generic[Result]):
+    """A diagnosis in a JSON file: the logs that it is of, its plug-ins, its calibration.
+
+    Args:
+        path: Output of ``diagnose --json``, or a run's ``result.json``.
+        kind: Class of the content.
+        what: Expected content, for errors.
+        remedy: Remedy, for errors.
 
     Raises:
-        InputError: A diagnosis is of no or of more trials, or has a change in none of its trials.
+        InputError: The file cannot be read, or is no such file, or was altered.
     """
-    for diagnosis in diagnoses:
-        change = diagnosis.change
-        if not 1 <= diagnosis.trials <= trials or (
-            change is not None and not 0 <= change.index < diagnosis.trials
-        ):
-            place = "" if change is None else f", with a change in trial {change.index}"
+
+    def __init__(
+        self,
+        path: Path,
+        kind: type[Result] = DiagnosisResult,  # type: ignore[assignment]  # the default of Result
+        what: str = "the output of `selfmodel diagnose --json`, or the result.json of a recovery",
+        remedy: str = "leave --diagnosis out, and the logs are diagnosed",
+    ) -> None:
+        self.path, self._what, self._remedy = path, what, remedy
+        self.result = read_as(path, kind, what, remedy)
+        if not self.result.explained:
+            raise self._error("it explains no log")
+
+    def _error(self, cause: str) -> InputError:
+        return InputError(f"{self.path}: expected {self._what}: {cause}; {self._remedy}")
+
+    def diagnosis(self, space: HypothesisSpace) -> Diagnosis:
+        """Returns the diagnosis.
+
+        Args:
+            space: Hypotheses that it may name.
+
+        Raises:
+            InputError: A value is missing, or of another type.
+        """
+        count = len(self.result.explained)
+        try:
+            diagnosis = diagnosis_from_dict({**as_json(self.result), "trials": count}, space.parse)
+        except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            raise self._error(f"{type(error).__name__}: {error}") from error
+        if diagnosis.change is not None and not 0 <= diagnosis.change.index < count:
+            raise self._error(f"a change in trial {diagnosis.change.index} of {count} trials")
+        return diagnosis
+
+    def matched(self, paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+        """Returns those of some logs that the diagnosis explains, in its order, and the healthy.
+
+        Args:
+            paths: All logs of the diagnosis, in any order and under any names.
+
+        Raises:
+            InputError: The logs are others than those of the diagnosis.
+        """
+        given, files = {file_digest(path): path for path in paths}, self.result.files or {}
+        # The paths in a result.json are relative to its folder, and those of its logs are not.
+        known = {PurePath(path).name: digest for path, digest in files.items()} | files
+        explained, healthy = (
+            [known.get(log) or known.get(PurePath(log).name, "") for log in logs]
+            for logs in (self.result.explained, self.result.healthy)
+        )
+        if len(given) != len(paths) or given.keys() != {*explained, *healthy}:
+            expected = ", ".join((*self.result.explained, *self.result.healthy))
             raise InputError(
-                f"{path}: expected diagnoses of 1 to {trials} trials, as many as the folder "
-                f"{TRIALS} has after the failure, got one of {diagnosis.trials}{place}: put back "
-                f"the logs that were moved away, or give the logs instead of the folder"
+                f"{self.path} is a diagnosis of other logs: expected {expected}, the same by "
+                f"SHA-256, got {', '.join(map(str, paths))}: give these logs, or {self._remedy}"
             )
+        return [given[digest] for digest in explained], [given[digest] for digest in healthy]
+
+    def check_self_model(self, robot: Robot) -> None:
+        """Checks that a robot is the self-model of the diagnosis, by its name and its digest.
+
+        Raises:
+            InputError: It is another one.
+        """
+        if robot.name != self.result.robot:
+            raise InputError(
+                f"{self.path} is a diagnosis of the robot {self.result.robot}, and these logs are "
+                f"of the robot {robot.name}: give --robot as it was given to the diagnosis"
+            )
+        given, model = self_model_digest(robot), self.result.model
+        if model != given:
+            raise InputError(
+                f"{self.path} is a diagnosis with another self-model of the name {robot.name}: "
+                f"expected the digest {model[:12]}, got {given[:12]}: give --robot as it was given "
+                f"to the diagnosis, or {self._remedy}"
+            )
+
+    def comparator_name(self, given: str) -> str:
+        """Returns the name by which the recorded comparator is found.
+
+        Args:
+            given: Name of ``--comparator``: where the recorded comparator is, such as
+                ``package.module:object``; ``auto`` for one that its own name finds.
+
+        Raises:
+            InputError: The given comparator is another one, or the file names a module.
+        """
+        recorded = self.result.comparator
+        if given == AUTO:
+            return self._installed(recorded)
+        name = plugins.comparator(given).name
+        if name != recorded:
+            raise InputError(
+                f"{self.path} has distances by the comparator {recorded}, and --comparator {given} "
+                f"is {name}: leave --comparator out, which is for a comparator "
+                f"package.module:object"
+            )
+        return given
+
+    def space(self, robot: Robot, given: Sequence[FaultKind]) -> HypothesisSpace:
+        """Returns the hypotheses of built-in kinds, of those in the file, and of given ones.
+
+        Raises:
+            InputError: The file names a module, or no kind has a name.
+        """
+        known = {kind.name for kind in given}
+        named = [self._installed(name) for name in self.result.kinds if name not in known]
+        recorded = plugins.kinds(",".join(named)) if named else ()
+        return hypothesis_space(robot, (*recorded, *given))
+
+    def _installed(self, name: str) -> str:
+        """Returns a name that imports no code: a file of others may name any module."""
+        if ":" in name:
+            raise InputError(
+                f"{self.path} names the plug-in {name!r}, and a report imports nothing that a file "
+                f"names: name it by --comparator or --kinds, or give it an entry point"
+            )
+        return name
+
+    def calibration(
+        self, robot: Robot, healthy: Sequence[Trial], threads: int
+    ) -> Calibration | None:
+        """Returns the calibration; None without healthy trials or without one.
+
+        Values of a fit joint by joint do not determine its model: it is fitted again.
+
+        Raises:
+            InputError: A value is missing, of another type, or of another robot.
+        """
+        if not healthy or self.result.calibration is None:
+            return None
+        values = self.result.calibration
+        fit = converted(self.path, values, CalibrationResult, self._what, self._remedy)
+        if fit.joints is not None:
+            return fitted(robot, healthy, threads)
+        # Factors of single joints and bodies are of other fits, and stay nominal.
+        names = {one.name for one in dataclasses.fields(Parameters)} & set(fit.__struct_fields__)
+        parameters = Parameters(**{name: getattr(fit, name) for name in names})
+        count = len(factor_names(robot))
+        sizes = {len(parameters.factors), len(fit.deviations), len(fit.determined) or count}
+        if sizes != {count}:
+            raise self._error(
+                f"its calibration has {sorted(sizes)} factors, and {count} are expected"
+            )
+        return Calibration(
+            robot=robot if fit.set == NOMINAL else with_parameters(robot, parameters),
+            parameters=parameters,
+            deviations=np.array(fit.deviations),
+            error_before=fit.error_before,
+            error=fit.error,
+            chosen=fit.set,
+            determined=fit.determined,
+            held_out_gain=fit.held_out_gain,
+        )

@@ -17,15 +17,12 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.physical.gap import draw_gap
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.plugins import NEXT_TRIAL, PAPER, repair
-from selfmodel.recovery.events import Event
-from selfmodel.recovery.random_streams import gap_stream
-from selfmodel.recovery.recover import RecoveryLoop
+from selfmodel.recovery.recover import RecoveryLoop, random_stream
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -191,7 +188,7 @@ def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
     Raises:
         InputError: The level is out of range.
     """
-    return Reality(draw_gap(robot, level, gap_stream(seed)))
+    return Reality(draw_gap(robot, level, random_stream(seed, "gap")))
 
 
 def is_correct(

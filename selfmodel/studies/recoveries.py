@@ -29,13 +29,11 @@ from selfmodel.logs.files import replace_file
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.falls import falls_of
-from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.recover import diagnose_trials
+from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import model_digest
-from selfmodel.recovery.scores import DISPLACEMENT
+from selfmodel.recovery.result import Event, SearchBegins
+from selfmodel.recovery.scores import DISPLACEMENT, falls_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -146,7 +144,11 @@ def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> dict[s
     make_repair = plugins.repair(parameters["repair"], parameters["search"])
     repair = make_repair(Simulator(robot, threads=1), settings, design, chosen.score)
     found = repair(
-        (INTACT,), partial(assumed_uncertainty, robot), (), repair_stream(seed, 0), lambda _: None
+        (INTACT,),
+        partial(assumed_uncertainty, robot),
+        (),
+        random_stream(seed, "repair"),
+        lambda _: None,
     )
     write_gait(folder, found[0].controller)
     return {"evaluations": repair.evaluations}
@@ -369,7 +371,7 @@ def recover_or_evolve(parameters: Parameters, needs: Folders, folder: Path) -> R
             rows.append({"before": before, **best})
 
     # A stream that no repair of the recovery draws from: the control is an independent search.
-    stream = repair_stream(parameters["seed"], settings.trials + 1)
+    stream = random_stream(parameters["seed"], "repair", settings.trials + 1)
     truths, assumed = [truth_of(parameters, robot)], partial(assumed_uncertainty, robot)
     RepairSearch(simulator, settings)(truths, assumed, [gait], stream, keep)
     return {"evolution": rows}

@@ -15,8 +15,9 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
-from selfmodel.recovery.random_streams import repair_stream
-from selfmodel.recovery.scores import TRACKING, UPRIGHT, Reference, Score, tracking, upright_within
+from selfmodel.recovery.recover import random_stream
+from selfmodel.recovery.scores import UPRIGHT, Score, upright_within
+from selfmodel.recovery.tracking import TRACKING, Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import Entry
@@ -227,7 +228,7 @@ def random_controller(design: Design, seed: int) -> Controller:
         design: The design.
         seed: Seed of all random numbers of the recovery.
     """
-    return Controller(design, draw_genomes(repair_stream(seed, 0), (design.weights,)))
+    return Controller(design, draw_genomes(random_stream(seed, "repair"), (design.weights,)))
 
 
 def _reference_of(behaviour: Behaviour, source: str) -> Reference:

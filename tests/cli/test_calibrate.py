@@ -10,8 +10,7 @@ import pytest
 from selfmodel.controllers.playback import played_back
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.model_factors import nominal, with_parameters

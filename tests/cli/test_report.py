@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.report.charts import Report
-from selfmodel.report.page import html_of
+from selfmodel.report.charts import Report, html_of
 from tests.helpers.command import SMALL, selfmodel
 
 BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.logs.inspection import verify
-from selfmodel.physical.stop_signals import STOP_SIGNALS
+from selfmodel.physical.safety import STOP_SIGNALS
 from tests.helpers.signalled_driver import PHASES, STEPS
 
 ROOT = Path(__file__).parents[2]

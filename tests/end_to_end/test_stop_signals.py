@@ -15,8 +15,8 @@ import pytest
 from typer.core import TyperGroup
 
 from selfmodel.controllers.controller import CommandSource
+from selfmodel.physical.safety import STOP_SIGNALS
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.physical.stop_signals import STOP_SIGNALS
 from selfmodel.trials.behaviour import Sample
 from tests.end_to_end.stop_signals import endings
 from tests.helpers.command import SMALL, selfmodel

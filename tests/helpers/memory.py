@@ -19,7 +19,7 @@ def in_memory(robot: Robot) -> RunTrial:
 
 
 class MemoryJournal:
-    """Journal that keeps diagnoses in memory; see ``selfmodel.recovery.database.Journal``."""
+    """Journal that keeps diagnoses in memory; see ``selfmodel.recovery.Journal``."""
 
     def __init__(self) -> None:
         self.diagnoses: list[Diagnosis] = []

@@ -18,7 +18,6 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery import next_trial as disagreement
-from selfmodel.recovery.events import DiscriminatingTrial, Event
 from selfmodel.recovery.next_trial import (
     EARLY_STEPS,
     GENERATIONS,
@@ -30,8 +29,7 @@ from selfmodel.recovery.next_trial import (
 )
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
 from selfmodel.recovery.repair import CandidateController
-from selfmodel.recovery.result import Database
-from selfmodel.robot.designs import cpg_for, network_for
+from selfmodel.recovery.result import Database, DiscriminatingTrial, Event
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
@@ -81,79 +79,68 @@ def test_rivals_come_first_then_what_is_unseen_and_without_any_those_that_follow
     found = dataclasses.replace(found, undetectable=besides)
 
     assert [str(one) for one in candidates_to_separate(found)] == list(expected)
+    diverged = tuple(dataclasses.replace(one, distance=np.inf) for one in found.ranked[1:])
+    found = dataclasses.replace(found, ranked=(found.ranked[0], *diverged), verdict="explained")
+    left = dict.fromkeys((*found.indistinguishable, *found.undetectable))
+    assert candidates_to_separate(found) == (found.best, *left)[:5]
 
 
-def test_a_hypothesis_that_diverges_is_not_in_the_running(quadruped: Robot):
-    found = diagnosis("intact", "break:front_left_knee", robot=quadruped, verdict="explained")
-    apart = dataclasses.replace(found.ranked[1], distance=float("inf"))
-
-    assert candidates_to_separate(dataclasses.replace(found, ranked=(found.ranked[0], apart))) == (
-        INTACT,
-    )
-
-
-@settings(deadline=None)
-@given(
-    seed=st.integers(0, 2**32),
-    known=st.integers(1, 4),
-    mutation=st.sampled_from([0.0, 0.01, 1.0]),
-)
-def test_a_controller_that_was_tried_is_no_candidate(
-    quadruped: Robot, seed: int, known: int, mutation: float
+@pytest.mark.parametrize("mutation", [0.0, 0.05])
+def test_offspring_is_of_every_controller_that_was_tried_and_is_none_of_them(
+    quadruped: Robot, mutation: float
 ):
-    tried = random_controllers(quadruped, known, seed % 97)
-    numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
-    pool = untried_mutants(tried, tried, numbers, np.random.default_rng(seed))
+    for tried in (random_controllers(quadruped, 3), random_cpgs(quadruped, 3)):
+        numbers = dataclasses.replace(SMALL, mutation=mutation, crossovers=0)
+        pool = untried_mutants(tried, tried, numbers, np.random.default_rng(0))
 
-    assert not set(pool) & set(tried)
-    assert 1 <= len(pool) == len(set(pool)) <= numbers.population
-
-
-def test_mutants_are_of_the_kind_of_their_parents(quadruped: Robot):
-    newest, older = random_cpgs(quadruped, 2)
-    found = untried_mutants([newest], [newest, older], SMALL, np.random.default_rng(0))
-
-    assert {one.design for one in found} == {cpg_for(quadruped)}
-
-
-def test_offspring_is_bred_of_every_controller_that_was_tried(quadruped: Robot):
-    tried = random_controllers(quadruped, 3)
-    numbers = dataclasses.replace(SMALL, mutation=0.05, crossovers=0)
-    pool = untried_mutants(tried, tried, numbers, np.random.default_rng(0))
-    kin = [[np.mean(child.genome == parent.genome) > 0.8 for parent in tried] for child in pool]
-
-    assert np.all(np.sum(kin, axis=1) == 1)
-    assert np.all(np.any(kin, axis=0))
+        assert {child.design for child in pool} == {tried[0].design}
+        assert not set(pool) & set(tried)
+        assert 1 <= len(pool) == len(set(pool)) <= numbers.population
+        if mutation:
+            kin = [[np.mean(c.genome == t.genome) > 0.7 for t in tried] for c in pool]
+            assert np.all(np.sum(kin, axis=1) == 1)
+            assert np.all(np.any(kin, axis=0))
+        else:
+            assert len(pool) == 1, "every mutant equals its parent: a random controller"
 
 
-def test_what_is_asked_is_bred_to_ask_more(quadruped: Robot):
-    simulator, known = Simulator(quadruped, 2), random_controllers(quadruped, 2)
+def test_what_is_asked_is_bred_to_ask_more_and_of_its_seed_at_any_number_of_threads(
+    quadruped: Robot,
+):
     touch = parse("sensor:front_left_touch", quadruped.anatomy)
     found = diagnosis("intact", robot=quadruped, verdict="explained")
     found = dataclasses.replace(found, undetectable=(touch,))
+    known = random_controllers(quadruped, 2)
     first = untried_mutants(known, known, SMALL, np.random.default_rng(1))
+    simulator = Watched(quadruped)
     best = Disagreement([INTACT, touch], simulator, SMALL.steps).most_discriminative(first)
-    bred = discriminating_controller(found, known, simulator, SMALL, np.random.default_rng(1))
+    simulator.times.clear()
+    bred, again = (
+        discriminating_controller(found, known, one, SMALL, np.random.default_rng(1))
+        for one in (simulator, Simulator(quadruped, 1))
+    )
 
+    assert set(simulator.times.values()) == {1}, "what is bred of is not simulated again"
+    assert len(simulator.times) > GENERATIONS * SMALL.survivors
     column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
     runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY_STEPS, ("sensors",))
     less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
     assert more > less
-    assert bred not in first
+    assert bred == again
+    assert bred not in [*first, *known]
 
 
-def test_the_controller_that_disagrees_most_is_not_tried_a_second_time(quadruped: Robot):
-    simulator = Simulator(quadruped, 2)
-    touch = parse("sensor:front_left_touch", quadruped.anatomy)
-    found = diagnosis("intact", robot=quadruped, verdict="explained")
-    found = dataclasses.replace(found, undetectable=(touch,))
-    newest, *older = random_controllers(quadruped, 2)
-    for _ in range(3):  # without mutation, offspring of the best one remains the best one
-        numbers = dataclasses.replace(SMALL, mutation=0.001, crossovers=0)
-        stream = np.random.default_rng(1)
-        best = discriminating_controller(found, [newest, *older], simulator, numbers, stream)
-        assert best not in [newest, *older]
-        older.append(best)
+class Watched(Simulator):
+    """Counts how often each controller is simulated for so many steps under each hypothesis."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot, threads=2)
+        self.times: Counter = Counter()
+
+    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
+        """Simulates as ever."""
+        self.times.update((run, steps) for run in runs if not isinstance(run[1], Playback))
+        return super().run(runs, steps, record)
 
 
 def loop_of(
@@ -179,59 +166,14 @@ def loop_of(
     return loop
 
 
-def test_a_repair_that_was_tried_is_followed_by_the_next_best(quadruped: Robot):
+def test_a_repair_that_was_tried_is_followed_by_the_next_best_and_the_last_by_a_mutant(
+    quadruped: Robot,
+):
     first, second, third = random_controllers(quadruped, 3)
     assert by_repair(loop_of(quadruped, [first], [first, second, third])) == second
     assert by_repair(loop_of(quadruped, [second, first], [first, second, third])) == third
-
-
-def test_if_all_repairs_were_tried_a_mutant_of_the_best_is_next(quadruped: Robot):
-    first, second = random_controllers(quadruped, 2)
-    chosen = by_repair(loop_of(quadruped, [first, second], [second, first]))
-    alike = np.mean(chosen.genome == second.genome)
-    assert 0.5 < alike < 1
-
-
-class CountingSimulator(Simulator):
-    """Counts how often each controller is simulated for so many steps under each hypothesis."""
-
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot, threads=2)
-        self.times: Counter = Counter()
-
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates as ever."""
-        self.times.update((run, steps) for run in runs if not isinstance(run[1], Playback))
-        return super().run(runs, steps, record)
-
-
-def test_what_is_bred_of_is_not_looked_at_again(quadruped: Robot):
-    simulator = CountingSimulator(quadruped)
-    found = diagnosis("intact", "jam:front_left_knee", robot=quadruped, verdict="ambiguous")
-    discriminating_controller(
-        found, random_controllers(quadruped, 2), simulator, SMALL, np.random.default_rng(1)
-    )
-
-    assert len(simulator.times) > GENERATIONS * SMALL.survivors
-    assert set(simulator.times.values()) == {1}
-
-
-def test_the_same_stream_chooses_the_same_at_any_number_of_threads(quadruped: Robot):
-    found = diagnosis(
-        *("jam:front_left_knee", "jam:front_left_shoulder"),
-        robot=quadruped,
-        indistinguishable=1,
-        verdict="ambiguous",
-    )
-    tried = random_controllers(quadruped, 2)
-    one, other = (
-        discriminating_controller(
-            found, tried, Simulator(quadruped, n), SMALL, np.random.default_rng(3)
-        )
-        for n in (1, 2)
-    )
-
-    assert one == other != tried[0]
+    mutant = by_repair(loop_of(quadruped, [first, second], [second, first]))
+    assert 0.5 < np.mean(mutant.genome == second.genome) < 1
 
 
 @pytest.mark.parametrize(
@@ -290,7 +232,7 @@ class Fate:
 class Oracle:
     """A simulator that knows the fate of each controller."""
 
-    robot = SimpleNamespace(standing_height=HEIGHT)
+    robot = SimpleNamespace(standing_height=HEIGHT, anatomy=SimpleNamespace(names=NAMES))
 
     def __init__(self, fates: Sequence[Fate]) -> None:
         network = Network(NAMES.sensors, NAMES.motors)
@@ -325,34 +267,6 @@ class Oracle:
         return SimulationResult(Behaviour(NAMES, time, signals), diverged)
 
 
-def chosen(quadruped: Robot, fates: Sequence[Fate], steps: int = 400) -> int:
-    """Which of the controllers with these fates is chosen."""
-    oracle = Oracle(fates)
-    hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
-    with pytest.MonkeyPatch.context() as patch:
-        level = SimpleNamespace(normal=UP)
-        patch.setattr(disagreement, "build", lambda _robot, _hypothesis: level)
-        one = Disagreement(hypotheses, oracle, steps).most_discriminative(oracle.controllers)
-    return oracle.controllers.index(one)
-
-
-def moving(robot: Robot, motor: str) -> Controller:
-    """A controller that turns one joint and leaves the others where they are."""
-    network, genome = network_for(robot), np.zeros(network_for(robot).weights)
-    to_motors = genome[-len(network.motors) * (network.hidden + 1) :]
-    to_motors.reshape(len(network.motors), -1)[network.motors.index(motor), -1] = 1.0
-    return Controller(network, genome)
-
-
-def test_the_controller_that_makes_two_hypotheses_differ_is_chosen(quadruped: Robot):
-    hypotheses = [INTACT, parse("jam:front_left_knee", quadruped.anatomy)]
-    motors = ("back_left_knee", "back_right_knee", "front_left_knee", "front_right_knee")
-    pool = [moving(quadruped, motor) for motor in motors]
-
-    one = Disagreement(hypotheses, Simulator(quadruped, 2), 120).most_discriminative(pool)
-    assert one == moving(quadruped, "front_left_knee")
-
-
 def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
     # What the controllers would make of the reading, another motion, is not evidence.
     simulator = Simulator(quadruped, 2)
@@ -369,30 +283,30 @@ def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
     )
 
 
-def test_what_differs_most_is_chosen_and_of_equals_the_first(quadruped: Robot):
-    assert chosen(quadruped, [Fate(0.1), Fate(0.2), Fate(0.2), Fate(0.15)]) == 1
-
-
-def test_what_differs_only_later_counts_for_nothing(quadruped: Robot):
-    assert chosen(quadruped, [Fate(0.01), Fate(0.3, late=True)]) == 0
-
-
-@pytest.mark.parametrize("step", [0, EARLY_STEPS - 1, EARLY_STEPS, 380])
-def test_a_controller_with_which_the_robot_falls_at_any_time_is_out(quadruped: Robot, step: int):
-    assert chosen(quadruped, [Fate(0.05), Fate(0.2, falls=step), Fate(0.1)]) == 2
-
-
-def test_a_controller_whose_simulation_diverges_is_out(quadruped: Robot):
-    assert chosen(quadruped, [Fate(0.2, diverges=True), Fate(0.1)]) == 1
-
-
-@pytest.mark.parametrize("steps", [(5, 50, 30), (150, 399, 200), (20, 300, 7)])
-def test_where_the_robot_always_falls_the_latest_fall_is_chosen(
-    quadruped: Robot, steps: tuple[int, ...]
+@pytest.mark.parametrize(
+    ("fates", "index"),
+    [
+        ([Fate(0.1), Fate(0.2), Fate(0.2), Fate(0.15)], 1),  # of equals the first
+        ([Fate(0.01), Fate(0.3, late=True)], 0),
+        ([Fate(0.2, diverges=True), Fate(0.1)], 1),
+        ([Fate(0.05), Fate(0.2, falls=0), Fate(0.1)], 2),
+        ([Fate(0.05), Fate(0.2, falls=EARLY_STEPS), Fate(0.1)], 2),
+        ([Fate(0.05), Fate(0.2, falls=380), Fate(0.1)], 2),
+        # If all fall, the latest one.
+        ([Fate(0.3, diverges=True), Fate(0.3, falls=5), Fate(0.2, falls=50)], 2),
+        ([Fate(0.3, falls=150), Fate(0.2, falls=380), Fate(0.1, falls=200)], 1),
+    ],
+)
+def test_the_controller_with_the_largest_early_disagreement_and_without_a_fall_is_chosen(
+    quadruped: Robot, fates: Sequence[Fate], index: int
 ):
-    fates = [Fate(0.3 - 0.1 * k, falls=step) for k, step in enumerate(steps)]
-
-    assert chosen(quadruped, [Fate(0.3, diverges=True), *fates]) == 2
+    oracle = Oracle(fates)
+    hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
+    with pytest.MonkeyPatch.context() as patch:
+        level = SimpleNamespace(normal=UP)
+        patch.setattr(disagreement, "build", lambda _robot, _hypothesis: level)
+        one = Disagreement(hypotheses, oracle, 400).most_discriminative(oracle.controllers)
+    assert oracle.controllers.index(one) == index
 
 
 @settings(deadline=None)

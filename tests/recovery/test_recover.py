@@ -1,19 +1,24 @@
-"""Promises of the algorithm: the paper's loop, no run simulated twice, no look at the truth."""
+"""Promises of the loop: the paper's order, what each step receives, no look at the truth."""
 
 import dataclasses
+import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.random import Generator
 
 from selfmodel.arguments import comparator_choice
-from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.choice import ChosenComparator
-from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -21,29 +26,37 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import read_truth, reader
-from selfmodel.logs.journal import FolderJournal, create_journal
+from selfmodel.logs.journal import create_journal
 from selfmodel.logs.log_file import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.events import Event, SearchBegins
-from selfmodel.recovery.recover import NextTrial, RecoveryLoop, by_repair
-from selfmodel.recovery.repair import RepairSearch
-from selfmodel.recovery.result import Recovery
+from selfmodel.recovery import recover as module
+from selfmodel.recovery.next_trial import discriminating_controller
+from selfmodel.recovery.recover import RecoveryLoop, by_repair, diagnose_trials
+from selfmodel.recovery.repair import CandidateController, RepairSearch
+from selfmodel.recovery.result import Event, Recovery, SearchBegins
+from selfmodel.recovery.scores import Score
+from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.domain import DomainDistribution
+from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import Sample
-from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Stage, Trial
+from selfmodel.trials.behaviour import Behaviour, Sample
+from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
+from tests.helpers.gaits import changed, gait, logged
+from tests.helpers.hostile import lacking
 from tests.helpers.memory import MemoryJournal, in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
+TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
 
 
-class CountingSimulator(Simulator):
-    """Counts how often each pair of hypothesis and controller is simulated for each record."""
+class Watched(Simulator):
+    """Counts how often each pair of hypothesis and controller is simulated."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot, threads=2)
@@ -74,103 +87,78 @@ class Sealed:
 
 
 def recovery(
-    robot: Robot,
-    truth: Hypothesis,
-    simulator: Simulator,
-    events: list[Event],
-    *,
-    sealed: bool = True,
-    seed: int = 5,
-    trials: int = 3,
-    gait: Controller | None = None,
-    next_trial: NextTrial = by_repair,
+    robot: Robot, *, simulator: Simulator | None = None, sealed: bool = True, **changes: object
 ) -> Recovery:
-    """A small recovery from a failure."""
+    """A small recovery from a failure, with the paper's repair."""
+    parts = {
+        "choose_comparator": comparator_choice(FORWARD_DISPLACEMENT),
+        "run_trial": in_memory(robot),
+        "journal": MemoryJournal(),
+        "settings": TINY,
+        "seed": 5,
+        "on_event": lambda _event: None,
+        "kinds": PAPER_KINDS,
+        "make_repair": RepairSearch,
+    }
+    truth = parse(changes.pop("truth", TRUTH), robot.anatomy)
+    loop = RecoveryLoop(simulator=simulator or Simulator(robot, 2), **{**parts, **changes})
     physical = SimulatedRobot(robot), SimulatedRobot(robot, truth)
-    healthy, damaged = (Sealed(one) for one in physical) if sealed else physical
-    return RecoveryLoop(
-        simulator=simulator,
-        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
-        run_trial=in_memory(robot),
-        journal=MemoryJournal(),
-        settings=dataclasses.replace(TINY, trials=trials),
-        seed=seed,
-        on_event=events.append,
-        kinds=PAPER_KINDS,
-        gait=gait,
-        next_trial=next_trial,
-        make_repair=RepairSearch,
-    ).run(healthy, damaged)
+    return loop.run(*(map(Sealed, physical) if sealed else physical))
 
 
-def test_a_recovery_tells_the_papers_story(robot: Robot):
+def test_a_recovery_follows_the_paper_and_simulates_nothing_twice(quadruped: Robot):
     events: list[Event] = []
-    truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
-    outcome = recovery(robot, truth, Simulator(robot, 2), events)
-    story = [
+    simulator = Watched(quadruped)
+    batches: list[tuple[Event, set[Hypothesis]]] = []
+    simulator.on_run = lambda runs: batches.append((events[-1], {fault for fault, _ in runs}))
+    outcome = recovery(quadruped, simulator=simulator, on_event=events.append)
+    order = [
         event.kind if isinstance(event, SearchBegins) else type(event).__name__
         for event in events
         if not isinstance(event, Generation)
     ]
 
-    once = ["diagnostic", "Diagnosis", "repair", "Trial"]
-    first = ["repair", "Trial", "Trial", "ChosenComparator"]
-    assert story == [*first, *once, *once, *once, "diagnostic", "Diagnosis"]
-    stages = [trial.plan.stage for trial in outcome.trials]
-    assert stages == ["before", "after", "recovery", "recovery", "recovery"]
-    assert outcome.trials[0].plan.controller == outcome.trials[1].plan.controller
-    assert outcome.tried[:2] == (INTACT, INTACT)
-    repairs = [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"]
-    assert [search.hypothesis for search in repairs] == [INTACT, *outcome.tried[2:]]
+    first, once = ["repair", "Trial", "Trial", "ChosenComparator"], ["diagnostic", "Diagnosis"]
+    assert order == [*first, *[*once, "repair", "Trial"] * 3, *once]
+    trials = outcome.trials
+    assert [trial.plan.stage for trial in trials] == ["before", "after", *["recovery"] * 3]
+    assert trials[0].plan.controller == trials[1].plan.controller
+    begins = [event for event in events if isinstance(event, SearchBegins)]
+    repairs = [event for event in begins if event.kind == "repair"]
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
     assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3, 4]
-    assert [diagnosis.best for diagnosis in diagnoses[:3]] == list(outcome.tried[2:])
-    children = TINY.population // 2
-    evaluations = TINY.population + (TINY.generations - 1) * children
-    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * evaluations
-    assert outcome.recovered == max(trial.displacement for trial in outcome.trials[2:])
-
-
-def test_nothing_is_simulated_twice(quadruped: Robot):
-    simulator = CountingSimulator(quadruped)
-    events: list[Event] = []
-    outcome = recovery(
-        quadruped, parse("jam:front_left_knee", quadruped.anatomy), simulator, events
-    )
-    trials = Counter(trial.plan.controller for trial in outcome.trials[1:])
-
+    assert outcome.tried == (INTACT, INTACT, *(diagnosis.best for diagnosis in diagnoses[:3]))
+    assert [search.hypothesis for search in repairs] == [INTACT, *outcome.tried[2:]]
+    assert outcome.repair_evaluations == outcome.diagnostic_evaluations == 4 * TINY.evaluations
+    assert outcome.recovered == max(trial.displacement for trial in trials[2:])
+    searched = [(event.hypothesis, faults) for event, faults in batches if event in repairs]
+    assert all(faults == {hypothesis} for hypothesis, faults in searched)
     # Once for its fitness in a repair; a controller that was tried, once more for each trial that
     # a diagnosis compares it with; and intact, for the trial that shows how well it is predicted.
-    before = INTACT, outcome.trials[0].plan.controller
+    runs = Counter(trial.plan.controller for trial in trials[1:])
     for (hypothesis, controller, _), times in simulator.seen.items():
-        assert times <= 1 + trials[controller] + ((hypothesis, controller) == before)
-    asked = outcome.repair_evaluations + outcome.diagnostic_evaluations
-    assert len(simulator.seen) < asked
+        healthy = (hypothesis, controller) == (INTACT, trials[0].plan.controller)
+        assert times <= 1 + runs[controller] + healthy
 
 
-def test_the_algorithm_cannot_see_what_is_hidden(quadruped: Robot):
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    open_events: list[Event] = []
-    recovery(quadruped, truth, Simulator(quadruped, 2), open_events, sealed=False)
-    events: list[Event] = []
-    recovery(quadruped, truth, Simulator(quadruped, 1), events)
+def test_a_recovery_is_of_its_seed_at_any_number_of_threads_and_sees_nothing_hidden(
+    quadruped: Robot,
+):
+    few = dataclasses.replace(TINY, trials=1)
+    one, two, other = (
+        recovery(quadruped, simulator=Simulator(quadruped, threads), settings=few, seed=seed)
+        for threads, seed in ((1, 5), (2, 5), (1, 6))
+    )
+    gait = one.trials[0].plan.controller
+    given = recovery(quadruped, settings=few, gait=gait)
 
-    def facts(told: list[Event]) -> list[object]:
-        diagnoses = [event for event in told if isinstance(event, Diagnosis)]
-        return [*diagnoses, *(event.displacement for event in told if isinstance(event, Trial))]
-
-    assert facts(events) == facts(open_events)
+    for same in (two, given):
+        assert same.diagnosis == one.diagnosis
+        assert [t.displacement for t in same.trials] == [t.displacement for t in one.trials]
+    assert other.trials[0].plan.controller != gait
+    assert given.repair_evaluations < one.repair_evaluations, "a given gait saves its search"
     with pytest.raises(AssertionError, match="reached for _embodiment"):
-        _ = Sealed(SimulatedRobot(quadruped, truth))._embodiment
-
-
-def test_the_same_seed_recovers_the_same_way_at_any_number_of_threads(quadruped: Robot):
-    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
-    outcomes = [recovery(quadruped, truth, Simulator(quadruped, n), []) for n in (1, 2)]
-
-    assert outcomes[0].diagnosis == outcomes[1].diagnosis
-    ways = [[trial.displacement for trial in outcome.trials] for outcome in outcomes]
-    assert ways[0] == ways[1]
+        _ = Sealed(SimulatedRobot(quadruped))._embodiment
 
 
 def test_every_search_starts_from_what_the_database_holds(
@@ -187,158 +175,267 @@ def test_every_search_starts_from_what_the_database_holds(
 
     monkeypatch.setattr("selfmodel.recovery.repair.Evolution", Spy)
     monkeypatch.setattr("selfmodel.diagnosis.search.Evolution", Spy)
-    events: list[Event] = []
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events)
-    diagnoses = [event for event in events if isinstance(event, Diagnosis)]
-    genomes = [trial.plan.controller.genome.tobytes() for trial in outcome.trials]
+    journal = MemoryJournal()
+    trials = recovery(quadruped, journal=journal).trials
+    genomes = [trial.plan.controller.genome.tobytes() for trial in trials]
     space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
     encoded = [
-        [space.encode(c.hypothesis, TINY.genes).tobytes() for c in d.ranked] for d in diagnoses
+        [space.encode(c.hypothesis, TINY.genes).tobytes() for c in diagnosis.ranked]
+        for diagnosis in journal.diagnoses
     ]
-
-    def newest_first(count: int) -> list[bytes]:
-        return list(dict.fromkeys(reversed(genomes[:count])))
+    newest_first = [list(dict.fromkeys(reversed(genomes[:count]))) for count in (2, 3, 4)]
 
     assert started[0] == []
     assert started[1::2] == [[], *encoded[:3]]
-    assert started[2::2] == [newest_first(2), newest_first(3), newest_first(4)]
+    assert started[2::2] == newest_first
 
 
-def test_every_repair_simulates_the_robot_that_was_diagnosed(quadruped: Robot):
-    simulator, events = CountingSimulator(quadruped), []
-    batches: list[tuple[object, set[Hypothesis]]] = []
-    simulator.on_run = lambda runs: batches.append((events[-1], {h for h, _ in runs}))
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    recovery(quadruped, truth, simulator, events)
-    repairs = [event for event in events if isinstance(event, SearchBegins) and event.hypothesis]
-
-    assert {event.hypothesis for event in repairs} - {INTACT}
-    searched = [(event, hypotheses) for event, hypotheses in batches if event in repairs]
-    assert searched
-    assert all(hypotheses == {event.hypothesis} for event, hypotheses in searched)
-
-
-def test_another_seed_recovers_another_way(quadruped: Robot):
-    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
-    simulator = Simulator(quadruped, 2)
-    gaits = {
-        recovery(quadruped, truth, simulator, [], seed=seed, trials=1).trials[0].plan.controller
-        for seed in (1, 2)
-    }
-
-    assert len(gaits) == 2
-
-
-def test_a_gait_that_is_given_changes_nothing_but_the_search_for_it(quadruped: Robot):
-    truth = parse("jam:front_left_shoulder", quadruped.anatomy)
-    evolved = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1)
-    gait = evolved.trials[0].plan.controller
-    given = recovery(quadruped, truth, Simulator(quadruped, 2), [], trials=1, gait=gait)
-
-    assert given.diagnosis == evolved.diagnosis
-    assert [t.displacement for t in given.trials] == [t.displacement for t in evolved.trials]
-    assert given.repair_evaluations < evolved.repair_evaluations
-
-
-def recovery_in_files(
-    robot: Robot, truth: Hypothesis, folder: Path, hidden: dict[Stage, str]
-) -> tuple[Recovery, FolderJournal]:
-    """A small recovery with logs, of which the algorithm reaches no more than it is given."""
-    journal = create_journal(folder, robot.anatomy, calibrated=False)
-
-    class SealedJournal:
-        add = staticmethod(journal.add)
-
-    outcome = RecoveryLoop(
-        simulator=Simulator(robot, 2),
-        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
-        run_trial=TrialRunner(journal.trials, robot, TINY, hidden).__call__,
-        journal=SealedJournal(),
-        settings=dataclasses.replace(TINY, trials=1),
-        seed=1,
-        on_event=lambda _: None,
-        kinds=PAPER_KINDS,
-    ).run(SimulatedRobot(robot), SimulatedRobot(robot, truth))
-    return outcome, journal
-
-
-def test_what_the_logs_hide_changes_no_diagnosis(quadruped: Robot, tmp_path: Path):
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    outcomes = [
-        recovery_in_files(quadruped, truth, tmp_path / name, hidden)[0]
-        for name, hidden in (("told", {"after": str(truth)}), ("not-told", {}))
-    ]
-
-    assert outcomes[0].diagnosis == outcomes[1].diagnosis
-    assert read_truth(tmp_path / "told" / "trials" / "01-after.mcap") == str(truth)
-    assert read_truth(tmp_path / "not-told" / "trials" / "01-after.mcap") is None
-
-
-def test_each_trial_is_read_from_its_log_once_and_is_all_that_is_known(
+def test_the_logs_are_all_that_is_known_and_what_they_hide_changes_nothing(
     quadruped: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     reads: Counter[str] = Counter()
     read_contents = reader.read_contents
 
-    def counted(path: Path, unread: Collection[str]) -> Contents:
+    def counted(path: Path, unread: Collection[str] = ()) -> Contents:
         reads[path.name] += 1
         return read_contents(path, unread)
 
     monkeypatch.setattr(reader, "read_contents", counted)
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    outcome, journal = recovery_in_files(quadruped, truth, tmp_path / "run", {})
-    names = ["00-before.mcap", "01-after.mcap", "02-recovery.mcap"]
+    outcomes, journals = [], []
+    for name, hidden in (("hidden", {"after": TRUTH}), ("bare", {})):
+        journal = create_journal(tmp_path / name, quadruped.anatomy, calibrated=False)
+        run_trial = TrialRunner(journal.trials, quadruped, TINY, hidden)
+        few = dataclasses.replace(TINY, trials=1)
+        given = {"run_trial": run_trial, "journal": SimpleNamespace(add=journal.add)}
+        outcomes.append(recovery(quadruped, settings=few, sealed=False, **given))
+        journals.append(journal)
 
-    assert reads == dict.fromkeys(names, 1)
-    kept = journal.read()
-    assert [trial.path for trial in kept.trials] == [trial.path for trial in outcome.trials]
-    assert [trial.plan for trial in kept.trials] == [trial.plan for trial in outcome.trials]
-    for trial, again in zip(outcome.trials, kept.trials, strict=True):
+    assert reads == dict.fromkeys(("00-before.mcap", "01-after.mcap", "02-recovery.mcap"), 2)
+    assert outcomes[0].diagnosis == outcomes[1].diagnosis
+    logs = [journal.trials / "01-after.mcap" for journal in journals]
+    assert [read_truth(log) for log in logs] == [TRUTH, None]
+    stored = journals[0].read()
+    assert stored.diagnoses[-1] == outcomes[0].diagnosis
+    assert len(stored.diagnoses) == 2
+    for trial, again in zip(outcomes[0].trials, stored.trials, strict=True):
+        assert (trial.path, trial.plan) == (again.path, again.plan)
         for signal, rows in trial.behaviour.signals.items():
             assert rows.tobytes() == again.behaviour[signal].tobytes()
-    assert kept.diagnoses[-1] == outcome.diagnosis
-    assert len(kept.diagnoses) == 2
 
 
-def test_the_way_to_choose_is_asked_before_each_trial_and_obeyed(quadruped: Robot):
-    met: list[tuple[int, int, int, float]] = []
-    given = random_controllers(quadruped, 3)
+def test_the_choice_of_the_next_trial_is_asked_before_each_and_obeyed(quadruped: Robot):
+    asked: list[tuple[int, int, int, float]] = []
+    given, events = random_controllers(quadruped, 3), []
 
     def choose(loop: RecoveryLoop) -> Controller:
         known = loop.known
-        now = loop.trials_left, len(known.diagnoses), len(known.evidence), loop.rng.random()
-        met.append(now)
-        return given[len(met) - 1]
+        draw = loop.rng.random()
+        asked.append((loop.trials_left, len(known.diagnoses), len(known.evidence), draw))
+        return given[len(asked) - 1]
 
-    truth = parse("break:back_left_knee", quadruped.anatomy)
-    events: list[Event] = []
-    outcome = recovery(quadruped, truth, Simulator(quadruped, 2), events, next_trial=choose)
+    outcome = recovery(quadruped, on_event=events.append, next_trial=choose)
 
     assert [trial.plan.controller for trial in outcome.trials[2:]] == given
-    assert [now[:3] for now in met] == [(3, 1, 1), (2, 2, 2), (1, 3, 3)]
-    assert len({now[3] for now in met}) == 3
-    assert not [e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"][1:]
+    assert [now[:3] for now in asked] == [(3, 1, 1), (2, 2, 2), (1, 3, 3)]
+    assert len({now[3] for now in asked}) == 3
+    assert len([e for e in events if isinstance(e, SearchBegins) and e.kind == "repair"]) == 1
 
 
 def test_a_comparator_that_refuses_the_healthy_trial_ends_the_recovery_before_the_failure(
     quadruped: Robot,
 ):
-    events: list[object] = []
+    events: list[Event] = []
 
     def refuse(_robot: Robot, _trials: Sequence[Trial]) -> ChosenComparator:
         raise InputError("no position")
 
     with pytest.raises(InputError, match="no position"):
-        RecoveryLoop(
-            simulator=Simulator(quadruped, 1),
+        recovery(
+            quadruped,
             choose_comparator=refuse,
-            run_trial=in_memory(quadruped),
-            journal=MemoryJournal(),
-            settings=TINY,
-            seed=1,
             on_event=events.append,
             calibrate=lambda _trials: pytest.fail("calibrated"),
             gait=random_controllers(quadruped, 1)[0],
-        ).run(SimulatedRobot(quadruped), SimulatedRobot(quadruped))
+        )
     assert [event.plan.stage for event in events if isinstance(event, Trial)] == ["before"]
+
+
+class StubRepair:
+    """A repair that returns the same candidates every time, and notes what it received."""
+
+    evaluations = 7
+
+    def __init__(self, candidates: Sequence[Controller]) -> None:
+        self._candidates = candidates
+        self.hypotheses: list[tuple[str, ...]] = []
+        self.uncertainties: list[DomainDistribution] = []
+
+    def __call__(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        uncertainty: Callable[[], DomainDistribution],
+        *_rest: object,
+    ) -> tuple[CandidateController, ...]:
+        """Returns the candidates; each prediction is the number of the call."""
+        self.hypotheses.append(tuple(map(str, hypotheses)))
+        self.uncertainties.append(uncertainty())
+        predicted = np.array([float(len(self.hypotheses))])
+        return tuple(CandidateController(one, predicted) for one in self._candidates)
+
+
+@pytest.fixture
+def stubbed(quadruped: Robot, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A recovery with a stub repair and a stub diagnosis, and what each of them received."""
+    repair = StubRepair(random_controllers(quadruped, 3))
+    scored: list[str] = []
+    weighted: list[tuple[int, str]] = []
+    best, alike = (parse(text, quadruped.anatomy) for text in (TRUTH, ALIKE))
+
+    class StubDiagnosis:
+        evaluations = distinct_hypotheses = 0
+
+        def __call__(self, *_rest: object) -> Diagnosis:
+            ranked = (Candidate(best, 0.1), Candidate(alike, 0.1))
+            return Diagnosis(ranked, 1, 1.0, (alike,), "ambiguous", "stub")
+
+    class Posterior(module.Posterior):
+        def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> DomainDistribution:
+            weighted.append((len(trials), str(hypothesis)))
+            return super().after(trials, hypothesis)
+
+    def score(_robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> np.ndarray:
+        scored.append(str(hypothesis))
+        return behaviour["base_position"][:, -1, 0]
+
+    monkeypatch.setattr(module, "DiagnosticSearch", lambda *_rest, **_options: StubDiagnosis())
+    monkeypatch.setattr(module, "Posterior", Posterior)
+    outcome = recovery(
+        quadruped,
+        settings=dataclasses.replace(TINY, trials=2),
+        score=Score("end", ("base_position",), score),
+        make_repair=lambda *_given: repair,
+    )
+    return SimpleNamespace(recovery=outcome, repair=repair, weighted=weighted, scored=scored)
+
+
+def test_a_repair_is_for_the_diagnosed_robot_and_its_candidates_are_tried_in_turn(
+    stubbed: SimpleNamespace,
+):
+    assert stubbed.repair.hypotheses == [("intact",), (TRUTH, ALIKE), (TRUTH, ALIKE)]
+    assert len(stubbed.repair.uncertainties[0].delays) > 1, "the first one is assumed"
+    assert stubbed.weighted == [(2, TRUTH), (3, TRUTH)]
+    controllers = [trial.plan.controller for trial in stubbed.recovery.trials]
+    assert controllers[0] == controllers[1]
+    assert len(set(controllers[1:])) == 3
+    before, after, *later = stubbed.recovery.predicted
+    assert (before, later) == (1.0, [2.0, 3.0])
+    assert math.isnan(after)
+    assert stubbed.scored == ["intact", *[TRUTH] * 3]
+
+
+@pytest.mark.parametrize(("scores", "fell"), [((0.0, 2.0), True), ((2.0, math.nan), False)])
+def test_a_recovery_fell_if_the_robot_fell_in_its_best_trial(
+    stubbed: SimpleNamespace, scores: tuple[float, float], *, fell: bool
+):
+    outcome = dataclasses.replace(
+        stubbed.recovery, scores=(9.0, 9.0, *scores), falls=(None, None, None, 12)
+    )
+    assert outcome.fell == fell
+    assert outcome.best_score == 2.0
+    assert outcome.recovered == outcome.trials[2 + scores.index(2.0)].displacement
+
+
+@pytest.mark.search
+@pytest.mark.parametrize(("kind", "next_trial"), [("network", "separates"), ("cpg", "repair")])
+def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
+    quadruped: Robot, kind: str, next_trial: str
+):
+    # Command ranges of more digits than a model is written with.
+    ranges = "-0.7853981633974483 0.7853981633974483", "-0.71234567891 0.6543210987"
+    robot = dataclasses.replace(quadruped, mjcf=quadruped.mjcf.replace(*ranges))
+    fitted = with_parameters(robot, dataclasses.replace(nominal(robot), friction=1.1))
+
+    def separating(loop: RecoveryLoop) -> Controller:
+        known, rest = loop.known, (loop.simulator, loop.settings, loop.rng)
+        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
+
+    outcome = recovery(
+        robot,
+        settings=dataclasses.replace(TINY, trials=2),
+        design=DESIGNS[kind](robot, None),
+        calibrate=lambda _trials: SimpleNamespace(robot=fitted, summary=None),
+        next_trial=by_repair if next_trial == "repair" else separating,
+    )
+    designs = {trial.plan.controller.design for trial in outcome.trials}
+
+    assert designs == {DESIGNS[kind](robot, None)}
+    assert designs != {DESIGNS[kind](with_parameters(robot, nominal(robot)), None)}
+
+
+def trials_of(robot: Robot, count: int) -> list[Trial]:
+    """Trials of a damaged robot, each with another controller."""
+    run, damaged = in_memory(robot), SimulatedRobot(robot, parse(TRUTH, robot.anatomy))
+    drivers = random_controllers(robot, count, seed=2)
+    plans = [TrialPlan(str(k), "single", one, TINY.steps, 0) for k, one in enumerate(drivers)]
+    return [run(damaged, plan) for plan in plans]
+
+
+def test_logged_trials_are_diagnosed_in_turn_and_each_diagnosis_seeds_the_next(quadruped: Robot):
+    trials, events = trials_of(quadruped, 3), []
+
+    def search(threads: int) -> DiagnosticSearch:
+        return DiagnosticSearch(Simulator(quadruped, threads), FORWARD_DISPLACEMENT, TINY)
+
+    last = diagnose_trials(trials, search(2), 4, events.append)
+    diagnoses = [event for event in events if isinstance(event, Diagnosis)]
+    begins = [event.kind for event in events if isinstance(event, SearchBegins)]
+
+    assert begins == ["diagnostic"] * 3
+    assert [diagnosis.trials for diagnosis in diagnoses] == [1, 2, 3]
+    assert diagnoses[-1] == last
+    assert diagnose_trials(trials[:2], search(1), 4, lambda _: None) == diagnoses[1]
+
+
+def test_trials_that_cannot_be_judged_are_named_before_any_search(quadruped: Robot):
+    first, *others = trials_of(quadruped, 3)
+    others = [lacking(trial, SIGNALS) for trial in others]
+    search = DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, TINY)
+    with pytest.raises(InputError, match=r"1: .* needs .*; .*2: .* needs "):
+        diagnose_trials([first, *others], search, 0, lambda _: pytest.fail("a search began"))
+    with pytest.raises(InputError, match="at least one trial to explain, got none"):
+        diagnose_trials([], search, 0, lambda _: None)
+
+
+@pytest.mark.parametrize("name", COMPARATORS)
+def test_a_comparator_names_what_a_trial_lacks(name: str, quadruped: Robot):
+    (trial,) = trials_of(quadruped, 1)
+    with pytest.raises(InputError, match=r"0: .* needs \w+"):
+        COMPARATORS[name].prepare(lacking(trial, SIGNALS))
+
+
+def test_a_trial_that_other_software_drove_is_explained_by_its_commands(quadruped: Robot):
+    (trial,) = trials_of(quadruped, 1)
+    playback = Playback(quadruped.anatomy.motors, trial.behaviour["commands"])
+    plan = dataclasses.replace(trial.plan, controller=playback)
+    search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, TINY)
+    hypotheses = [parse(text, quadruped.anatomy) for text in (TRUTH, "intact")]
+    exact, other = search.losses.distances(hypotheses, [dataclasses.replace(trial, plan=plan)])
+
+    assert exact == 0 < other
+
+
+def test_a_surrogate_that_cannot_judge_a_trial_is_replaced_by_the_comparator(quadruped: Robot):
+    run = gait()
+    # Seen at four of the moments that are looked at closely, none of which the screen looks at.
+    seen = np.zeros(run.steps, dtype=bool)
+    starts = np.linspace(0, run.steps - 1 - SEGMENT_PREDICTION.horizon, 80).round().astype(int)
+    seen[starts[[1, 2, 4, 5]]] = True
+    angles = np.where(seen[:, np.newaxis], run["joint_positions"], np.nan)
+    trial = logged(changed(run, joint_positions=angles))
+    simulator = Simulator(quadruped, 1)
+    evidence = LossTable(simulator, SEGMENT_PREDICTION)
+
+    with pytest.raises(InputError, match="needs joint_positions at 4 or more of 26 moments"):
+        evidence.cheaper[0].check([trial])
+    assert evidence.surrogate([trial])[0] is evidence
+    DiagnosticSearch(simulator, SEGMENT_PREDICTION, TINY).check([trial])

@@ -1,64 +1,302 @@
-"""The repair search: its start, and the fitness of a diverged gait."""
+"""Promises of both repairs: where they begin, their cost, their candidates, their errors."""
 
 import dataclasses
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pytest
 
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.repair import RepairSearch
-from selfmodel.robot.designs import DESIGNS
+from selfmodel.evolution import Evolution, Generation
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.recovery import repair as module
+from selfmodel.recovery.repair import (
+    COST,
+    FIRST_COST,
+    SHORT_STEPS,
+    CandidateController,
+    MakeRepair,
+    RepairSearch,
+    RobustFitness,
+    RobustRepair,
+    from_repertoire,
+    robust,
+    rollouts_of,
+)
+from selfmodel.recovery.repertoire import Repertoire
+from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.robot.designs import DESIGNS, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.domain import DomainDistribution
+from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable
+from tests.recovery.test_repertoire import ORIGIN
 
-SMALL = dataclasses.replace(Settings().scaled(20), generations=1, steps=200)
-
-
-def test_a_repair_starts_from_the_controllers_it_is_given(quadruped: Robot):
-    seeds = random_controllers(quadruped, 20, seed=3)
-    simulator = Simulator(quadruped, 2)
-    given = assumed, seeds, np.random.default_rng(0), lambda _: None
-    best = RepairSearch(simulator, SMALL)((INTACT,), *given)[0].controller
-    runs = [(INTACT, seed) for seed in seeds]
-    behaviour = simulator.run(runs, SMALL.steps, ["base_position"]).behaviour
-
-    assert best == seeds[int(np.argmax(forward_displacement(behaviour)))]
+NOISY_EA = partial(Evolution, noisy=True)
+LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
+TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=60)
+SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
 
 
-def test_its_candidates_are_the_survivors_with_their_fitness_best_first(quadruped: Robot):
-    seeds = random_controllers(quadruped, 20, seed=3)
-    simulator = Simulator(quadruped, 2)
-    numbers = dataclasses.replace(SMALL, generations=2, mutation=0.01)
-    given = seeds, np.random.default_rng(0), lambda _: None
-    found = RepairSearch(simulator, numbers)([INTACT], assumed, *given)
-    runs = [(INTACT, one.controller) for one in found]
-    fitness = forward_displacement(simulator.run(runs, 200, ["base_position"]).behaviour)
-    assert [one.predicted for one in found] == fitness.tolist() == sorted(fitness)[::-1]
-    assert 1 < len({one.controller for one in found}) == len(found) <= numbers.survivors
+class Watched(Simulator):
+    """A simulator that notes the hypotheses and the steps of each batch under conditions."""
+
+    def __init__(self, robot: Robot, threads: int = 2) -> None:
+        super().__init__(robot, threads)
+        self.asked: list[tuple[list[Hypothesis], int]] = []
+
+    def run_under(self, conditions, uncertainty, drivers, steps, record) -> SimulationResult:  # noqa: ANN001  # those of Simulator
+        """Simulates as ever."""
+        self.asked.append(([one.hypothesis for one in conditions], steps))
+        return super().run_under(conditions, uncertainty, drivers, steps, record)
 
 
-def assumed() -> DomainDistribution:
-    """The uncertainty of a repair that asks for none."""
-    raise AssertionError("the paper's repair simulates the self-model alone")
+def found_by(
+    make: MakeRepair,
+    simulator: Simulator,
+    *,
+    hypotheses: Sequence[Hypothesis] = (INTACT,),
+    design: Design | None = None,
+    seeds: Sequence[Controller] = (),
+    seed: int = 0,
+) -> tuple[CandidateController, ...]:
+    """The candidates of a tiny repair."""
+    repair = make(simulator, TINY, design or network_for(simulator.robot), DISPLACEMENT)
+    assumed = partial(assumed_uncertainty, simulator.robot)
+    return repair(hypotheses, assumed, seeds, np.random.default_rng(seed), lambda _: None)
 
 
-def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot):
-    few = dataclasses.replace(Settings().scaled(4), generations=1, steps=20)
-    search = RepairSearch(Simulator(unstable(quadruped), 2), few)
-    with pytest.raises(WorkError, match="no simulation of quadruped as intact remained finite, wi"):
-        search((INTACT,), assumed, (), np.random.default_rng(0), lambda _: None)
+def repaired(
+    simulator: Simulator,
+    settings: Settings = SMALL,
+    score: Score = DISPLACEMENT,
+    *,
+    hypotheses: Sequence[Hypothesis] = (INTACT,),
+    seeds: Sequence[Controller] = (),
+    seed: int = 0,
+    **options: object,
+) -> tuple[tuple[CandidateController, ...], list[Generation]]:
+    robot, generations = simulator.robot, []
+    repair = RobustRepair(simulator, settings, network_for(robot), score, **options)
+    rng, assumed = np.random.default_rng(seed), partial(assumed_uncertainty, robot)
+    return repair(hypotheses, assumed, seeds, rng, generations.append), generations
 
 
-def test_a_search_for_one_kind_does_not_start_from_controllers_of_the_other(quadruped: Robot):
+def fitness_of(simulator: Simulator) -> RobustFitness:
+    robot = simulator.robot
+    return RobustFitness(simulator, DISPLACEMENT, (INTACT,), assumed_uncertainty(robot))
+
+
+def test_the_mean_and_the_lower_tail_count_alike_and_one_divergence_rejects_nobody():
+    scores = np.array([[0.0, 10.0, 10.0, 10.0], [7.0, 7.0, 7.0, 7.0], [4.0, 4.0, 4.0, 8.0]])
+    np.testing.assert_allclose(robust(scores), [(7.5 + 0) / 2, 7, (5 + 4) / 2])
+    np.testing.assert_allclose(robust(np.array([[3.0]])), [3.0])
+    some, none = [5.0, 5.0, 5.0, -np.inf], [-np.inf] * 4
+    assert np.argsort(-robust(np.array([none, some]))).tolist() == [1, 0]
+    assert np.isfinite(robust(np.array([some]))).all()
+
+
+@pytest.mark.parametrize("repair", [RepairSearch, RobustRepair])
+def test_a_repair_is_of_its_seed_at_any_number_of_threads(quadruped: Robot, repair: MakeRepair):
+    weak = parse("motor:front_left_knee=0.5", quadruped.anatomy)
+    one, two, other = (
+        found_by(repair, Watched(quadruped, threads), seed=seed, hypotheses=(weak, INTACT))
+        for threads, seed in ((1, 0), (2, 0), (1, 1))
+    )
+
+    assert [each.controller for each in one] == [each.controller for each in two]
+    np.testing.assert_array_equal(one[0].scores, two[0].scores)
+    assert other[0].controller not in [each.controller for each in one]
+    values = [float(robust(each.scores[None])[0]) for each in one]
+    assert values == sorted(values, reverse=True)
+
+
+@pytest.mark.parametrize("repair", [RepairSearch, RobustRepair])
+def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot, repair: MakeRepair):
+    with pytest.raises(WorkError, match=r"as intact, got (0 of 8|none) with .*: check"):
+        found_by(repair, Simulator(unstable(quadruped), 2))
+
+
+@pytest.mark.parametrize("kind", ["network", "cpg"])
+@pytest.mark.parametrize("repair", [RepairSearch, RobustRepair])
+def test_a_repair_of_one_design_does_not_start_from_controllers_of_another(
+    quadruped: Robot, repair: MakeRepair, kind: str
+):
     seeds = [*random_controllers(quadruped, 2), *random_cpgs(quadruped, 2)]
-    for kind in ("network", "cpg"):
-        design = DESIGNS[kind](quadruped, None)
-        search = RepairSearch(Simulator(quadruped, 1), dataclasses.replace(SMALL, steps=60), design)
-        rest = None, seeds, np.random.default_rng(0), lambda _generation: None
-        assert {one.controller.design for one in search((INTACT,), *rest)} == {design}
+    design = DESIGNS[kind](quadruped, None)
+    found = found_by(repair, Simulator(quadruped, 1), design=design, seeds=seeds)
+
+    assert {each.controller.design for each in found} == {design}
+
+
+def test_the_papers_repair_returns_its_survivors_with_their_exact_fitness(quadruped: Robot):
+    seeds = random_controllers(quadruped, 8, seed=3)
+    simulator = Simulator(quadruped, 2)
+    found = found_by(RepairSearch, simulator, seeds=seeds)
+    runs = [(INTACT, each.controller) for each in found]
+    behaviour = simulator.run(runs, TINY.steps, ["base_position"]).behaviour
+    of_seeds = simulator.run([(INTACT, each) for each in seeds], TINY.steps, ["base_position"])
+
+    assert [each.predicted for each in found] == forward_displacement(behaviour).tolist()
+    assert found[0].predicted >= forward_displacement(of_seeds.behaviour).max()
+    assert 1 < len({each.controller for each in found}) == len(found) <= TINY.survivors
+
+
+def test_scores_are_those_of_each_condition_and_minus_infinity_of_a_divergence(quadruped: Robot):
+    drivers = random_controllers(quadruped, 3)
+    fitness = fitness_of(Simulator(quadruped, 1))
+    scores = fitness(drivers, 4, 50, np.random.default_rng(0))
+    alone = fitness(drivers[1:2], 4, 50, np.random.default_rng(0))
+    diverged = fitness_of(Simulator(unstable(quadruped), 1))(
+        drivers, 2, 50, np.random.default_rng(0)
+    )
+
+    assert scores.shape == (3, 4)
+    assert len(np.unique(scores)) == 12
+    np.testing.assert_array_equal(alone, scores[1:2])
+    assert np.isneginf(diverged).all()
+    assert np.isneginf(robust(diverged)).all()
+
+
+@pytest.mark.search
+def test_candidates_are_better_than_chance_under_new_conditions_and_best_first(quadruped: Robot):
+    simulator = Simulator(quadruped, 2)
+    found, _ = repaired(simulator)
+    fitness = fitness_of(simulator)
+    by_chance, best = (
+        robust(fitness(drivers, 8, SMALL.steps, np.random.default_rng(1)))
+        for drivers in (random_controllers(quadruped, 40), [found[0].controller])
+    )
+
+    assert best[0] > np.quantile(by_chance, 0.9)
+    assert found[0].predicted == pytest.approx(found[0].scores.mean())
+
+
+@pytest.mark.search
+@pytest.mark.parametrize("known", [0, 1])
+@pytest.mark.parametrize("options", [{}, {"make_search": NOISY_EA}], ids=["cma-es", "ea"])
+def test_it_costs_what_it_may_and_reports_its_progress(
+    quadruped: Robot, known: int, options: dict[str, object]
+):
+    simulator = Simulator(quadruped, 2)
+    seeds = random_controllers(quadruped, known)
+    found, generations = repaired(simulator, seeds=seeds, **options)
+    cost, spent = rollouts_of(SMALL, known=bool(known)), simulator.stats.steps / SMALL.steps
+
+    assert abs(spent - cost) < SMALL.population, "the largest difference is a generation"
+    assert [own.number for own in generations] == list(range(1, len(generations) + 1))
+    assert generations[-1].number == generations[-1].total
+    assert np.isfinite(found[0].scores).all()
+    assert not {own.controller for own in found} & {*seeds}
+
+
+@pytest.mark.search
+@pytest.mark.parametrize(
+    ("score", "steps"),
+    [
+        (DISPLACEMENT, {300, 600}),
+        (LAST, {600}),
+    ],
+    ids=["grows with time", "does not"],
+)
+def test_rollouts_have_half_of_the_steps_at_first_with_a_score_that_grows_with_time(
+    quadruped: Robot, score: Score, steps: set[int]
+):
+    settings = dataclasses.replace(Settings().scaled(6), generations=4, steps=600)
+    repaired(simulator := Watched(quadruped), settings, score)
+    random, *searched, first, last = (number for _, number in simulator.asked)
+
+    assert random == SHORT_STEPS
+    assert searched == sorted(searched)
+    halves = sum(300 for one in searched if one == 300)
+    assert halves <= 0.5 * sum(searched), "the share of half rollouts is HALVED"
+    assert {*searched} == steps
+    assert (first, last) == (600, 600), "candidates are compared over whole trials"
+
+
+def test_a_known_controller_makes_a_large_repair_cheaper_and_no_small_one():
+    large = Settings()
+    assert rollouts_of(large, known=True) == round(COST * large.evaluations)
+    assert rollouts_of(large, known=False) == FIRST_COST * large.evaluations
+    assert rollouts_of(SMALL, known=True) == rollouts_of(SMALL, known=False)
+    medium = Settings().scaled(30)
+    assert rollouts_of(medium, known=True) == 600
+    assert COST * medium.evaluations < 600 < FIRST_COST * medium.evaluations
+
+
+@pytest.mark.search
+@pytest.mark.parametrize(("share", "number"), [(0.4, None), (0.5, 4)])
+def test_a_candidate_whose_simulations_mostly_diverge_is_none(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch, share: float, number: int | None
+):
+    def partly(self: RobustFitness, *given: object) -> np.ndarray:
+        scores = whole(self, *given)
+        scores[:, round(share * scores.shape[1]) :] = -np.inf
+        return scores
+
+    whole = RobustFitness.__call__
+    monkeypatch.setattr(RobustFitness, "__call__", partly)
+    monkeypatch.setattr(module, "_comparisons", lambda _: ((8, 10), (4, 10)))
+    if number is None:
+        with pytest.raises(WorkError, match="got 16 of 40 with the best 4 of"):
+            repaired(Simulator(quadruped, 2))
+    else:
+        assert len(repaired(Simulator(quadruped, 2))[0]) == number
+
+
+@pytest.mark.parametrize(("population", "generations"), [(2, 1), (3, 2)])
+def test_the_least_search_finds_a_controller_that_is_not_known(
+    quadruped: Robot, population: int, generations: int
+):
+    least = dataclasses.replace(Settings().scaled(population), generations=generations, steps=10)
+    known = random_controllers(quadruped, 3)
+    found, _ = repaired(Simulator(quadruped, 1), least, seeds=known, make_search=NOISY_EA)
+
+    assert found
+    assert not {own.controller for own in found} & {*known}
+
+
+@pytest.mark.search
+def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadruped: Robot):
+    least = dataclasses.replace(Settings().scaled(12), generations=1, steps=100)
+    known = repaired(Simulator(quadruped, 2), seed=5)[0][0].controller
+    found, _ = repaired(Simulator(quadruped, 2), least, seeds=(known,))
+    different = [np.count_nonzero(own.controller.genome != known.genome) for own in found]
+
+    assert min(different) <= 5, "one in a hundred weights of a mutant is drawn anew"
+    assert known not in [own.controller for own in found]
+
+
+GAITS = Settings().scaled(40)
+
+
+def repertoire(robot: Robot, gaits: int) -> Repertoire:
+    design = network_for(robot)
+    genomes = np.round(draw_genomes(np.random.default_rng(5), (gaits, design.weights)), 2)
+    return Repertoire(design, genomes, np.arange(gaits, dtype=float), np.zeros((gaits, 4)), ORIGIN)
+
+
+def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped: Robot):
+    found, known = repertoire(quadruped, 1000), np.full(68, 0.3)
+    make = from_repertoire(found)
+    asked = make(68, draw_genomes, GAITS, np.random.default_rng(0), [known]).ask()
+    other = make(68, draw_genomes, GAITS, np.random.default_rng(1), [known]).ask()
+    short = dataclasses.replace(GAITS, steps=100)
+
+    assert len(asked) == 1 + round(GAITS.evaluations / 8 * 5)  # 200 of 1,000 steps each
+    assert (asked[0] == known).all()
+    drawn = [own.tobytes() for own in asked[1:]]
+    assert set(drawn) <= {own.tobytes() for own in found.genomes}
+    assert len(set(drawn)) == len(drawn)
+    assert not np.array_equal(asked, other)
+    few = repertoire(quadruped, 2)
+    assert len(from_repertoire(few)(68, draw_genomes, GAITS, np.random.default_rng(0)).ask()) == 4
+    cheap = make(68, draw_genomes, short, np.random.default_rng(0)).ask()
+    assert len(cheap) == round(GAITS.evaluations / 8)

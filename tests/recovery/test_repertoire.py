@@ -12,23 +12,18 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery import map_elites
-from selfmodel.recovery.falls import falls_of
-from selfmodel.recovery.map_elites import (
-    Filling,
-    duty_factors,
-    feet_of,
-    make_repertoire,
-    reevaluate,
-    simulated_evaluation,
-)
+from selfmodel.recovery import repertoire as module
 from selfmodel.recovery.repertoire import (
-    Modelled,
     Origin,
     Repertoire,
+    feet_of,
+    make_repertoire,
     model_digest,
+    reevaluate,
     self_model_digest,
+    simulated_evaluation,
 )
+from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
@@ -55,41 +50,18 @@ def repertoire(quadruped: Robot) -> Repertoire:
     return made(quadruped)
 
 
-def test_a_repertoire_holds_walking_gaits_in_cells_of_their_own(
+def test_a_repertoire_names_its_origin_and_is_the_same_at_any_thread_count(
     repertoire: Repertoire, quadruped: Robot
 ):
-    evaluate = simulated_evaluation(Simulator(quadruped, 2), INTACT, STEPS)
-    scores, descriptors = evaluate(repertoire.controllers(range(len(repertoire))))
-    cells = np.minimum((repertoire.descriptors * 20 + 1e-6).astype(int), 19)
-
-    assert np.array_equal(scores, repertoire.scores)
-    assert np.array_equal(descriptors, repertoire.descriptors)
-    assert len(np.unique(cells, axis=0)) == len(repertoire) > 5
-    assert repertoire.scores.min() > 0
-    assert np.all(np.diff(repertoire.scores) <= 0)
-
-
-def test_a_repertoire_is_the_same_at_any_thread_count(repertoire: Repertoire, quadruped: Robot):
-    alone = made(quadruped, threads=1)
+    origin, seen = repertoire.origin, []
+    alone = made(quadruped, threads=1, on_filling=seen.append)
 
     assert np.array_equal(alone.genomes, repertoire.genomes)
     assert np.array_equal(alone.scores, repertoire.scores)
-
-
-def test_a_repertoire_says_how_it_was_made(repertoire: Repertoire, quadruped: Robot):
-    origin = repertoire.origin
-
+    assert [one.evaluations for one in seen] == [20, 40, 60]
+    assert (seen[-1].gaits, seen[-1].best) == (len(alone), alone.scores[0])
     assert (origin.robot, origin.model) == ("quadruped", model_digest(quadruped))
     assert (origin.steps, origin.evaluations, origin.levels, origin.seed) == (STEPS, 60, 20, 3)
-
-
-def test_progress_is_reported_after_each_batch(quadruped: Robot):
-    seen: list[Filling] = []
-    whole = made(quadruped, on_filling=seen.append)
-
-    assert [one.evaluations for one in seen] == [20, 40, 60]
-    assert seen[-1].gaits == len(whole)
-    assert seen[-1].best == whole.scores[0]
 
 
 def test_nothing_that_walks_is_an_error(quadruped: Robot):
@@ -107,34 +79,17 @@ def test_gaits_are_sorted_by_their_score_under_a_hypothesis(
 ):
     damaged = parse("break:front_left_knee", quadruped.anatomy)
     evaluate = simulated_evaluation(Simulator(quadruped, 2), damaged, STEPS)
-    found = reevaluate(repertoire, evaluate)
-    scores, _ = evaluate(repertoire.controllers(found.gaits))
-    walking = int(np.isfinite(scores).sum())
-
-    assert np.array_equal(scores, found.scores)
-    assert sorted(found.gaits) == list(range(len(repertoire)))
-    assert np.all(np.diff(scores[:walking]) <= 0)
-    assert len(found.controllers) == walking
-    assert found.controllers[0] == repertoire.controller(found.gaits[0])
-
-
-def test_a_sample_is_spread_over_the_duty_factors(quadruped: Robot):
-    duty = np.full((40, 4), 0.5) + np.arange(40)[:, np.newaxis] / 1000
-    duty[[20, 25, 30, 39], range(4)] = 0.05  # few gaits are unlike the others, and not the best
-    whole = Repertoire(
-        network_for(quadruped), np.zeros((40, 68)), np.arange(40.0)[::-1], duty, ORIGIN
-    )
-    evaluated: list[int] = []
-
-    def evaluate(controllers: list[Controller]) -> tuple[FloatArray, FloatArray]:
-        evaluated.append(len(controllers))
-        return np.arange(float(len(controllers))), np.zeros((len(controllers), 4))
-
-    found = reevaluate(whole, evaluate, sample=8)
-
-    assert evaluated == [8]
-    assert {0, 20, 25, 30, 39} < set(found.gaits.tolist())
-    assert len(set(found.gaits.tolist())) == 8
+    gaits = repertoire.controllers(range(len(repertoire)))
+    scores, _ = evaluate(gaits)
+    order = [i for i in np.argsort(-scores, kind="stable") if np.isfinite(scores[i])]
+    assert reevaluate(repertoire, evaluate) == tuple(gaits[i] for i in order)
+    cells = np.minimum((repertoire.descriptors * 20 + 1e-6).astype(int), 19)
+    assert len(np.unique(cells, axis=0)) == len(repertoire) > 5
+    assert repertoire.scores.min() > 0
+    assert np.all(np.diff(repertoire.scores) <= 0)
+    healthy = simulated_evaluation(Simulator(quadruped, 2), INTACT, STEPS)
+    again = healthy(repertoire.controllers(range(len(repertoire))))
+    assert all(map(np.array_equal, again, (repertoire.scores, repertoire.descriptors)))
 
 
 def test_each_cell_keeps_its_best_genome_in_hundredths_and_one_without_a_score_is_left_out(
@@ -146,7 +101,7 @@ def test_each_cell_keeps_its_best_genome_in_hundredths_and_one_without_a_score_i
         """The nearer to 0, the better; the descriptors are the first four values."""
         genomes = np.array([one.genome for one in controllers])
         scores, duty = -np.square(genomes).sum(axis=1), (genomes[:, :4] + 1) / 2
-        scores[::5], duty[::5] = -np.inf, np.nan
+        scores[1::5], duty[1::5] = -np.inf, np.nan
         known.extend(zip(scores, duty, genomes, strict=True))
         return scores, duty
 
@@ -164,76 +119,37 @@ def test_each_cell_keeps_its_best_genome_in_hundredths_and_one_without_a_score_i
     assert found.scores.tolist() == pytest.approx(sorted(best.values(), reverse=True))
 
 
-def test_given_controllers_are_in_the_first_batch(quadruped: Robot):
-    seen: list[Controller] = []
-
-    def evaluate(controllers: list[Controller]) -> tuple[FloatArray, FloatArray]:
-        seen.extend(controllers)
-        return np.ones(len(controllers)), np.full((len(controllers), 4), 0.5)
-
-    seeds = random_controllers(quadruped, 2)
-    options = {"steps": 5, "seed": 0, "evaluations": 4, "batch": 4}
-    make_repertoire(quadruped, network_for(quadruped), evaluate, seeds=seeds, **options)
-
-    assert seen[:2] == list(seeds)
-
-
-def test_without_pyribs_the_remedy_is_named(quadruped: Robot, monkeypatch: pytest.MonkeyPatch):
+def test_without_pyribs_or_feet_the_remedy_is_named(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    with pytest.raises(InputError, match="needs the touch sensors of feet, and this robot has n"):
+        feet_of(arm().anatomy)
     monkeypatch.setitem(sys.modules, "ribs.archives", None)
 
     with pytest.raises(InputError, match=r"pip install 'selfmodel\[repertoire\]'"):
         made(quadruped)
 
 
-def test_a_duty_factor_is_the_part_of_the_steps_with_contact(quadruped: Robot):
-    names = quadruped.anatomy.names.sensors
-    readings = np.zeros((1, 4, len(names)))
-    readings[0, :3, names.index("front_left_touch")] = 1
-    readings[0, :1, names.index("back_right_touch")] = 1
-
-    assert duty_factors(quadruped.anatomy, readings).tolist() == [[0.75, 0, 0, 0.25]]
-
-
-def test_gaits_that_fall_or_go_backwards_have_no_score(quadruped: Robot):
+def test_gaits_that_fall_or_go_backwards_have_no_score(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
     controllers = random_controllers(quadruped, 40, seed=1)
     simulator = Simulator(quadruped, 2)
     damaged = parse("break:front_left_shoulder+break:front_right_shoulder", quadruped.anatomy)
     scores, descriptors = simulated_evaluation(simulator, damaged, 150)(controllers)
     runs = [(damaged, one) for one in controllers]
-    behaviour = simulator.run(runs, 150, map_elites.RECORD).behaviour
+    behaviour = simulator.run(runs, 150, module.RECORD).behaviour
     walks = forward_displacement(behaviour)
     falls = falls_of(quadruped, damaged, behaviour) < 150
 
     assert falls.any()
     assert (~falls & (walks > 0)).any()
     assert np.array_equal(scores, np.where(falls | (walks <= 0), -np.inf, walks))
-    assert np.array_equal(descriptors, duty_factors(quadruped.anatomy, behaviour["sensors"]))
-
-
-def test_gaits_of_several_batches_keep_their_order(
-    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
-):
-    controllers = random_controllers(quadruped, 5)
-    evaluate = simulated_evaluation(Simulator(quadruped, 2), INTACT, 30)
-    whole = evaluate(controllers)
-    monkeypatch.setattr(map_elites, "BATCH", 2)
-
-    assert all(map(np.array_equal, whole, evaluate(controllers)))
-
-
-def test_a_robot_without_feet_has_no_repertoire():
-    with pytest.raises(InputError, match="needs the touch sensors of feet, and this robot has n"):
-        feet_of(arm().anatomy)
-
-
-def test_the_gaits_are_sorted_by_score(quadruped: Robot):
-    genomes = np.zeros((2, 68))
-    genomes[1] = 0.5
-    found = Repertoire(network_for(quadruped), genomes, np.array([1.0, 3]), np.eye(2, 4), ORIGIN)
-
-    assert found.scores.tolist() == [3, 1]
-    assert found.controller(0).genome[0] == 0.5
-    assert found.descriptors[0].tolist() == [0, 1, 0, 0]
+    touch = [k for k, sensor in enumerate(quadruped.anatomy.sensors) if sensor.kind == "touch"]
+    assert np.array_equal(descriptors, (behaviour["sensors"][..., touch] == 1).mean(axis=1))
+    monkeypatch.setattr(module, "BATCH", 7)
+    again = simulated_evaluation(simulator, damaged, 150)(controllers)
+    assert all(map(np.array_equal, (scores, descriptors), again))
 
 
 @pytest.mark.parametrize(("gaits", "weights"), [(0, 68), (2, 67)])
@@ -270,7 +186,7 @@ def test_the_model_that_a_log_serialises_anew_has_the_digest_of_the_robot():
         {"assets": {"feet.stl": b"1"}},
     ],
 )
-def test_a_change_of_the_model_changes_its_digest(digest: Callable[[Modelled], str], change: dict):
+def test_a_change_of_the_model_changes_its_digest(digest: Callable[[Robot], str], change: dict):
     changed = SimpleNamespace(**{**ROBOT, **change})
 
     assert digest(changed) != digest(SimpleNamespace(**ROBOT))

@@ -104,7 +104,7 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
     }
 
 
-def test_a_replay_is_serialisable_and_a_table(different: Replay):
+def test_a_replay_is_serialisable_and_a_table(trial: Trial, different: Replay):
     values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
     rows = different.to_pandas()
 
@@ -112,12 +112,8 @@ def test_a_replay_is_serialisable_and_a_table(different: Replay):
     assert values["rms"] == {signal: different.rms(signal) for signal in SIGNALS}
     assert [row["step"] for row in rows] == list(range(60))
     assert rows[7]["commands"] == different.errors["commands"][7]
-
-
-def test_the_rms_of_an_unobserved_signal_is_none(trial: Trial):
-    found = selfmodel.replay(without_base(trial), "intact", "quadruped")
-
-    assert found.to_dict()["rms"]["base_position"] is None
+    blind = selfmodel.replay(without_base(trial), "intact", "quadruped")
+    assert blind.to_dict()["rms"]["base_position"] is None
 
 
 def test_the_repr_of_a_replay_has_the_errors_only_of_a_different_one(different: Replay):
@@ -138,8 +134,3 @@ def test_the_repr_of_a_robot_a_trial_and_a_controller_is_short(trial: Trial, qua
         "  its controller, a network of 5 hidden neurons",
         f"  {trial.path}>",
     ]
-
-
-def test_a_simulator_uses_all_processors_by_default(quadruped: Robot):
-    assert selfmodel.Simulator(quadruped).threads >= 1
-    assert selfmodel.Simulator(quadruped, 3).threads == 3

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.report.content import shots_of
 from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject, subject_of_run
-from selfmodel.report.trials import shots_of
 from tests.helpers.command import SMALL, selfmodel
 
 

@@ -9,10 +9,9 @@ import pytest
 
 from selfmodel.faults.notation import parse
 from selfmodel.report.charts import GaitDiagram
-from selfmodel.report.content import details, headline, report_of
+from selfmodel.report.content import details, gait_section, headline, report_of
 from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject
-from selfmodel.report.trials import gait_section
 
 
 def with_verdict(subject: Subject, **changes: object) -> Subject:
@@ -31,6 +30,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
     assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline
     assert result["diagnosis"][0]["hypothesis"] in report.headline
+    assert f"True faults: {result['truth']}, at a reality gap of 0.1" in report.verdict[-1]
     trials = report.sections[0].items[1]
     assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]
     ranking = report.sections[1].items[1].rows
@@ -46,6 +46,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     ],
 )
 def test_every_verdict_has_its_sentence(subject: Subject, verdict: str, said: str):
+    assert not any("True" in one for one in details(with_verdict(subject)))
     expected = said.format(best=subject.diagnosis.best)
 
     assert expected in headline(with_verdict(subject, verdict=verdict))
@@ -62,17 +63,14 @@ def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subje
     assert "or motor:back_left_knee=0.9 or motor:back_right_knee=0.9 or one of 2 others" in found
 
 
-def test_the_truth_of_a_run_is_named(subject: Subject):
-    assert subject.result is not None
-    assert f"True faults: {subject.result.truth}, at a reality gap of 0.1" in details(subject)[-1]
-    assert not any("True" in one for one in details(with_verdict(subject)))
-
-
 def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: tuple[Shot, ...]):
     section = gait_section(subject, shots)
     assert section is not None
     diagram = section.items[0]
     assert isinstance(diagram, GaitDiagram)
+    first = dataclasses.replace(shots[0].rollouts[0], diverged=True)
+    alone = gait_section(subject, (dataclasses.replace(shots[0], rollouts=(first,)),))
+    assert list(alone.items[0].groups) == ["measured"], "a simulation that diverged has none"
     behaviour = shots[0].trial.behaviour
     for lane in diagram.groups["measured"]:
         column = behaviour.names.sensors.index(lane.label)
@@ -81,13 +79,3 @@ def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: t
             contact |= (behaviour.time >= begin) & (behaviour.time < end)
 
         assert np.array_equal(contact[:-1], (behaviour["sensors"][:, column] > 0.5)[:-1])
-
-
-def test_a_simulation_that_diverged_has_no_contacts(subject: Subject, shots: tuple[Shot, ...]):
-    first = dataclasses.replace(shots[0].rollouts[0], diverged=True)
-
-    section = gait_section(subject, (dataclasses.replace(shots[0], rollouts=(first,)),))
-
-    assert section is not None
-    assert isinstance(section.items[0], GaitDiagram)
-    assert list(section.items[0].groups) == ["measured"]

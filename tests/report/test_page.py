@@ -11,9 +11,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from selfmodel.report.charts import LineChart, Report, Section, Series, Table, as_json
+from selfmodel.report.charts import LineChart, Report, Section, Series, Table, as_json, html_of
 from selfmodel.report.content import report_of
-from selfmodel.report.page import html_of
 from selfmodel.report.subject import Subject
 from tests.helpers.browser import ROOT, browses, read_failures, read_report
 

@@ -11,7 +11,7 @@ from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.results import SEARCHES, read_searches, write_searches
-from selfmodel.recovery.events import SearchBegins
+from selfmodel.recovery.result import SearchBegins
 from selfmodel.report.progress import Progress
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
@@ -40,10 +40,16 @@ def test_the_searches_are_read_back_from_the_folder(tmp_path: Path, quadruped: R
     assert [one.hypothesis for one in searches] == ["intact", ""]
 
 
-@pytest.mark.parametrize("kind", [WorkError, InputError, KeyboardInterrupt])
+@pytest.mark.parametrize("kind", [WorkError, KeyboardInterrupt])
 def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trials(
     tmp_path: Path, quadruped: Robot, kind: type[BaseException]
 ):
+    with pytest.raises(kind), Progress(tmp_path, quadruped).kept_on_failure():
+        raise kind("the folder has another run")
+    assert not list(tmp_path.iterdir()), "an error before any search leaves the folder as it is"
+    progress = recorded(tmp_path / "no-folder", quadruped)
+    with pytest.raises(kind, match="gone"), progress.kept_on_failure():
+        raise kind("the robot is gone")
     progress = recorded(tmp_path, quadruped)
     with pytest.raises(kind) as early, progress.kept_on_failure():
         raise kind("before the first trial")
@@ -58,24 +64,10 @@ def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trial
     assert read_searches(tmp_path) == progress.searches
 
 
-def test_a_failure_before_any_search_or_without_a_disk_is_reported_as_it_is(
-    tmp_path: Path, quadruped: Robot
-):
-    with (
-        pytest.raises(InputError, match="another"),
-        Progress(tmp_path, quadruped).kept_on_failure(),
-    ):
-        raise InputError("the folder has another run")
-    assert not list(tmp_path.iterdir())
-    progress = recorded(tmp_path / "no-folder", quadruped)
-    with pytest.raises(WorkError, match="gone"), progress.kept_on_failure():
-        raise WorkError("the robot is gone")
-
-
 LONG = '[{"kind": "repair", "hypothesis": "", "best": [1%s], "evaluations": [1]}]' % ("0" * 400)
 
 
-@pytest.mark.parametrize("text", ["{", "[1]", '[{"kind": "repair"}]', '[{"best": [NaN]}]', LONG])
+@pytest.mark.parametrize("text", ["{", "[1]", LONG])
 def test_a_damaged_file_is_named_and_a_folder_without_one_has_none(tmp_path: Path, text: str):
     assert read_searches(tmp_path) == ()
     (tmp_path / SEARCHES).write_text(text)
@@ -129,8 +121,8 @@ def test_a_recovery_that_is_interrupted_leaves_the_last_report(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("selfmodel.studies.experiment.is_correct", stopped)
-    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--out", "run")
-    done = selfmodel("recover", "quadruped", *arguments, "--report", cwd=tmp_path)
+    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--no-calibrate")
+    done = selfmodel("recover", "quadruped", *arguments, "--report", "--out", "run", cwd=tmp_path)
 
     assert done.returncode != 0
     assert "The recovery is not finished: " in (tmp_path / "run" / "report.html").read_text()

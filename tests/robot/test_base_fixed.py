@@ -7,8 +7,7 @@ import pytest
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
 from selfmodel.simulation.simulator import Simulator

@@ -12,8 +12,7 @@ from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import fit
 from selfmodel.simulation.calibration import (

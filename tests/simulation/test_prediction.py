@@ -14,8 +14,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import prediction
 from selfmodel.simulation.model_factors import nominal, with_parameters

@@ -11,8 +11,8 @@ from hypothesis import given, settings, strategies as st
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.notation import parse
-from selfmodel.physical.gap import draw_gap
-from selfmodel.recovery.random_streams import gap_stream
+from selfmodel.physical.simulated import draw_gap
+from selfmodel.recovery.recover import random_stream
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.reality_gap import (
     MAX_EXTRA_DELAY,
@@ -199,6 +199,6 @@ def test_perturbed_self_models_share_a_batch(robot: Robot):
 
 
 def test_the_gap_is_drawn_from_a_stream_of_its_own():
-    draws = [draw_gap(QUADRUPED, 0.1, gap_stream(seed)) for seed in (0, 0, 1)]
+    draws = [draw_gap(QUADRUPED, 0.1, random_stream(seed, "gap")) for seed in (0, 0, 1)]
 
     assert draws[0] == draws[1] != draws[2]

@@ -7,8 +7,7 @@ import pytest
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.simulation.requests import LEAD
 from selfmodel.simulation.segments import (
     HORIZON,

@@ -17,7 +17,7 @@ from selfmodel.cli.output.plain import counted, plain
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.evolution import Generation
-from selfmodel.recovery.events import DiscriminatingTrial, Event, SearchBegins
+from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.trials.trial import Trial
 

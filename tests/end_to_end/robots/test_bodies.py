@@ -20,9 +20,8 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.robots import robot_of
 from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.gap import draw_gap
-from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.falls import first_falls
+from selfmodel.physical.simulated import SimulatedRobot, draw_gap
+from selfmodel.recovery.scores import first_falls
 from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
