@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 
-from selfmodel.comparators.forward_displacement import FORWARD_DISPLACEMENT
 from selfmodel.comparators.gait_pattern import GAIT_PATTERN
 from selfmodel.comparators.noisy_transfer import NOISY_TRANSFER
-from selfmodel.comparators.paper_sensors import PAPER_SENSORS
+from selfmodel.comparators.paper import FORWARD_DISPLACEMENT, PAPER_SENSORS
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD
 from selfmodel.comparators.sensor_series import SENSOR_SERIES
 from selfmodel.diagnosis.comparator import Comparator

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray, held, median_of_known
 from selfmodel.simulation.requests import END
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import standing_tolerance
@@ -41,8 +41,8 @@ encoder follows them."""
 DERIVED = 0.999
 """Smallest correlation of a reading with an angle from which it is derived."""
 
-MIN_KNOWN = 20
-"""Known rows that a fit needs."""
+MIN_KNOWN, MIN_VARIANCE = 20, 1e-6
+"""Known rows that a fit needs, and their variance, rad^2: that of a milliradian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +70,16 @@ def logged_motion(positions: FloatArray, starts: IndexArray, horizon: int) -> Lo
 
     Args:
         positions: Logged joint positions, ``(steps, hinges)`` rad; NaN where unknown.
-        starts: Step at which each segment begins, ``(segments,)``.
+        starts: Step at which each segment of ``horizon`` steps begins, ``(segments,)``.
         horizon: Control steps of a segment.
     """
     angles = np.where(np.isfinite(positions), positions, np.nan)
     rows = angles[starts[:, np.newaxis] + np.arange(horizon + 1)]
     known = np.isfinite(rows)
+    end = median_of_known(angles[round((1 - END) * len(angles)) :])
     return LoggedMotion(
         within=_motion(rows, known),
-        overall=_mean(np.square(rows - _median(angles[round((1 - END) * len(angles)) :])), known),
+        overall=_mean(np.square(rows - end), known),
         tolerance=np.square(standing_tolerance(angles)),
         known=known,
     )
@@ -131,12 +132,6 @@ def _mean(
     return np.where(count >= least, total / np.maximum(count, 1), unknown)
 
 
-def _median(angles: FloatArray) -> FloatArray:
-    """Returns the median of the known angles of each hinge, ``(hinges,)``; NaN without any."""
-    columns = (column[np.isfinite(column)] for column in angles.T)
-    return np.array([np.median(one) if len(one) else np.nan for one in columns], dtype=np.float64)
-
-
 def hinge_losses(
     simulated: Behaviour, logged: Mapping[Signal, FloatArray], compared: IndexArray
 ) -> FloatArray:
@@ -164,7 +159,7 @@ def hinge_losses(
 
 @dataclass(frozen=True, eq=False)
 class LooseEncoders:
-    """Angles of the encoders that follow commands, and the readings that are derived from angles.
+    """Angles of encoders that follow commands, and the readings that are derived from them.
 
     Attributes:
         hinges: Columns of the encoders that follow commands.
@@ -187,12 +182,7 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
     """Returns the encoders of a trial that follow commands; None if there are none.
 
     Encoders of intact joints may be among them: they are used only for hypotheses that detach the
-    joint.
-
-    Args:
-        behaviour: The logged behaviour.
-        starts: Step at which each segment begins, ``(segments,)``.
-        horizon: Control steps of a segment.
+    joint. The arguments are those of ``logged_motion``.
     """
     commands, logged = behaviour["commands"], behaviour["joint_positions"]
     filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
@@ -203,15 +193,14 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
         return None
     angles = np.stack([fit for fit in fits if fit is not None], axis=1)
     velocities = np.gradient(angles, behaviour.time, axis=0)
-    derived = [
-        (sensor, source, line)
-        for sensor, readings in enumerate(behaviour["sensors"].T)
-        for source, hinge in enumerate(hinges)
-        for line in (_derived(readings[first:], logged[first:, hinge]),)
-        if line is not None
-    ]
+    derived = []
+    for sensor, readings in enumerate(behaviour["sensors"].T):
+        for source, hinge in enumerate(hinges):
+            line = _line(readings[first:], logged[first:, hinge])
+            if line is not None and line[2] < 1 - DERIVED**2:
+                derived.append((sensor, source, line[0] + line[1] * angles[:, source]))
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
-    readings = [line[0] + line[1] * angles[:, source] for _, source, line in derived]
+    readings = [values for _, _, values in derived]
     return LooseEncoders(
         hinges=hinges,
         angles=angles[rows],
@@ -223,27 +212,18 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
 
 
 def with_loose_encoders(simulated: Behaviour, loose: LooseEncoders) -> Mapping[Signal, FloatArray]:
-    """Returns predictions in which the encoders of detached hinges follow their commands.
-
-    Args:
-        simulated: Predicted signals, ``(n, segments, horizon + 1, width)`` each.
-        loose: Encoders that follow commands.
-    """
+    """Returns predictions in which the encoders of detached hinges follow their commands."""
     detached = simulated.hinge_mask("detached")
-    followed = {
-        "joint_positions": (loose.hinges, loose.angles, np.arange(len(loose.hinges))),
-        "joint_velocities": (loose.hinges, loose.velocities, np.arange(len(loose.hinges))),
-        "sensors": (loose.sensors, loose.readings, loose.source),
+    followed: dict[Signal, tuple[IndexArray, FloatArray, IndexArray]] = {
+        "joint_positions": (loose.hinges, loose.angles, loose.hinges),
+        "joint_velocities": (loose.hinges, loose.velocities, loose.hinges),
+        "sensors": (loose.sensors, loose.readings, loose.hinges[loose.source]),
     }
     signals = dict(simulated.signals)
-    for signal, values in simulated.signals.items():
-        if signal in followed:
-            columns, fitted, source = followed[signal]
-            changed = values.copy()
-            for k, column in enumerate(columns.tolist()):
-                rows = detached[:, loose.hinges[source[k]]]
-                changed[rows, :, :, column] = fitted[:, :, k]
-            signals[signal] = changed
+    for signal in followed.keys() & signals.keys():
+        signals[signal] = changed = signals[signal].copy()
+        for k, (column, hinge) in enumerate(zip(*followed[signal][::2], strict=True)):
+            changed[detached[:, hinge], :, :, column] = followed[signal][1][:, :, k]
     return signals
 
 
@@ -271,25 +251,13 @@ def _low_pass(commands: FloatArray, constant: float) -> FloatArray:
 
     Row k contains the commands up to row k - 1: command k has its effect after row k.
     """
-    held = _held(commands)
+    known = np.nan_to_num(held(np.where(np.isfinite(commands), commands, np.nan)))  # 0 at first
     gain = 1 - np.exp(-1 / constant) if constant else 1.0
-    filtered = np.empty_like(held)
-    filtered[0] = held[0]
-    for k in range(1, len(held)):
-        filtered[k] = filtered[k - 1] + gain * (held[k - 1] - filtered[k - 1])
+    filtered = np.empty_like(known)
+    filtered[0] = known[0]
+    for k in range(1, len(known)):
+        filtered[k] = filtered[k - 1] + gain * (known[k - 1] - filtered[k - 1])
     return filtered
-
-
-def _held(commands: FloatArray) -> FloatArray:
-    """Returns commands in which an unknown one is the last known one; 0 before the first."""
-    known = np.where(np.isfinite(commands), np.arange(len(commands))[:, np.newaxis] + 1, 0)
-    before = np.vstack([np.zeros((1, commands.shape[1])), commands])
-    return np.asarray(np.take_along_axis(before, np.maximum.accumulate(known), axis=0))
-
-
-def _derived(readings: FloatArray, angles: FloatArray) -> tuple[float, float] | None:
-    line = _line(readings, angles)
-    return line[:2] if line is not None and line[2] < 1 - DERIVED**2 else None
 
 
 def _line(values: FloatArray, over: FloatArray) -> tuple[float, float, float] | None:
@@ -299,11 +267,8 @@ def _line(values: FloatArray, over: FloatArray) -> tuple[float, float, float] | 
         return None
     y, x = values[known], over[known]
     variance, spread = float(y.var()), float(x.var())
-    if variance < _STANDS or spread < _STANDS:
+    if min(variance, spread) < MIN_VARIANCE:
         return None
     slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / spread
     left = float(np.mean(np.square(y - y.mean() - slope * (x - x.mean())))) / variance
     return float(y.mean()) - slope * float(x.mean()), slope, left
-
-
-_STANDS = 1e-6  # rad^2: a milliradian

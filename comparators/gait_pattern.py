@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.sensor_series import geman_mcclure, observed_signals
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.behaviour import Behaviour
@@ -61,37 +61,31 @@ class GaitPattern:
       stride frequency that rises by 1 Hz moves all power by 1 Hz or more);
     * posture and excursion: the mean and the standard deviation of every reading and joint.
 
-    Readings are not classified as touches, because a log does not contain the kind of a sensor: one
-    half separates the values of a binary reading, and is half of the joint's range for an angle. A
-    robot without touch sensors is compared by its joints. Unobserved values of the trial are left
-    out of both gaits.
+    A log does not contain the kind of a sensor: one half separates the values of a touch, and is
+    half of the joint's range for an angle. A robot without touch sensors is compared by its joints.
+    Unobserved values of the trial are left out of both gaits.
 
     Source: Hildebrand, "Symmetrical gaits of horses", Science 150 (1965), describes a gait by duty
     factor and phase, and orders gaits by their footfall sequences. The rest is selfmodel's choice.
 
     Limits: the travel of the robot is not compared. Failures that do not change the gait (a sensor
-    that the controller hardly uses) are close to the healthy robot. A time shift matters a little
-    if a window has fewer than two strides, or the gait changes. The order of feet that touch down
-    together is decided by noise. A robot that lies still has no gait: its posture decides.
-
-    Attributes:
-        name: The comparator's name.
+    that the controller hardly uses) are close to the healthy robot. The order of feet that touch
+    down together is decided by noise. A robot that lies still has no gait: its posture decides.
     """
 
     name: str = "gait-pattern"
 
     def prepare(self, trial: Trial) -> "PreparedGait":
-        """Returns the gait of the trial, from its observed readings and joint positions.
-
-        Raises:
-            InputError: Neither readings nor joint positions were observed.
-        """
+        """Returns the gait of the trial, from its observed readings and joint positions."""
         signals = observed_signals(trial, SIGNALS, self.name)
         logged = np.concatenate([trial.behaviour[signal] for signal in signals], axis=-1)
         readings = trial.behaviour["sensors"].shape[-1] if "sensors" in signals else 0
-        observed, timestep = np.isfinite(logged), _timestep(trial.behaviour.time)
+        observed, time = np.isfinite(logged), trial.behaviour.time
+        timestep = float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 1.0
         windows = min(MAX_WINDOWS, max(1, len(logged) // MIN_WINDOW))
-        known = _observed_features(_observed_in_windows(observed, windows), readings)
+        length = len(logged) // windows
+        in_windows = observed[: windows * length].reshape(windows, length, -1).any(axis=1)
+        known = _observed_features(in_windows, readings)
         share = np.stack([known[group].any(axis=-1) for group in LARGE_DIFFERENCES], axis=-1).mean()
         return PreparedGait(
             request=ClosedLoop(record=signals),
@@ -103,19 +97,6 @@ class GaitPattern:
             known=known,
             share=float(share),
         )
-
-
-def _timestep(time: FloatArray) -> float:
-    return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 1.0
-
-
-def _observed_in_windows(observed: BoolArray, windows: int) -> BoolArray:
-    """Returns whether a column has an observation in a window, ``(windows, columns)``.
-
-    Steps that are left over at the end are ignored, as by ``Gait``.
-    """
-    length = len(observed) // windows
-    return np.asarray(observed[: windows * length].reshape(windows, length, -1).any(axis=1))
 
 
 class Gait:
@@ -192,17 +173,13 @@ class PreparedGait:
     share: float
 
     def losses(self, simulated: Behaviour) -> FloatArray:
-        """Returns the loss of each group of features in each window.
-
-        Returns:
-            ``(n, windows * groups)``; their mean is the distance.
-        """
+        """Returns the loss of each group of features in each window, ``(n, windows * groups)``."""
         values = np.concatenate([simulated[signal] for signal in self.request.record], axis=-1)
         gaits = Gait(values, self.observed, self.readings, self.timestep, self.windows)
-        found = _differences(gaits, self.gait)
+        differences = _differences(gaits, self.gait)
         losses = np.stack(
             [
-                _masked_mean(geman_mcclure(found[group] / large), self.known[group])
+                _masked_mean(geman_mcclure(differences[group] / large), self.known[group])
                 for group, large in LARGE_DIFFERENCES.items()
             ],
             axis=-1,
@@ -235,7 +212,7 @@ def _observed_features(observed: BoolArray, readings: int) -> dict[str, BoolArra
         observed: Mask of the columns with an observation in a window, ``(windows, columns)``.
         readings: Number of columns that are readings.
     """
-    first, second = _pairs(observed.shape[1])
+    first, second = np.triu_indices(observed.shape[1], 1)
     return {
         "duty": observed[:, :readings],
         "sequence": np.asarray(observed[:, :readings].any(axis=1, keepdims=True)),
@@ -244,11 +221,6 @@ def _observed_features(observed: BoolArray, readings: int) -> dict[str, BoolArra
         "posture": observed,
         "excursion": observed,
     }
-
-
-def _pairs(columns: int) -> tuple[IndexArray, IndexArray]:
-    first, second = np.triu_indices(columns, 1)
-    return first, second
 
 
 def _sequence(on: BoolArray, taper: FloatArray) -> FloatArray:
@@ -288,7 +260,7 @@ def _spectral(
     parts = (basis @ centred).reshape(runs, windows, 2, frequencies, columns)
     lines = parts[:, :, 0] + 1j * parts[:, :, 1]
     power = np.square(parts).sum(axis=2)
-    first, second = _pairs(columns)
+    first, second = np.triu_indices(columns, 1)
     total = power.sum(axis=2) + STILL**2
     cross = (lines.swapaxes(-1, -2) @ lines.conj())[..., first, second]
     # In C order, as all other features: the order in memory is the order in which numpy adds.
@@ -299,12 +271,7 @@ def _spectral(
 
 
 def _masked_mean(values: FloatArray, mask: BoolArray) -> FloatArray:
-    """Returns the mean over the last axis of the values in a mask; 0 where the mask is empty.
-
-    Args:
-        values: Finite values, ``(..., columns)``.
-        mask: Mask that broadcasts to ``values``.
-    """
+    """Returns the mean over the last axis of the values in a mask; 0 where the mask is empty."""
     count = np.maximum(mask.sum(axis=-1), 1)
     return np.asarray((values * mask).sum(axis=-1) / count)
 

@@ -22,20 +22,17 @@ class NoisyTransfer:
 
     Each hypothesis is simulated with six self-models whose masses, friction, damping and motors
     were drawn at a reality gap of 0.05, the same six for every hypothesis (common random numbers).
-    The trial is cut into windows of 25 steps. The features of a window are the mean and the
-    standard deviation of every column, and the members give a predictive distribution of each
-    feature: if the robot were one more draw from a normal distribution of which six draws are
-    known, it would follow a Student t about their mean, with five degrees of freedom and a scale
-    of sqrt(1 + 1/6) times their standard deviation, to which the signal's floor is added in
-    squares. The loss is the difference between the highest possible log likelihood, that of
-    members that all reproduce the trial, and the log likelihood of the trial; it is averaged over
-    the features of a signal, and over the signals.
+    The features of a window of 25 steps are the mean and the standard deviation of every column.
+    If the robot were one more draw from a normal distribution of which six draws are known, a
+    feature would follow a Student t about their mean, with five degrees of freedom and a scale of
+    sqrt(1 + 1/6) times their standard deviation, to which the signal's floor is added in squares.
+    The loss is the difference between the log likelihood of members that all reproduce the trial
+    and that of the trial, averaged over the features of a signal, and over the signals.
 
-    Therefore a difference from the members has a small loss where the members differ from each
-    other, and a large loss where they agree. This replaces a decreasing weight of later steps, and
-    an ensemble that is wide enough to fit any trial has a loss for its width. The base's
-    orientation is compared as the direction of gravity in the base's frame and the horizontal part
-    of the forward direction. Unobserved values of the trial are left out.
+    So a difference has a small loss where the members differ from each other, as in later steps,
+    and a large loss where they agree; an ensemble that is wide enough to fit any trial has a loss
+    for its width. The base's orientation is compared as in ``sensor-series``. Unobserved values of
+    the trial are left out.
 
     Source: the paper names noisy transfer as future work. Noise in the badly modelled parts of a
     simulation: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995). Estimates of
@@ -44,18 +41,10 @@ class NoisyTransfer:
     prediction of one more draw, such as in Gelman et al., "Bayesian Data Analysis". Windows,
     features and floors are selfmodel's choices.
 
-    Limits: the level of the gap is assumed, not measured: a robot further from its model makes
-    every hypothesis unlikely, and with a robot closer to its model hypotheses are distinguished
-    less sharply than possible; because no member is the model itself, the distance of the true
-    hypothesis is above 0 even without a gap. Delay, measurement noise and structure are not drawn.
-    The cost is six simulations per hypothesis, where other comparators need one, and six members
-    estimate a deviation only roughly. Beyond the moment from which the members differ, a trial
-    contains little information. Features are taken to be independent.
-
-    Attributes:
-        name: The comparator's name.
-        members: Simulations of each hypothesis.
-        level: Level of the reality gap from which the members are drawn.
+    Limits: the level of the gap is assumed, not measured; because no member is the model itself,
+    the distance of the true hypothesis is above 0 even without a gap. Delay and measurement noise
+    are not drawn. The cost is six simulations per hypothesis, where other comparators need one, and
+    six members estimate a deviation only roughly. Features are taken to be independent.
     """
 
     name: str = "noisy-transfer"
@@ -63,16 +52,12 @@ class NoisyTransfer:
     level: float = 0.05
 
     def prepare(self, trial: Trial) -> "PreparedFeatures":
-        """Returns the features of the trial, for the observed ones of its signals.
-
-        Raises:
-            InputError: None of the signals was observed.
-        """
+        """Returns the features of the trial, of the signals that were observed."""
         signals = observed_signals(trial, ENSEMBLE_DEVIATION_FLOORS, self.name)
         features = {signal: _trial_features(signal, trial.behaviour[signal]) for signal in signals}
         weight = np.zeros(-(-trial.behaviour.steps // WINDOW))
-        for found in features.values():
-            weight += found.weight.sum(axis=1)
+        for each in features.values():
+            weight += each.weight.sum(axis=1)
         return PreparedFeatures(Ensemble(signals, self.members, self.level), features, weight)
 
 
@@ -114,8 +99,9 @@ class PreparedFeatures:
             # One hypothesis at a time: its members fit in the CPU cache, and no result depends on
             # the other hypotheses.
             for hypothesis, members in enumerate(simulated[signal]):
-                found = _features(comparable(signal, members), features.observed)
-                shortfall = _likelihood_shortfall(found - features.values, features.floor)
+                difference = _features(comparable(signal, members), features.observed)
+                difference -= features.values
+                shortfall = _likelihood_shortfall(difference, features.floor)
                 total[hypothesis] += (shortfall * features.weight).sum(axis=1)
         some = self.weight > 0
         # In C order: the order in memory is the order in which a mean adds.
@@ -161,9 +147,6 @@ def _likelihood_shortfall(difference: FloatArray, floor: float) -> FloatArray:
         difference: Features of the members less those of the trial,
             ``(members, windows, features)``.
         floor: Deviation that is added to that of the members.
-
-    Returns:
-        ``(windows, features)``, exactly 0 if no member differs from the trial.
     """
     members = len(difference)
     freedom = max(members - 1, 1)

@@ -49,13 +49,7 @@ class LoggedReadings:
 
 
 def logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:
-    """Returns the readings in the segments of a trial.
-
-    Args:
-        logged: Readings of the whole trial, ``(steps, sensors)``; NaN if unknown.
-        starts: Step at which each segment begins, ``(segments,)``.
-        horizon: Control steps of a segment.
-    """
+    """Returns the readings in the segments of a trial, of all readings ``(steps, sensors)``."""
     unknown = np.isnan(logged)
     binary = (np.isin(logged, (0.0, 1.0)) | unknown).all(axis=0) & ~unknown.all(axis=0)
     rows = starts[:, np.newaxis] + np.arange(horizon + 1)
@@ -93,9 +87,6 @@ def arithmetic_loss(trial: Trial, starts: IndexArray, horizon: int) -> FloatArra
 
 def command_errors(trial: Trial) -> FloatArray:
     """Returns the difference between the logged commands and those of the controller.
-
-    Args:
-        trial: A logged trial.
 
     Returns:
         ``(steps, motors)`` in each motor's unit, exactly 0 where the robot executed its controller.
@@ -158,8 +149,8 @@ def noise_level_loss(predicted: FloatArray, logged: FloatArray, graded: BoolArra
     _, rows, sensors = logged.shape
     if rows <= ORDER or not sensors:
         return np.zeros(len(predicted))
-    found = _excess(logged[np.newaxis], graded)
-    error = (_excess(predicted, graded) - found) / NOISE_ERROR_SCALE
+    excess = _excess(logged[np.newaxis], graded)
+    error = (_excess(predicted, graded) - excess) / NOISE_ERROR_SCALE
     return np.asarray(np.log1p(np.square(error)).mean(axis=1))
 
 

@@ -83,11 +83,7 @@ class SegmentPrediction:
         return dataclasses.replace(self, max_segments=max(self.max_segments // 3, MIN_SEGMENTS))
 
     def prepare(self, trial: Trial) -> "PreparedSegments":
-        """Returns the segments of the trial and the logged values to compare them with.
-
-        Raises:
-            TrialRefusedError: The trial is too short, or has too few observations.
-        """
+        """Returns the segments of the trial and the logged values to compare them with."""
         behaviour, horizon = trial.behaviour, self.horizon
         states = estimated_states(behaviour, self.state)
         starts, steady = self._starts(trial, states)

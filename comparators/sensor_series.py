@@ -43,23 +43,18 @@ class SensorSeries:
 
     Limits: beyond the lag, a stride that begins late counts as wrong, and a gap between model and
     robot makes strides late sooner or later. A failure that shows late has little weight.
-    Neighbouring windows are not independent, which a paired test over them must allow for.
+    Neighbouring windows are not independent.
 
     Attributes:
         name: The comparator's name.
-        signals: The compared signals, of the keys of ``SERIES_SPREAD_FLOORS``; at least one of them
-            must have been observed.
+        signals: The compared signals, of the keys of ``SERIES_SPREAD_FLOORS``.
     """
 
     name: str = "sensor-series"
     signals: tuple[Signal, ...] = tuple(SERIES_SPREAD_FLOORS)
 
     def prepare(self, trial: Trial) -> "PreparedSeries":
-        """Returns the observed series of the trial, with their scales and weights.
-
-        Raises:
-            InputError: None of the signals was observed.
-        """
+        """Returns the observed series of the trial, with their scales and weights."""
         signals = observed_signals(trial, self.signals, self.name)
         steps = trial.behaviour.steps
         windows = -(-steps // WINDOW)
@@ -116,11 +111,7 @@ class PreparedSeries:
     relative_decay: FloatArray
 
     def losses(self, simulated: Behaviour) -> FloatArray:
-        """Returns the loss of each window, weighted so that their mean is the distance.
-
-        Returns:
-            ``(n, windows)``.
-        """
+        """Returns the loss of each window, weighted so that their mean is the distance."""
         runs, windows = len(simulated[self.request.record[0]]), len(self.weight)
         steps = len(next(iter(self.columns.values())).logged)
         lagged = np.clip(np.arange(steps) + np.array(LAGS)[:, np.newaxis], 0, steps - 1)
@@ -165,25 +156,20 @@ def _spread(logged: FloatArray, observed: BoolArray, floor: float) -> FloatArray
 def observed_signals(
     trial: Trial, signals: Iterable[Signal], comparator: str
 ) -> tuple[Signal, ...]:
-    """Returns the signals with at least one finite value in the trial.
-
-    Args:
-        trial: The logged trial.
-        signals: The signals that the comparator can use.
-        comparator: Name of the comparator, for the error.
+    """Returns the signals that a comparator can use and that have a finite value in the trial.
 
     Raises:
         TrialRefusedError: The trial has none of the signals.
     """
     wanted = tuple(signals)
-    found = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
-    if not found:
+    observed = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
+    if not observed:
         raise TrialRefusedError(
             f"{trial.path}: {comparator} needs at least one of {', '.join(wanted)}, and the log "
             f"has none of them",
             "leave this log out, or give another comparator",
         )
-    return found
+    return observed
 
 
 def padded_windows(
@@ -207,13 +193,10 @@ def padded_windows(
 
 
 def geman_mcclure(residuals: FloatArray) -> FloatArray:
-    """Returns the Geman-McClure loss u² / (1 + u²), which no single outlier can dominate.
+    """Returns the loss u² / (1 + u²) of residuals u, which no single outlier can dominate.
 
     Source: Geman and McClure, "Statistical methods for tomographic image reconstruction", Bulletin
     of the International Statistical Institute 52 (1987).
-
-    Args:
-        residuals: Residuals over the size that counts as large, any shape.
     """
     squared = residuals * residuals
     return squared / (1 + squared)

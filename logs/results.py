@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from selfmodel.diagnosis.diagnosis import renamed
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.files import replace_file
@@ -124,10 +125,10 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     calibration: dict[str, Any] | None
     diagnosis: Annotated[list[dict[str, Any]], Meta(min_length=1)]
     verdict: str
-    rivals: list[str]
-    unseen: list[str]
+    indistinguishable: list[str]
+    undetectable: list[str]
     test: str
-    outside: dict[str, Any] | None = None
+    unsearched: dict[str, Any] | None = None
     intact_distance: float | None
     reason: str | None = None
     fit: dict[str, Any] | None = None
@@ -270,7 +271,8 @@ def converted(path: Path, values: object, kind: type[Read], what: str, remedy: s
 
 def read_as(path: Path, kind: type[Read], what: str, remedy: str) -> Read:
     """Returns the content of a result file, whose digest is checked; see ``converted``."""
-    return converted(path, read_result(path, what, remedy).content, kind, what, remedy)
+    content = renamed(read_result(path, what, remedy).content)
+    return converted(path, content, kind, what, remedy)
 
 
 def write_searches(folder: Path, searches: Sequence[Search]) -> None:

@@ -1,4 +1,4 @@
-"""Preparation of trials for a comparator, and the choice of one that can judge all trials."""
+"""Preparation of trials for a comparator, and the choice of one that accepts all trials."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,22 +28,17 @@ def contract_error(comparator: Comparator, problem: str) -> InputError:
 def prepared_trial(
     comparator: Comparator, robot: Robot, trial: Trial
 ) -> PreparedTrial | PiecewiseTrial:
-    """Returns a trial prepared for comparison, checked.
-
-    Args:
-        comparator: The comparator.
-        robot: The self-model.
-        trial: A logged trial of the robot.
+    """Returns a trial of a robot prepared for comparison, checked.
 
     Raises:
-        TrialRefusedError: The comparator cannot judge the trial.
+        TrialRefusedError: The comparator does not accept the trial.
         InputError: The comparator breaks its contract, or a compared number is absurdly large.
     """
     # Numbers that are too large for arithmetic are refused by name, after the preparation.
     with np.errstate(over="ignore", invalid="ignore"):
-        known = completed_trial(robot, trial)
+        complete = completed_trial(robot, trial)
         try:
-            prepared: object = comparator.prepare(known)
+            prepared: object = comparator.prepare(complete)
         except TrialRefusedError:
             raise
         except InputError as error:  # of a third-party comparator
@@ -70,25 +65,20 @@ def prepared_trial(
 
 @dataclass(frozen=True)
 class ChosenComparator:
-    """A comparator that can judge all trials.
-
-    Attributes:
-        comparator: The comparator.
-        reason: The reason for the choice, a clause.
-    """
+    """A comparator that accepts all trials, and the reason for the choice, a clause."""
 
     comparator: Comparator
     reason: str
 
 
 ComparatorChoice = Callable[[Robot, Sequence[Trial]], ChosenComparator]
-"""Returns a comparator that can judge all trials of a robot, or raises ``InputError``."""
+"""Returns a comparator that accepts all trials of a robot, or raises ``InputError``."""
 
 
 def best_comparator(
     preference: Sequence[Comparator], robot: Robot, trials: Sequence[Trial]
 ) -> ChosenComparator:
-    """Returns the first comparator that can judge all trials.
+    """Returns the first comparator that accepts all trials.
 
     Args:
         preference: At least one comparator, best first; the last needs the fewest signals.
@@ -96,7 +86,7 @@ def best_comparator(
         trials: Logged trials of the robot.
 
     Raises:
-        InputError: No comparator can judge all trials; the message has the reasons of the last one
+        InputError: No comparator accepts all trials; the message has the reasons of the last one
             for each trial. Or a compared number is absurdly large.
     """
     reasons: list[str] = []
@@ -117,7 +107,7 @@ def given_comparator(
     robot: Robot,
     trials: Sequence[Trial],
 ) -> ChosenComparator:
-    """Returns a comparator that the caller gave, if it can judge all trials.
+    """Returns a comparator that the caller gave, if it accepts all trials.
 
     Args:
         comparator: The comparator.
@@ -126,8 +116,8 @@ def given_comparator(
         trials: Logged trials of the robot.
 
     Raises:
-        InputError: The comparator cannot judge all trials; the message has the reason for each
-            trial, and the first comparator of the preference that can judge all of them. Or the
+        InputError: The comparator does not accept all trials; the message has the reason for each
+            trial, and the first comparator of the preference that accepts all of them. Or the
             comparator breaks its contract, or a compared number is absurdly large.
     """
     refused = _refusals(comparator, robot, trials)
@@ -139,11 +129,11 @@ def given_comparator(
 
 
 def _refusals(comparator: Comparator, robot: Robot, trials: Sequence[Trial]) -> list[str]:
-    """Returns the reasons for which a comparator cannot judge trials; none if it can judge all."""
-    found = []
+    """Returns the reasons for which a comparator does not accept trials."""
+    reasons = []
     for trial in trials:
         try:
             prepared_trial(comparator, robot, trial)
         except TrialRefusedError as error:
-            found.append(error.reason)
-    return found
+            reasons.append(error.reason)
+    return reasons

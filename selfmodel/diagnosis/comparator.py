@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
 from selfmodel.trials.behaviour import Behaviour
@@ -16,7 +16,8 @@ class Comparator(Protocol):
     """A distance between simulated behaviour and a logged trial.
 
     A plug-in is an object with these members; no base class is required.
-    ``selfmodel.check_comparator`` tests conformance.
+    ``selfmodel.check_comparator`` tests conformance. An attribute ``surrogate`` is optional: a
+    comparator that requests less simulation, to pre-select hypotheses.
     """
 
     @property
@@ -25,24 +26,12 @@ class Comparator(Protocol):
         ...
 
     def prepare(self, trial: Trial) -> "PreparedTrial | PiecewiseTrial":
-        """Returns the trial prepared for comparison.
-
-        The result depends on the trial alone.
+        """Returns the trial prepared for comparison; the result depends on the trial alone.
 
         Raises:
             TrialRefusedError: The trial lacks a required signal; the message names the signal. Any
                 other ``InputError`` counts as this.
         """
-        ...
-
-
-@runtime_checkable
-class ComparatorWithSurrogate(Comparator, Protocol):
-    """A comparator with a surrogate: a cheaper comparator, used to pre-select hypotheses."""
-
-    @property
-    def surrogate(self) -> Comparator:
-        """A comparator that requests less simulation and prepares trials of the same kind."""
         ...
 
 
@@ -80,7 +69,9 @@ class PiecewiseTrial(Protocol):
     """A prepared trial with losses of segments, windows or steps, whose mean is the distance.
 
     The losses make a paired test possible: whether one hypothesis is *significantly* closer to
-    the trial than another. With a single distance per trial there is no such test.
+    the trial than another. An attribute ``piece_steps`` is optional: the first and the last
+    control step of each piece, ``(pieces, 2)``, in increasing order. With it, a change in time can
+    be found.
     """
 
     @property
@@ -101,16 +92,6 @@ class PiecewiseTrial(Protocol):
         ...
 
 
-@runtime_checkable
-class TimedTrial(PiecewiseTrial, Protocol):
-    """A prepared trial whose pieces have times, so that a change in time can be found."""
-
-    @property
-    def piece_steps(self) -> IndexArray:
-        """First and last control step of each piece, ``(pieces, 2)``, in increasing order."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Losses:
     """Losses of simulations of a trial, with their parts.
@@ -128,9 +109,15 @@ class Losses:
     by_signal: Mapping[str, FloatArray] = field(default_factory=dict)
     by_hinge: FloatArray | None = None
 
+    def __getitem__(self, row: int) -> "Losses":
+        """Returns the losses of one simulation, without the leading axis."""
+        by_hinge = None if self.by_hinge is None else self.by_hinge[row]
+        by_signal = {signal: losses[row] for signal, losses in self.by_signal.items()}
+        return Losses(self.total[row], by_signal, by_hinge)
+
 
 class TrialRefusedError(InputError):
-    """A comparator cannot judge a trial, which lacks signals or steps.
+    """A trial lacks signals or steps that a comparator needs.
 
     Attributes:
         reason: The trial, the requirement of the comparator and the content of the trial.
@@ -145,19 +132,11 @@ class TrialRefusedError(InputError):
         self.reason = reason
 
 
-def as_comparator(found: object, name: str) -> Comparator:
-    """Returns an object as a comparator.
-
-    Args:
-        found: Any object.
-        name: The name that the user gave, for the error.
-
-    Raises:
-        InputError: The object is no comparator.
-    """
-    if isinstance(found, Comparator) and not isinstance(found, type):
-        return found
+def as_comparator(value: Any, name: str) -> Comparator:  # noqa: ANN401  # of a plug-in
+    """Returns an object as a comparator, or raises an ``InputError`` with the name given to it."""
+    if isinstance(value, Comparator) and not isinstance(value, type):
+        return value
     raise InputError(
         f"{name!r} is no comparator: expected an object, not a class, with the members of "
-        f"selfmodel.diagnosis.comparator.Comparator, got {found!r}"
+        f"selfmodel.diagnosis.comparator.Comparator, got {value!r}"
     )

@@ -1,20 +1,35 @@
-"""The diagnosis of trials: diagnostic EA, local refinement, change in time, and verdict."""
+"""The diagnosis of trials: diagnostic EA, local refinement, change in time, and verdict.
 
-import dataclasses
+**Change in time.** The pieces of all trials, in the order of the trials, are one timeline. Before a
+change, one hypothesis predicts the pieces; after it, another. The losses of the candidates are
+known from the search, so a scan over all times is a cumulative sum and needs no further simulation.
+
+Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulative sum; here of the
+differences of two hypotheses' losses, over all times afterwards.
+"""
+
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from selfmodel.diagnosis.change import best_split, change_at, is_change
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Change, Diagnosis
 from selfmodel.diagnosis.joints import with_joint_faults
-from selfmodel.diagnosis.losses import LossTable
-from selfmodel.diagnosis.problem import Parts, Problem
+from selfmodel.diagnosis.losses import LossFunction, LossTable, Problem, Timeline
 from selfmodel.diagnosis.search import LocalSearch, evolved
-from selfmodel.diagnosis.significance import MIN_Z, excess_over_healthy
-from selfmodel.diagnosis.verdict import judged, ranked_by_distance
+from selfmodel.diagnosis.significance import (
+    CHANGE_TOLERANCE,
+    MIN_PIECES,
+    MIN_Z,
+    MIN_Z_OF_CHANGE,
+    excess_over_healthy,
+    is_better,
+    paired_z,
+)
+from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -27,8 +42,8 @@ from selfmodel.trials.trial import Trial, trial_names
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
 
-MIN_SURROGATE_PIECES = 2
-"""Pieces of the surrogate comparator after a change that a search needs."""
+SHORTLIST = 8
+"""Candidates whose change is computed with the comparator itself."""
 
 
 class DiagnosticSearch:
@@ -84,9 +99,18 @@ class DiagnosticSearch:
             rng: Source of all random numbers.
             on_generation: Callback, called after each generation.
         """
-        surrogate = self.losses.surrogate(trials)
-        found, evaluations = evolved(
-            partial(surrogate[0].distances, trials=surrogate[1]),
+        problem = Problem(
+            self.losses,
+            self._space,
+            trials,
+            surrogate=self.losses.surrogate(trials),
+            healthy_trials=self._healthy_trials,
+            names=trial_names(trials),
+            settings=self._settings,
+        )
+        table, coarse_trials = problem.surrogate
+        ranked, evaluations = evolved(
+            partial(table.distances, trials=coarse_trials),
             self._space,
             self._settings,
             seeds,
@@ -94,23 +118,16 @@ class DiagnosticSearch:
             on_generation=on_generation,
         )
         self.evaluations += evaluations
-        self._proposed.update(found)
-        problem = self._problem(trials, trials, surrogate)
-        if not self.losses.is_piecewise(trials):
-            return ranked_by_distance(found, problem)
-        starts = found[:REFINEMENT_STARTS]
+        self._proposed.update(ranked)
+        if not problem.has_test:
+            return diagnosis_of(problem, ranked)
+        starts = ranked[:REFINEMENT_STARTS]
         best, compared = self._refined(starts, problem)
-        return self._after_change(best, starts, trials, problem, surrogate) or judged(
-            best, compared, problem
-        )
+        after = self._after_change(best, starts, trials, problem)
+        return after or diagnosis_of(problem, compared, best)
 
     def check(self, trials: Sequence[Trial]) -> None:
-        """Checks that the comparator accepts all trials, before any search.
-
-        Raises:
-            InputError: The comparator rejects a trial; the message contains every such trial and
-                the reason.
-        """
+        """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
         self.losses.check([*self._healthy_trials, *trials])
         cheaper, its_trials = self.losses.surrogate(trials)
         cheaper.check(its_trials)
@@ -119,32 +136,6 @@ class DiagnosticSearch:
     def distinct_hypotheses(self) -> int:
         """Number of distinct hypotheses that were proposed, by all searches so far."""
         return len(self._proposed)
-
-    def _problem(
-        self,
-        trials: Sequence[Trial],
-        parts: Parts,
-        surrogate: tuple[LossTable, Parts],
-        earlier: Parts = (),
-    ) -> Problem:
-        """Returns the problem of some trials, or parts of them.
-
-        Args:
-            trials: All trials of the diagnosis.
-            parts: Trials to explain, or parts of them.
-            surrogate: Losses of the surrogate comparator, and its trials.
-            earlier: Parts of the trials before the robot changed: the healthy reference if there
-                are no trials of the healthy robot.
-        """
-        return Problem(
-            self.losses,
-            self._space,
-            parts,
-            surrogate=surrogate,
-            healthy_trials=self._healthy_trials or earlier,
-            names=trial_names(trials),
-            settings=self._settings,
-        )
 
     def _refined(
         self, known: Iterable[Hypothesis], problem: Problem
@@ -167,90 +158,189 @@ class DiagnosticSearch:
         starts: Sequence[Hypothesis],
         trials: Sequence[Trial],
         problem: Problem,
-        surrogate: tuple[LossTable, Sequence[Trial]],
     ) -> Diagnosis | None:
         """Returns the diagnosis of the time after a change of the robot.
 
         None if no change predicts the trials significantly better than the best hypothesis, if too
         little time follows it, or if the losses of the comparator have no times.
-
-        Args:
-            best: The best hypothesis about all trials.
-            starts: Hypotheses from the EA that refinements start from.
-            trials: All trials.
-            problem: The problem of all trials.
-            surrogate: Losses of the surrogate comparator, and its trials.
         """
-        table, its_trials = surrogate
-        change = self._change(best, starts, trials, problem)
-        if change is None:
-            return None
-        coarse_parts = change.since(its_trials)
-        if table.losses([INTACT], coarse_parts).shape[1] < MIN_SURROGATE_PIECES:
-            return None
-        change = self._with_refined_before(change, starts, trials, surrogate)
-        earlier = change.until(trials) if change.before == INTACT else []
-        later = self._problem(trials, change.since(trials), (table, coarse_parts), earlier)
-        after, compared = self._refined([change.after, *starts], later)
-        if after == change.before:
-            return None
-        diagnosis = judged(after, compared, later)
-        dated = self._dated(change, diagnosis.best, trials)
-        return dataclasses.replace(diagnosis, change=dated, trials=len(trials))
-
-    def _change(
-        self,
-        best: Hypothesis,
-        starts: Sequence[Hypothesis],
-        trials: Sequence[Trial],
-        problem: Problem,
-    ) -> Change | None:
         timeline = self.losses.timeline(trials)
         if timeline is None:
             return None
+        dated = partial(
+            change_at,
+            losses=problem.losses,
+            timeline=timeline,
+            names=[problem.names[trial.path] for trial in trials],
+        )
         space = problem.space
         before = dict.fromkeys([INTACT, best, *space.with_one_less(best)])
         after = dict.fromkeys([best, *starts, *space.with_one_more(INTACT)])
         split = best_split(list(before), list(after), problem.coarse, problem.losses)
         if split is None or not is_change(split, best, problem.losses):
             return None
-        return change_at(split, problem.losses, timeline, _names_of(trials))
+        change = dated(split)
+        if problem.within(change.since) is None:
+            return None
+        change = self._with_refined_before(change, starts, problem)
+        healthy = change.until(trials) if change.before == INTACT else []
+        later = problem.within(change.since, healthy)
+        if later is None:
+            return None
+        refined, compared = self._refined([change.after, *starts], later)
+        if refined == change.before:
+            return None
+        diagnosis = diagnosis_of(later, compared, refined)
+        split = best_split([change.before], [diagnosis.best], problem.losses, problem.losses)
+        final = change if split is None else dated(split)
+        change = final if final.index == change.index else change
+        return replace(diagnosis, change=change, trials=len(trials))
 
     def _with_refined_before(
-        self,
-        change: Change,
-        starts: Sequence[Hypothesis],
-        trials: Sequence[Trial],
-        surrogate: tuple[LossTable, Sequence[Trial]],
+        self, change: Change, starts: Sequence[Hypothesis], problem: Problem
     ) -> Change:
         """Returns a change with the refined hypothesis about the time before it.
 
         If the empty hypothesis predicts this time as well as the healthy trials, or if there are
         none, it stays: the search would only find model error.
         """
-        table, its_trials = surrogate
-        earlier, coarse_parts = change.until(trials), change.until(its_trials)
-        if table.losses([INTACT], coarse_parts).shape[1] < MIN_SURROGATE_PIECES:
+        earlier = problem.within(change.until)
+        if earlier is None:
             return change
-        problem = self._problem(trials, earlier, (table, coarse_parts))
         if change.before == INTACT:
-            healthy, (losses,) = problem.reference, problem.losses([INTACT])
+            healthy, (losses,) = earlier.reference, earlier.losses([INTACT])
             if healthy is None or excess_over_healthy(losses, healthy) < MIN_Z:
                 return change
-        before, _ = self._refined([change.before, *starts], problem)
-        return dataclasses.replace(change, before=before)
-
-    def _dated(self, change: Change, after: Hypothesis, trials: Sequence[Trial]) -> Change:
-        """Returns a change with the time that the final hypothesis gives it."""
-        losses, timeline = partial(self.losses.losses, trials=trials), self.losses.timeline(trials)
-        split = best_split([change.before], [after], losses, losses)
-        if split is None or timeline is None:
-            return change
-        dated = change_at(split, losses, timeline, _names_of(trials))
-        return dated if dated.index == change.index else change
+        before, _ = self._refined([change.before, *starts], earlier)
+        return replace(change, before=before)
 
 
-def _names_of(trials: Sequence[Trial]) -> list[str]:
-    """Returns the name of each of all trials."""
-    names = trial_names(trials)
-    return [names[trial.path] for trial in trials]
+@dataclass(frozen=True)
+class Split:
+    """A change between two pieces of a timeline.
+
+    Attributes:
+        before: Hypothesis about the pieces before the change.
+        after: Hypothesis about the pieces from the change on.
+        piece: Index of the first piece after the change.
+    """
+
+    before: Hypothesis
+    after: Hypothesis
+    piece: int
+
+
+def best_split(
+    before: Sequence[Hypothesis],
+    after: Sequence[Hypothesis],
+    coarse: LossFunction,
+    losses: LossFunction,
+) -> Split | None:
+    """Returns the change between two hypotheses with the smallest total loss.
+
+    Args:
+        before: Hypotheses about the time before the change.
+        after: Hypotheses about the time after it.
+        coarse: Losses of the surrogate comparator, ``(n, pieces)``, which select the hypotheses.
+        losses: Losses of the comparator itself, which decide.
+
+    Returns:
+        None if the timeline is too short, or if every simulation diverged.
+    """
+    pieces, few = (each(before[:1]).shape[1] for each in (losses, coarse))
+    least = max(2, round(MIN_PIECES * few / pieces))
+    ranked = dict.fromkeys(split.after for split in _splits(before, after, coarse, least))
+    splits = _splits(before, list(ranked)[:SHORTLIST], losses, MIN_PIECES)
+    return splits[0] if splits else None
+
+
+def is_change(split: Split, single: Hypothesis, losses: LossFunction) -> bool:
+    """Returns whether a change predicts the trials significantly better than no change.
+
+    Three conditions hold: before the change, the first hypothesis is significantly better than the
+    second; after it, the second is better than the first by ``MIN_Z_OF_CHANGE`` standard errors;
+    and with the change, all pieces together are predicted significantly better than without.
+
+    Args:
+        split: The change.
+        single: The best hypothesis without a change.
+        losses: Losses on the timeline, ``(n, pieces)``.
+    """
+    before, after, alone = losses([split.before, split.after, single])
+    k = split.piece
+    changed = np.concatenate([before[:k], after[k:]])
+    return (
+        is_better(before[:k], after[:k])
+        and is_better(after[k:], before[k:])
+        and paired_z(before[k:], after[k:]) >= MIN_Z_OF_CHANGE
+        and is_better(changed, alone)
+    )
+
+
+def change_at(
+    split: Split, losses: LossFunction, timeline: Timeline, names: Sequence[str]
+) -> Change:
+    """Returns the change of a split, with its time and the bounds of the time.
+
+    The bounds are those of the pieces between which the change costs at most ``CHANGE_TOLERANCE``
+    mean differences of a piece more than at the best place.
+
+    Args:
+        split: The change.
+        losses: Losses on the timeline, ``(n, pieces)``.
+        timeline: Times of the pieces.
+        names: Names of the trials.
+    """
+    before, after = losses([split.before, split.after])
+    k = split.piece
+    totals = _totals(before, after)
+    typical = min((after - before)[:k].mean(), (before - after)[k:].mean())
+    possible = _run_around(totals <= totals[k] + CHANGE_TOLERANCE * max(float(typical), 0.0), k)
+    index = int(timeline.trial[k])
+    inside = np.flatnonzero(timeline.trial == index)
+    first, last = np.clip(possible, inside[0], inside[-1]).tolist()
+    return Change(
+        trial=names[index],
+        index=index,
+        time=float(timeline.begin[k]),
+        earliest=float(timeline.begin[max(first - 1, inside[0])]),
+        latest=float(timeline.end[last]),
+        before=split.before,
+        after=split.after,
+    )
+
+
+def _splits(
+    before: Sequence[Hypothesis], after: Sequence[Hypothesis], losses: LossFunction, least: int
+) -> list[Split]:
+    """Returns the best change from any hypothesis before to each one after, best first.
+
+    ``least`` pieces lie before and after a change, at least.
+    """
+    rows = losses([*before, *after])
+    if rows.shape[1] < 2 * least:
+        return []
+    splits: list[tuple[float, Split]] = []
+    for second, later in zip(after, rows[len(before) :], strict=True):
+        for first, earlier in zip(before, rows, strict=False):
+            if first == second or not (np.isfinite(earlier).all() and np.isfinite(later).all()):
+                continue
+            totals = _totals(earlier, later)
+            piece = least + int(np.argmin(totals[least : len(later) - least + 1]))
+            splits.append((float(totals[piece]), Split(first, second, piece)))
+    return [split for _, split in sorted(splits, key=lambda one: one[0])]  # stable
+
+
+def _totals(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Returns the total loss of a change before each piece, ``(pieces + 1,)``."""
+    past = np.append(0.0, np.cumsum(before))
+    rest = np.append(np.cumsum(after[::-1])[::-1], 0.0)
+    return np.asarray(past + rest)
+
+
+def _run_around(mask: BoolArray, k: int) -> tuple[int, int]:
+    """Returns the first and the last index of the run of true values around index k."""
+    no = np.flatnonzero(~mask)
+    first = int(no[no < k].max(initial=-1)) + 1
+    last = int(no[no > k].min(initial=len(mask))) - 1
+    return max(first, 1), min(last, len(mask) - 2)

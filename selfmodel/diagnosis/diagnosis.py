@@ -1,14 +1,15 @@
-"""A diagnosis: hypotheses ranked by distance to all trials, a verdict and its numbers."""
+"""A diagnosis: hypotheses ranked by distance to all trials, a verdict and its numbers, as JSON."""
 
 import dataclasses
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import msgspec
 
 from selfmodel.arrays import data_frame
-from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_FLOOR, LOSS_RATIO
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.trial import Trial, TrialPart, whole
 
@@ -82,25 +83,6 @@ class Fit:
     left: float | None = None
     joints: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def is_too_high(self) -> bool:
-        """Whether the loss is higher than that of healthy trials, significantly and by much.
-
-        Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss
-        of a hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
-        """
-        if self.healthy_loss is None or self.excess is None:
-            return False
-        if self.loss > LOSS_RATIO * self.healthy_loss + LOSS_FLOOR:
-            return True
-        is_much = self.loss > FAULTY_RATIO * self.healthy_loss + LOSS_FLOOR
-        return self.excess > self.threshold and (is_much or not self.has_faults)
-
-    @property
-    def is_unexplained(self) -> bool:
-        """Whether the loss is too high, or a joint does not move as in healthy trials."""
-        return self.is_too_high or bool(self.joints)
-
 
 @dataclass(frozen=True)
 class Residual:
@@ -148,23 +130,16 @@ class Change:
         )
 
     def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
-        """Returns the trials from the change on.
+        """Returns the parts of all trials of the diagnosis from the change on.
 
         The first piece after the change is left out: the change may lie in it, and then neither
         hypothesis predicts it.
-
-        Args:
-            trials: All trials of the diagnosis.
         """
         first, *rest = trials[self.index :]
         return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
 
     def until(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
-        """Returns the trials up to the change.
-
-        Args:
-            trials: All trials of the diagnosis.
-        """
+        """Returns the parts of all trials of the diagnosis up to the change."""
         *earlier, last = trials[: self.index + 1]
         return [*earlier, TrialPart(last, end=self.time)]
 
@@ -200,16 +175,16 @@ class Diagnosis:
         trials: Number of trials.
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
-            first; see ``alternatives.indistinguishable``.
+            first; see ``verdict.indistinguishable``.
         verdict: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
-            trials significantly better; see ``alternatives.unsearched_fault``.
+            trials significantly better; see ``verdict.unsearched_fault``.
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
         detectable: Smallest detectable severities of each kind and part, if the best hypothesis
-            is the empty one; see ``alternatives.detectable_severities``.
+            is the empty one; see ``verdict.detectable_severities``.
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
@@ -238,18 +213,14 @@ class Diagnosis:
     @property
     def undetectable_faults(self) -> tuple[Hypothesis, ...]:
         """The undetectable faults without those of the best hypothesis."""
-        best = self.best.faults
+        known = set(self.best.faults)
         return tuple(
-            Hypothesis(tuple(fault for fault in one.faults if fault not in best))
+            Hypothesis(tuple(fault for fault in one.faults if fault not in known))
             for one in self.undetectable
         )
 
     def explained(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Returns the rows of the trials that the diagnosis is about: those after a change.
-
-        Args:
-            trials: The trials of the diagnosis.
-        """
+        """Returns the rows of the trials that the diagnosis is about: those after a change."""
         if self.change is None:
             return list(trials)
         return [whole(part).rows for part in self.change.since(trials)]
@@ -284,14 +255,26 @@ class Diagnosis:
 
 
 def output_of(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Returns the values of a diagnosis in ``--json`` output.
+    """Returns the values of a diagnosis in ``--json`` output, where the ranking is ``diagnosis``.
 
-    The ranking is ``diagnosis`` there, and ``unseen`` has the undetectable faults alone.
+    The number of trials is left out.
     """
     values = diagnosis.to_dict()
     del values["trials"]
-    unseen = [str(faults) for faults in diagnosis.undetectable_faults]
-    return {"diagnosis": values.pop("ranked"), **values, "unseen": unseen}
+    return {"diagnosis": values.pop("ranked"), **values}
+
+
+OLD_KEYS: Mapping[str, str] = {
+    "rivals": "indistinguishable",
+    "unseen": "undetectable",
+    "outside": "unsearched",
+}
+"""Keys of JSON that selfmodel 0.1 wrote, with the keys of now."""
+
+
+def renamed(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns JSON values with the keys of now in the place of those of selfmodel 0.1."""
+    return {OLD_KEYS.get(key, key): value for key, value in values.items()}
 
 
 def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Diagnosis:
@@ -299,95 +282,82 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
     Args:
         values: Result of ``Diagnosis.to_dict``, or of ``output_of`` with a number of ``trials``.
-            Those of selfmodel 0.1 lack some keys.
+            Those of selfmodel 0.1 lack some keys, and may have undetectable faults alone, without
+            the best hypothesis.
         parse: Reads the notation of a hypothesis.
 
     Raises:
-        ValueError: A hypothesis, a number or the verdict is invalid.
+        ValueError: A value is invalid, or has another type.
         KeyError: A key is missing.
-        TypeError: A value has another type.
         AttributeError: The values are no object.
     """
-    named = {_ATTRIBUTES.get(key, key): value for key, value in values.items()}
-    if "diagnosis" in named:
-        named["ranked"] = named["diagnosis"]
+    named = renamed(values)
     named["reason"] = named.get("reason") or ""
-    found: Diagnosis = _from_json(Diagnosis, named, parse)
-    if not found.ranked:
+    named["ranked"] = named.get("ranked", named.get("diagnosis"))
+    try:
+        diagnosis: Diagnosis = _from_json(Diagnosis, named, parse)
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error)) from error
+    if not diagnosis.ranked:
         raise ValueError("expected at least one ranked hypothesis, got none")
-    if "diagnosis" in named:
-        full = (dict.fromkeys((*found.best.faults, *one.faults)) for one in found.undetectable)
-        undetectable = tuple(Hypothesis(tuple(sorted(faults))) for faults in full)
-        found = dataclasses.replace(found, undetectable=undetectable)
-    fit = found.fit
+    best, fit = diagnosis.best.faults, diagnosis.fit
+    complete = (sorted({*best, *one.faults}) for one in diagnosis.undetectable)
     # Both are null without healthy trials; null beside a number is infinite.
     if fit is not None and (fit.healthy_loss is None) != (fit.excess is None):
         healthy = math.inf if fit.healthy_loss is None else fit.healthy_loss
         excess = math.inf if fit.excess is None else fit.excess
         fit = dataclasses.replace(fit, healthy_loss=healthy, excess=excess)
-    return dataclasses.replace(found, fit=fit)
-
-
-_KEYS: Mapping[str, str] = {
-    "indistinguishable": "rivals",
-    "undetectable": "unseen",
-    "unsearched": "outside",
-}
-"""Published keys of JSON that are not the names of the attributes."""
-
-_ATTRIBUTES: Mapping[str, str] = {key: name for name, key in _KEYS.items()}
+    undetectable = tuple(Hypothesis(tuple(faults)) for faults in complete)
+    return dataclasses.replace(diagnosis, fit=fit, undetectable=undetectable)
 
 
 def to_json(value: object) -> Any:  # noqa: ANN401  # JSON values
     """Returns the JSON values of a record of a diagnosis, by the names of its attributes."""
-    if isinstance(value, Hypothesis):
-        return str(value)
+    match value:
+        case Hypothesis():
+            return str(value)
+        case Mapping():
+            return {key: to_json(one) for key, one in value.items()}
+        case tuple():
+            return [to_json(one) for one in value]
+        case float():
+            # JSON has no infinity, which is the distance of a simulation that diverged.
+            return value if math.isfinite(value) else None
     if dataclasses.is_dataclass(value):
-        names = (one.name for one in dataclasses.fields(value))
-        return {_KEYS.get(name, name): to_json(getattr(value, name)) for name in names}
-    if isinstance(value, Mapping):
-        return {key: to_json(one) for key, one in value.items()}
-    if isinstance(value, tuple):
-        return [to_json(one) for one in value]
-    # JSON has no infinity, which is the distance of a simulation that diverged.
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return {one.name: to_json(getattr(value, one.name)) for one in dataclasses.fields(value)}
+    return value
 
 
-def _from_json(kind: Any, value: Any, parse: Callable[[str], Hypothesis]) -> Any:  # noqa: ANN401
+def _from_json(  # noqa: PLR0911  # a result for each shape of a type
+    kind: Any,  # noqa: ANN401
+    value: Any,  # noqa: ANN401
+    parse: Callable[[str], Hypothesis],
+) -> Any:  # noqa: ANN401
     """Returns the value of a field of a type, from its JSON value."""
     parts, origin = get_args(kind), get_origin(kind)
     if type(None) in parts:
         return None if value is None else _from_json(parts[0], value, parse)
-    if dataclasses.is_dataclass(kind) and kind is not Hypothesis:
-        types = get_type_hints(kind)
+    if kind is Hypothesis:
+        return parse(msgspec.convert(value, str))
+    if origin is tuple:
+        items = msgspec.convert(value, list)
+        return tuple(_from_json(parts[0], one, parse) for one in items)
+    if origin is Mapping:
+        entries = msgspec.convert(value, dict)
+        return {key: _from_json(parts[1], one, parse) for key, one in entries.items()}
+    if dataclasses.is_dataclass(kind):
+        types, given = get_type_hints(kind), msgspec.convert(value, dict)
+        # A key with a default may be missing; without one, the look-up names it.
         names = [
             one.name
             for one in dataclasses.fields(kind)
-            # A key with a default may be missing; without one, the look-up names it.
-            if one.name in value or one.default is one.default_factory  # both missing
+            if one.name in given or one.default is one.default_factory  # both missing
         ]
         record: Any = kind
-        return record(**{name: _from_json(types[name], value[name], parse) for name in names})
-    if origin is tuple and isinstance(value, list):
-        return tuple(_from_json(parts[0], one, parse) for one in value)
-    if origin is Mapping and isinstance(value, dict):
-        return {key: _from_json(parts[1], one, parse) for key, one in value.items()}
-    return _leaf_from_json(kind, value, parse)
+        return record(**{name: _from_json(types[name], given[name], parse) for name in names})
+    if kind is float and value is None:
+        return math.inf
+    return msgspec.convert(value, FINITE if kind is float else kind)
 
 
-def _leaf_from_json(kind: Any, value: Any, parse: Callable[[str], Hypothesis]) -> Any:  # noqa: ANN401
-    if kind is float:
-        if value is None:
-            return math.inf
-        if not isinstance(value, (int, float)) or not abs(value) <= sys.float_info.max:
-            raise ValueError(f"expected a finite number or null, got {value!r:.60}")
-        return float(value)
-    if get_origin(kind) is Literal:
-        if value not in get_args(kind):
-            raise ValueError(f"expected one of {', '.join(get_args(kind))}, got {value!r:.60}")
-        return value
-    if kind is Hypothesis and isinstance(value, str):
-        return parse(value)
-    if not isinstance(kind, type) or not isinstance(value, kind):
-        raise TypeError(f"expected {kind}, got {value!r:.60}")
-    return value
+FINITE = Annotated[float, msgspec.Meta(ge=-sys.float_info.max, le=sys.float_info.max)]

@@ -4,7 +4,7 @@ It is a report beside a diagnosis: ``segment-prediction`` uses the motion of the
 of its loss, and the readings and commands as before.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,12 +54,7 @@ class JointEvidence:
 
 @dataclass(frozen=True)
 class ConstantSensor:
-    """A sensor whose reading never changed.
-
-    Attributes:
-        sensor: Name of the sensor.
-        reading: Its reading.
-    """
+    """A sensor whose reading never changed, and the reading."""
 
     sensor: str
     reading: float
@@ -96,59 +91,43 @@ def direct_evidence(
 
 
 def _evidence_of(trial: Trial, anatomy: Anatomy, name: str) -> DirectEvidence:
-    commanded = _commanded(trial)
-    joints = tuple(_joints(trial, anatomy, commanded))
-    return DirectEvidence(
-        trial=name,
-        joints=joints,
-        constant_sensors=tuple(_constant_sensors(trial)),
-        commands_without_effect=tuple(_without_effect(joints, anatomy, commanded)),
-    )
-
-
-def _commanded(trial: Trial) -> dict[str, float]:
-    """Returns the range of the known commands of each motor."""
-    columns = trial.behaviour["commands"].T
-    known = (column[np.isfinite(column)] for column in columns)
-    ranges = [float(np.ptp(column)) if len(column) else 0.0 for column in known]
-    return dict(zip(trial.behaviour.names.motors, ranges, strict=True))
-
-
-def _joints(trial: Trial, anatomy: Anatomy, commanded: dict[str, float]) -> Iterator[JointEvidence]:
-    positions = trial.behaviour["joint_positions"]
-    angles = np.where(np.isfinite(positions), positions, np.nan)
-    columns = {hinge: column for column, hinge in enumerate(trial.behaviour.names.hinges)}
-    tolerances = np.hypot(PLAY, NOISE_RATIO * encoder_noise(angles))
+    behaviour = trial.behaviour
+    commands = _known(behaviour.names.motors, behaviour["commands"])
+    ranges = {motor: float(np.ptp(each)) if len(each) else 0.0 for motor, each in commands.items()}
+    readings = _known(behaviour.names.sensors, behaviour["sensors"])
+    angles = _known(behaviour.names.hinges, behaviour["joint_positions"])
+    positions = behaviour["joint_positions"]
+    noise = encoder_noise(np.where(np.isfinite(positions), positions, np.nan))
+    tolerances = dict(zip(angles, np.hypot(PLAY, NOISE_RATIO * noise), strict=True))
+    joints: list[JointEvidence] = []
+    without_effect: list[str] = []
     for joint in anatomy.joints:
-        largest = max((commanded[motor] for motor in joint.motors), default=0.0)
-        for hinge in joint.hinges:
-            column = columns[hinge]
-            yield _hinge(joint.name, hinge, angles[:, column], tolerances[column], largest)
+        commanded = max((ranges[motor] for motor in joint.motors), default=0.0)
+        rows = [
+            _hinge(joint.name, hinge, angles[hinge], tolerances[hinge], commanded)
+            for hinge in joint.hinges
+        ]
+        joints += rows
+        if {row.motion for row in rows} == {"stands"}:
+            without_effect += [motor for motor in joint.motors if ranges[motor] >= MIN_COMMANDED]
+    constant = [
+        ConstantSensor(sensor, float(known[0]))
+        for sensor, known in readings.items()
+        if len(known) >= MIN_KNOWN and np.ptp(known) == 0
+    ]
+    return DirectEvidence(name, tuple(joints), tuple(constant), tuple(without_effect))
+
+
+def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:
+    """Returns the finite values of each column."""
+    return {name: one[np.isfinite(one)] for name, one in zip(names, values.T, strict=True)}
 
 
 def _hinge(
-    joint: str, hinge: str, angles: FloatArray, tolerance: float, commanded: float
+    joint: str, hinge: str, known: FloatArray, tolerance: float, commanded: float
 ) -> JointEvidence:
-    known = angles[np.isfinite(angles)]
     if len(known) < MIN_KNOWN:
         return JointEvidence(joint, hinge, None, None, commanded, "unknown")
     deviation = float(known.std())
     motion: Motion = "stands" if deviation <= tolerance else "moves"
     return JointEvidence(joint, hinge, float(known.mean()), deviation, commanded, motion)
-
-
-def _constant_sensors(trial: Trial) -> Iterator[ConstantSensor]:
-    readings = trial.behaviour["sensors"]
-    for name, column in zip(trial.behaviour.names.sensors, readings.T, strict=True):
-        known = column[np.isfinite(column)]
-        if len(known) >= MIN_KNOWN and np.ptp(known) == 0:
-            yield ConstantSensor(name, float(known[0]))
-
-
-def _without_effect(
-    joints: Sequence[JointEvidence], anatomy: Anatomy, commanded: dict[str, float]
-) -> Iterator[str]:
-    for joint in anatomy.joints:
-        motions = {one.motion for one in joints if one.joint == joint.name}
-        if motions == {"stands"}:
-            yield from (motor for motor in joint.motors if commanded[motor] >= MIN_COMMANDED)

@@ -22,20 +22,19 @@ from functools import partial
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.diagnosis.problem import Problem
-from selfmodel.diagnosis.search import LocalSearch
-from selfmodel.diagnosis.severity import with_fitted_severity
+from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.losses import Problem
+from selfmodel.diagnosis.search import LocalSearch, with_fitted_severity
 from selfmodel.diagnosis.significance import (
     MAX_LEFT_OF_JOINT,
     MIN_EXCESS_OF_JOINT,
     MIN_PIECES,
-    MIN_Z,
     MIN_Z_OF_JOINT,
     excess_over_healthy,
     gain_exceeds_healthy_gain,
     is_better,
-    paired_z,
+    joint_is_better,
+    known,
 )
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import Fault
@@ -47,17 +46,15 @@ JOINTS_TRIED, KINDS_FITTED = 3, 3
 def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
     """Returns a hypothesis with its faults of single joints decided by the joints' own motion.
 
-    An added fault has to gain significantly more than on healthy trials, and to explain the joint.
-
     Args:
         best: The best hypothesis by the total loss.
         search: The search that found it; its problem has losses of joints.
     """
     joints = _JointSearch(best, search)
     current = best
-    for joint in joints.joints_of(best):
+    for joint in _joints_of(best.faults, search.problem):
         current = joints.replaced(current, joint)
-    while len(current) < search.problem.max_faults:
+    while len(current) < search.problem.settings.genes:
         added = joints.with_one_more(current)
         if added == current:
             break
@@ -77,54 +74,30 @@ def excesses(hypothesis: Hypothesis, problem: Problem) -> dict[str, float]:
         Excess by the joint's name, standard errors, of the joints with at least ``MIN_PIECES``
         known pieces in either; see ``significance.excess_over_healthy``.
     """
-    found = {}
+    excess = {}
     for joint in problem.space.anatomy.joints:
         (one,) = known(problem.of_joint(joint.name, [hypothesis]))
-        (other,) = known(problem.healthy_of_joint(joint.name, [INTACT]))
+        (other,) = known(problem.of_joint(joint.name, [INTACT], healthy=True))
         if min(len(one), len(other)) >= MIN_PIECES:
-            found[joint.name] = excess_over_healthy(one, other)
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+            excess[joint.name] = excess_over_healthy(one, other)
+    return dict(sorted(excess.items(), key=lambda item: -item[1]))
 
 
-def distinguished(best: Hypothesis, others: Sequence[Hypothesis], problem: Problem) -> BoolArray:
-    """Returns a mask of the hypotheses that predict some joint significantly worse, ``(n,)``.
+def predicts_joints_worse(other: Hypothesis, best: Hypothesis, problem: Problem) -> bool:
+    """Returns whether a hypothesis predicts some joint significantly worse than the best.
 
-    Args:
-        best: The hypothesis that may be better.
-        others: Hypotheses; the joints at which exactly one of the two has a fault are compared.
-        problem: The trials and their losses.
+    The joints at which exactly one of the two has a fault are compared.
     """
-    mask = np.zeros(len(others), dtype=np.bool_)
-    for row, other in enumerate(others):
-        different = set(best.faults) ^ set(other.faults)
-        parts = {fault.part for fault in different if fault.kind.is_of_joint}
-        mask[row] = any(
-            joint_is_better(*problem.of_joint(joint.name, [best, other]))
-            for joint in problem.space.anatomy.joints
-            if joint.name in parts
-        )
-    return mask
+    return any(
+        joint_is_better(*problem.of_joint(joint, [best, other]))
+        for joint in _joints_of(set(best.faults) ^ set(other.faults), problem)
+    )
 
 
-def known(rows: FloatArray) -> FloatArray:
-    """Returns the pieces that are known in every row, ``(n, known pieces)``."""
-    return np.asarray(rows[:, ~np.isnan(rows).any(axis=0)])
-
-
-def joint_is_better(one: FloatArray, other: FloatArray) -> bool:
-    """Returns whether the losses of a joint are significantly smaller.
-
-    Args:
-        one: Losses of a hypothesis, ``(pieces,)``; NaN if unknown.
-        other: Losses of another hypothesis on the same pieces.
-
-    Returns:
-        False with fewer than ``MIN_PIECES`` pieces that are known in both.
-    """
-    smaller, larger = known(np.stack([one, other]))
-    if len(smaller) < MIN_PIECES or not np.isfinite(smaller).all():
-        return False
-    return not np.isfinite(larger).all() or paired_z(larger, smaller) >= MIN_Z
+def _joints_of(faults: Sequence[Fault] | set[Fault], problem: Problem) -> list[str]:
+    """Returns the joints with a fault of their motion, in the order of the anatomy."""
+    parts = {fault.part for fault in faults if fault.kind.is_of_joint}
+    return [joint.name for joint in problem.space.anatomy.joints if joint.name in parts]
 
 
 class _JointSearch:
@@ -134,11 +107,6 @@ class _JointSearch:
         self._start, self._problem, self._losses = start, search.problem, search.losses
         self._space = search.problem.space
 
-    def joints_of(self, hypothesis: Hypothesis) -> list[str]:
-        """The joints with a fault of their motion, in the order of the anatomy."""
-        parts = {fault.part for fault in hypothesis.faults if fault.kind.is_of_joint}
-        return [joint.name for joint in self._space.anatomy.joints if joint.name in parts]
-
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
         levels = self._best_levels(current, joint)
@@ -147,17 +115,19 @@ class _JointSearch:
         candidate = self._best_fitted(levels, joint)
         if self._is_better_at(joint, candidate, current):
             return candidate
-        is_simpler = len(candidate) < len(current)
-        is_worse = joint_is_better(*self._problem.of_joint(joint, [current, candidate]))
-        is_enough = is_simpler and not is_worse and not self._harms(candidate, current)
+        is_enough = (
+            len(candidate) < len(current)
+            and not joint_is_better(*self._problem.of_joint(joint, [current, candidate]))
+            and not self._harms(candidate, current)
+        )
         return candidate if is_enough else current
 
     def with_one_more(self, current: Hypothesis) -> Hypothesis:
         """The hypothesis with a fault of a further joint; the same if none explains its joint."""
-        taken = self.joints_of(current)
+        faulty = _joints_of(current.faults, self._problem)
         excess = excesses(current, self._problem)
         suspects = [
-            name for name, z in excess.items() if z >= MIN_EXCESS_OF_JOINT and name not in taken
+            name for name, z in excess.items() if z >= MIN_EXCESS_OF_JOINT and name not in faulty
         ]
         for joint in suspects[:JOINTS_TRIED]:
             levels = self._best_levels(current, joint)
@@ -171,24 +141,14 @@ class _JointSearch:
 
     def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis without the faults that neither the trials nor their joints require."""
-        current = hypothesis
-        while True:
-            fewer = next(
-                (one for one in self._space.with_one_less(current) if self._suffices(one, current)),
-                None,
-            )
-            if fewer is None:
-                return current
-            current = fewer
-
-    def _suffices(self, fewer: Hypothesis, current: Hypothesis) -> bool:
-        if is_better(*self._losses([current, fewer])):
-            return False
-        removed = set(current.faults) - set(fewer.faults)
-        joints = [fault.part for fault in removed if fault.kind.is_of_joint]
-        return not any(
-            joint_is_better(*self._problem.of_joint(joint, [current, fewer])) for joint in joints
-        )
+        for fewer in self._space.with_one_less(hypothesis):
+            removed = set(hypothesis.faults) - set(fewer.faults)
+            if not is_better(*self._losses([hypothesis, fewer])) and not any(
+                joint_is_better(*self._problem.of_joint(joint, [hypothesis, fewer]))
+                for joint in _joints_of(removed, self._problem)
+            ):
+                return self.pruned(fewer)
+        return hypothesis
 
     def _explains(
         self, joint: str, candidate: Hypothesis, current: Hypothesis, excess: float
@@ -196,9 +156,9 @@ class _JointSearch:
         """Returns whether a fault of a joint is the cause of its excess, and no model error."""
         if not self._is_better_at(joint, candidate, current):
             return False
-        alone = self._space.canonical(_faults_of(candidate, joint))
+        alone = self._space.canonical(_faults_at(joint, candidate))
         damaged = known(self._problem.of_joint(joint, [candidate, current]))
-        healthy = known(self._problem.healthy_of_joint(joint, [alone, INTACT]))
+        healthy = known(self._problem.of_joint(joint, [alone, INTACT], healthy=True))
         left = excesses(candidate, self._problem).get(joint, np.inf)
         is_cause = left < min(MIN_Z_OF_JOINT, MAX_LEFT_OF_JOINT * excess)
         return is_cause and gain_exceeds_healthy_gain(*damaged, *healthy)
@@ -210,7 +170,7 @@ class _JointSearch:
         """
         if np.isnan(self._problem.of_joint(joint, [current])).all():
             return []
-        others = [fault for fault in current.faults if fault not in _faults_of(current, joint)]
+        others = [fault for fault in current.faults if fault not in _faults_at(joint, current)]
         by_kind: dict[str, list[Hypothesis]] = {}
         for fault in self._space.coarse_candidates:
             if fault.kind.is_of_joint and fault.part == joint:
@@ -225,7 +185,7 @@ class _JointSearch:
         focused = partial(self._focused, joint=joint)
         fitted = []
         for hypothesis in levels[:KINDS_FITTED]:
-            (fault,) = _faults_of(hypothesis, joint)
+            (fault,) = _faults_at(joint, hypothesis)
             index = hypothesis.faults.index(fault)
             fitted.append(with_fitted_severity(hypothesis, index, focused, self._space))
         return self._smallest(fitted, joint)
@@ -235,10 +195,11 @@ class _JointSearch:
 
     def _focused(self, hypotheses: Sequence[Hypothesis], joint: str) -> FloatArray:
         """Total losses plus those of the joint, ``(n, pieces)``; inf without evidence on it."""
-        own = self._problem.of_joint(joint, hypotheses)
-        unknown = np.isnan(own)
-        own = np.where(unknown.all(axis=1, keepdims=True), np.inf, np.where(unknown, 0.0, own))
-        return self._losses(hypotheses) + own
+        losses = self._problem.of_joint(joint, hypotheses)
+        unknown = np.isnan(losses)
+        losses[unknown] = 0.0
+        losses[unknown.all(axis=1)] = np.inf
+        return self._losses(hypotheses) + losses
 
     def _is_better_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
         """Returns whether one predicts the joint better, and the trials not worse."""
@@ -251,6 +212,6 @@ class _JointSearch:
         return is_better(before, after) or is_better(start, after)
 
 
-def _faults_of(hypothesis: Hypothesis, joint: str) -> list[Fault]:
+def _faults_at(joint: str, hypothesis: Hypothesis) -> list[Fault]:
     """Returns the faults of the motion of a joint."""
     return [fault for fault in hypothesis.faults if fault.kind.is_of_joint and fault.part == joint]

@@ -1,42 +1,53 @@
-"""Losses of hypotheses on logged trials: each hypothesis is simulated once for each trial."""
+"""Losses of hypotheses on logged trials, and the problem that a diagnosis solves with them."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray, median_of_known
 from selfmodel.diagnosis.choice import contract_error, prepared_trial
 from selfmodel.diagnosis.comparator import (
     Comparator,
-    ComparatorWithSurrogate,
     Losses,
     PiecewiseTrial,
     PreparedTrial,
-    TimedTrial,
     as_comparator,
 )
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import JAMMED_AT_ANGLE
+from selfmodel.faults.kind import Fault
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.settings import Settings
+from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.trial import Trial, TrialPart, whole
+from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
-OPENING = 1 / 3
-"""Part of a trial that is simulated, from its beginning, if the comparator has no surrogate.
+Parts = Sequence[Trial | TrialPart]
 
-The first part discriminates best: later, contact has made any two simulations differ."""
+LossFunction = Callable[[Sequence[Hypothesis]], FloatArray]
+"""Returns the losses of some hypotheses, ``(n, pieces)``; inf where a simulation diverged."""
 
-MIN_OPENING = 100
-"""Control steps of the shortest opening; a shorter trial is simulated whole."""
+OPENING, MIN_OPENING = 1 / 3, 100
+"""Part of a trial that is simulated, from its beginning, if the comparator has no surrogate, and
+its shortest length, control steps. The first part discriminates best: later, contact has made any
+two simulations differ."""
 
-SURROGATES, MANY_TRIALS = 2, 3
-"""Surrogates, each of the one before, and trials from which on the last one is used."""
+MANY_TRIALS = 3
+"""Trials from which on the surrogate of the surrogate is enough: together they have as many pieces
+as one trial by the surrogate."""
+
+MIN_SURROGATE_PIECES = 2
+"""Pieces of the surrogate comparator that a search in a part of the trials needs."""
+
+MAX_JAM_SPREAD = 0.05
+"""Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +67,23 @@ class Timeline:
 
 @dataclass(eq=False)
 class _Column:
-    """A prepared trial, and the losses of the hypotheses that were simulated, each without axis."""
+    """A prepared trial, and the losses of the hypotheses that were simulated."""
 
     prepared: PreparedTrial | PiecewiseTrial
     known: dict[Hypothesis, Losses] = field(default_factory=dict)
+
+    @property
+    def piece_steps(self) -> IndexArray | None:
+        steps: IndexArray | None = getattr(self.prepared, "piece_steps", None)
+        return steps
 
 
 class LossTable:
     """Losses of hypotheses on trials, by the content of the trial and the hypothesis.
 
-    A trial is prepared once, and a hypothesis is simulated once for each trial. Losses are
-    independent of the hypotheses computed before.
+    A trial is prepared once, and a hypothesis is simulated once for each trial: the total, the
+    parts of signals and the losses of hinges are of one simulation. They are independent of the
+    hypotheses computed before.
 
     Args:
         simulator: The self-model.
@@ -82,12 +99,7 @@ class LossTable:
         self._columns: dict[Hashable, _Column] = {}
 
     def check(self, trials: Sequence[Trial]) -> None:
-        """Checks that the comparator can judge all trials, before any search.
-
-        Raises:
-            InputError: The comparator cannot judge some trials; the message contains the reason for
-                each.
-        """
+        """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
         problems = []
         for trial in trials:
             try:
@@ -97,146 +109,115 @@ class LossTable:
         if problems:
             raise InputError("; ".join(problems))
 
-    def is_piecewise(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the distances are means of losses, so that paired tests are possible.
+    def accepts(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether the comparator accepts all trials."""
+        try:
+            self.check(trials)
+        except InputError:
+            return False
+        return True
 
-        Raises:
-            InputError: The comparator cannot judge one of the trials.
-        """
+    def is_piecewise(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether the distances are means of losses, so that paired tests are possible."""
         return all(isinstance(self._column(trial).prepared, PiecewiseTrial) for trial in trials)
 
     def uses_segments(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the comparator judges all trials by short predictions.
-
-        Raises:
-            InputError: The comparator cannot judge one of the trials.
-        """
+        """Returns whether the comparator compares short predictions on all trials."""
         return all(isinstance(self._column(trial).prepared.request, Segments) for trial in trials)
 
-    def distances(
-        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
-    ) -> FloatArray:
-        """Returns the distance of each hypothesis from all trials together, ``(n,)``.
+    def distances(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
+        """Returns the sum over the trials of the mean loss of each hypothesis, ``(n,)``.
 
-        The distance is the sum over the trials of the mean loss, and infinite for a hypothesis
-        whose simulation diverges.
+        It is infinite for a hypothesis whose simulation diverges.
         """
         total = np.zeros(len(hypotheses))
-        for part in map(whole, trials):
-            kept = self._pieces(part)
-            rows = [one.total[kept] for one in self._rows(hypotheses, part.trial)]
+        for rows, pieces in self._rows_of(hypotheses, trials):
+            losses = (row.total[pieces] for row in rows)
             # A change near the end of a trial leaves no piece of it.
-            total += np.array([row.mean() if len(row) else 0.0 for row in rows])
+            total += [one.mean() if len(one) else 0.0 for one in losses]
         return total
 
-    def losses(
-        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
-    ) -> FloatArray:
+    def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the losses of each hypothesis on all trials, ``(n, pieces)``.
 
         A comparator without losses has one column per trial: the distance.
         """
-        parts = []
-        for part in map(whole, trials):
-            kept = self._pieces(part)
-            parts.append(np.array([one.total[kept] for one in self._rows(hypotheses, part.trial)]))
-        return np.concatenate(parts, axis=1)
+        rows_of = self._rows_of(hypotheses, trials)
+        return np.concatenate(
+            [np.array([row.total[pieces] for row in rows]) for rows, pieces in rows_of], axis=1
+        )
 
-    def by_signal(
-        self, hypothesis: Hypothesis, trials: Sequence[Trial | TrialPart]
-    ) -> Mapping[str, FloatArray]:
+    def by_signal(self, hypothesis: Hypothesis, trials: Parts) -> Mapping[str, FloatArray]:
         """Returns the part of each signal in each loss of a hypothesis, ``(pieces,)`` each.
 
         The result is empty for a comparator whose losses are no sums over signals, and for a
         hypothesis whose simulation diverges.
         """
-        found: dict[str, list[FloatArray]] = {}
-        for part in map(whole, trials):
-            (row,) = self._rows([hypothesis], part.trial)
+        parts: dict[str, list[FloatArray]] = {}
+        for (row,), pieces in self._rows_of([hypothesis], trials):
             if not row.by_signal or not np.isfinite(row.total).all():
                 return {}
-            kept = self._pieces(part)
             for signal, losses in row.by_signal.items():
-                found.setdefault(signal, []).append(losses[kept])
-        return {signal: np.concatenate(each) for signal, each in found.items()}
+                parts.setdefault(signal, []).append(losses[pieces])
+        return {signal: np.concatenate(each) for signal, each in parts.items()}
 
-    def by_hinge(
-        self, hypotheses: Sequence[Hypothesis], trials: Sequence[Trial | TrialPart]
-    ) -> FloatArray | None:
+    def by_hinge(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray | None:
         """Returns the losses of each hinge on its own, ``(n, pieces, hinges)``.
 
         A loss is infinite where a simulation diverges, and NaN without evidence on the hinge. The
         result is None for a comparator that predicts no single hinges.
         """
-        found = []
-        for part in map(whole, trials):
-            rows = [one.by_hinge for one in self._rows(hypotheses, part.trial)]
-            known = [row for row in rows if row is not None]
-            if len(known) < len(rows):
+        parts = []
+        for rows, pieces in self._rows_of(hypotheses, trials):
+            hinges = [row.by_hinge for row in rows if row.by_hinge is not None]
+            if len(hinges) < len(rows):
                 return None
-            found.append(np.array(known)[:, self._pieces(part)])
-        return np.concatenate(found, axis=1)
+            parts.append(np.array(hinges)[:, pieces])
+        return np.concatenate(parts, axis=1)
 
-    def timeline(self, trials: Sequence[Trial | TrialPart]) -> Timeline | None:
-        """Returns the times of the columns of ``losses``; None if the comparator has no times.
-
-        Raises:
-            InputError: The comparator cannot judge one of the trials.
-        """
+    def timeline(self, trials: Parts) -> Timeline | None:
+        """Returns the times of the columns of ``losses``; None if the comparator has no times."""
         times = []
         for part in map(whole, trials):
-            prepared = self._column(part.trial).prepared
-            if not isinstance(prepared, TimedTrial):
+            steps = self._column(part.trial).piece_steps
+            if steps is None:
                 return None
-            times.append(part.trial.behaviour.time[prepared.piece_steps][self._pieces(part)])
-        return Timeline(
-            trial=np.repeat(np.arange(len(times)), [len(one) for one in times]),
-            begin=np.concatenate([one[:, 0] for one in times]),
-            end=np.concatenate([one[:, 1] for one in times]),
-        )
-
-    @cached_property
-    def cheaper(self) -> tuple["LossTable", ...]:
-        """Tables of the comparator's surrogate and of that one's surrogate, as far as they are."""
-        found: list[LossTable] = []
-        current = self._comparator
-        while len(found) < SURROGATES and isinstance(current, ComparatorWithSurrogate):
-            current = current.surrogate
-            found.append(LossTable(self._simulator, current))
-        return tuple(found)
+            times.append(part.trial.behaviour.time[steps][self._pieces(part)])
+        begin, end = np.concatenate(times).T
+        return Timeline(np.repeat(np.arange(len(times)), [*map(len, times)]), begin, end)
 
     def surrogate(self, trials: Sequence[Trial]) -> tuple["LossTable", Sequence[Trial]]:
         """Returns a table and trials that cost less and rank hypotheses about as these trials do.
 
         A comparator without losses is its own surrogate: its hypotheses are not refined, so its
         distances from the whole trials make the ranking. Otherwise it is the comparator's own
-        surrogate, or the comparator on the openings of the trials. Of ``MANY_TRIALS`` or more, the
-        surrogate of the surrogate is enough: together they have as many pieces as one. A surrogate
-        that cannot judge a trial, such as one with many late steps, is left out.
+        surrogate (from ``MANY_TRIALS`` on, the surrogate of that one), or the comparator on the
+        openings of the trials. A surrogate that refuses a trial, such as one with many late steps,
+        is left out.
 
         Args:
-            trials: Trials that the comparator can judge.
+            trials: Trials that the comparator accepts.
         """
         if not self.is_piecewise(trials):
             return self, trials
-        for cheaper in reversed(self.cheaper if len(trials) >= MANY_TRIALS else self.cheaper[:1]):
-            if cheaper.accepts(trials):
-                return cheaper, trials
-        return self, trials if self.cheaper else [self._opening(trial) for trial in trials]
+        if self._cheaper is None:
+            return self, [self._opening(trial) for trial in trials]
+        cheapest = self._cheaper._cheaper if len(trials) >= MANY_TRIALS else None  # noqa: SLF001
+        for table in (cheapest, self._cheaper):
+            if table is not None and table.accepts(trials):
+                return table, trials
+        return self, trials
+
+    @cached_property
+    def _cheaper(self) -> "LossTable | None":
+        surrogate = getattr(self._comparator, "surrogate", None)
+        return None if surrogate is None else LossTable(self._simulator, surrogate)
 
     def _opening(self, trial: Trial) -> Trial:
-        """The first part of a trial, or the whole trial if the comparator cannot judge the part."""
+        """The first part of a trial, or the whole trial if the comparator refuses the part."""
         steps = max(round(OPENING * trial.behaviour.steps), min(MIN_OPENING, trial.behaviour.steps))
         opening = replace(trial, behaviour=trial.behaviour.first(steps))
         return opening if self.accepts([opening]) else trial
-
-    def accepts(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the comparator can judge all trials; see ``check``."""
-        try:
-            self.check(trials)
-        except InputError:
-            return False
-        return True
 
     def _column(self, trial: Trial) -> _Column:
         if trial.content not in self._columns:
@@ -245,12 +226,19 @@ class LossTable:
         return self._columns[trial.content]
 
     def _pieces(self, part: TrialPart) -> BoolArray | slice:
-        """Returns the pieces of the losses of a trial that lie within a part of it."""
-        prepared = self._column(part.trial).prepared
-        if part.is_whole or not isinstance(prepared, TimedTrial):
+        """Returns the pieces of a trial that lie within a part of it."""
+        steps = self._column(part.trial).piece_steps
+        if part.is_whole or steps is None:
             return slice(None)
-        times = part.trial.behaviour.time[prepared.piece_steps]
+        times = part.trial.behaviour.time[steps]
         return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
+
+    def _rows_of(
+        self, hypotheses: Sequence[Hypothesis], trials: Parts
+    ) -> Iterator[tuple[list[Losses], BoolArray | slice]]:
+        """Returns for each trial the losses of each hypothesis, and the pieces that count."""
+        for part in map(whole, trials):
+            yield self._rows(hypotheses, part.trial), self._pieces(part)
 
     def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[Losses]:
         column = self._column(trial)
@@ -260,31 +248,28 @@ class LossTable:
         for first in range(0, len(missing), size):
             batch = missing[first : first + size]
             result = simulate(simulator, request, trial, batch)
-            found = self._losses_of(column.prepared, trial, batch, result)
-            for row, hypothesis in enumerate(batch):
-                column.known[hypothesis] = Losses(
-                    found.total[row],
-                    {signal: losses[row] for signal, losses in found.by_signal.items()},
-                    None if found.by_hinge is None else found.by_hinge[row],
-                )
+            losses = self._losses_of(column, trial, batch, result)
+            column.known.update((one, losses[row]) for row, one in enumerate(batch))
         return [column.known[one] for one in hypotheses]
 
     def _losses_of(
         self,
-        prepared: PreparedTrial | PiecewiseTrial,
+        column: _Column,
         trial: Trial,
         hypotheses: Sequence[Hypothesis],
         result: SimulationResult,
     ) -> Losses:
         """Returns the checked losses of simulations; infinite where one diverged."""
         diverged = result.diverged[:, np.newaxis]
-        warnings: Literal["ignore"] | None = "ignore" if diverged.any() else None
-        with np.errstate(over=warnings, invalid=warnings, divide=warnings):
-            found = _compared(prepared, result.behaviour)
-        total, count = found.total, len(hypotheses)
-        if total.ndim != 2 or len(total) != count or not total.shape[1]:
+        handling = (
+            {} if not diverged.any() else dict.fromkeys(("over", "invalid", "divide"), "ignore")
+        )
+        with np.errstate(**handling):  # type: ignore[arg-type]  # of a literal type
+            losses = _compared(column.prepared, result.behaviour)
+        total, by_hinge = losses.total, losses.by_hinge
+        if total.ndim != 2 or len(total) != len(hypotheses) or not total.shape[1]:
             raise contract_error(
-                self._comparator, f"returned losses {total.shape} for {count} simulations"
+                self._comparator, f"returned losses {total.shape} for {len(hypotheses)} simulations"
             )
         wrong = total[~((total >= 0) | diverged)]
         if len(wrong):
@@ -292,32 +277,25 @@ class LossTable:
                 self._comparator,
                 f"returned a distance that is not a number of at least 0: {wrong[0]}",
             )
-        if isinstance(prepared, TimedTrial):
-            total = total + contradiction_losses(hypotheses, trial.behaviour, prepared.piece_steps)
-        total = np.where(diverged, np.inf, total)
-        if found.by_hinge is None:
-            return replace(found, total=total)
         expected = (*total.shape, len(trial.behaviour.names.hinges))
-        if found.by_hinge.shape != expected:
+        if by_hinge is not None and by_hinge.shape != expected:
             raise contract_error(
                 self._comparator,
-                f"returned losses of hinges {found.by_hinge.shape} in place of {expected}",
+                f"returned losses of hinges {by_hinge.shape} in place of {expected}",
             )
-        by_hinge = np.where(diverged[:, np.newaxis], np.inf, found.by_hinge)
-        return Losses(total, found.by_signal, by_hinge)
+        if column.piece_steps is not None:
+            total = total + contradiction_losses(hypotheses, trial.behaviour, column.piece_steps)
+        return Losses(
+            np.where(diverged, np.inf, total),
+            losses.by_signal,
+            None if by_hinge is None else np.where(diverged[:, np.newaxis], np.inf, by_hinge),
+        )
 
 
 def simulate(
     simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
 ) -> SimulationResult:
-    """Runs the simulation that a comparison with a trial requires.
-
-    Args:
-        simulator: The self-model.
-        request: The request of the prepared trial.
-        trial: The trial that was prepared.
-        hypotheses: At least one; each is a row of the signals.
-    """
+    """Runs the simulation that a comparison with a trial requires, a row for each hypothesis."""
     driver, steps = trial.plan.controller, trial.behaviour.steps
     match request:
         case ClosedLoop():
@@ -330,28 +308,20 @@ def simulate(
 
 
 def _compared(prepared: PreparedTrial | PiecewiseTrial, simulated: Behaviour) -> Losses:
-    if isinstance(prepared, PiecewiseTrial):
-        found = prepared.losses(simulated)
-        return found if isinstance(found, Losses) else Losses(np.asarray(found))
-    return Losses(np.asarray(prepared.distances(simulated))[..., np.newaxis])
+    if not isinstance(prepared, PiecewiseTrial):
+        return Losses(np.asarray(prepared.distances(simulated))[..., np.newaxis])
+    losses = prepared.losses(simulated)
+    return losses if isinstance(losses, Losses) else Losses(np.asarray(losses))
 
 
 def contradiction_losses(
     hypotheses: Sequence[Hypothesis], behaviour: Behaviour, piece_steps: IndexArray
 ) -> FloatArray:
-    """Returns the loss of each hypothesis in the pieces in which the log itself contradicts it.
+    """Returns the loss in the pieces in which a log contradicts hypotheses, ``(n, pieces)``.
 
     A sensor whose reading changes has not failed. The loss of a comparator contains this only in
     part: a model that predicts far too much contact at a foot is nearer to a sensor that never
     reads contact than to one that seldom does.
-
-    Args:
-        hypotheses: Hypotheses about the trial.
-        behaviour: The logged behaviour.
-        piece_steps: First and last control step of each piece, ``(pieces, 2)``.
-
-    Returns:
-        ``(n, pieces)``.
     """
     losses = np.zeros((len(hypotheses), len(piece_steps)))
     for row, hypothesis in zip(losses, hypotheses, strict=True):
@@ -360,3 +330,164 @@ def contradiction_losses(
             is_contradicted = steps[piece_steps[:, 1] + 1] > steps[piece_steps[:, 0]]
             row[is_contradicted] += CONTRADICTION
     return losses
+
+
+class Problem:
+    """Trials to explain, or parts of them, and the losses of hypotheses about them.
+
+    Jams at the angles at which the encoders end are added to the hypotheses.
+
+    Args:
+        table: Losses of the comparator.
+        space: The hypotheses about the robot.
+        trials: Trials to explain, or parts of them.
+        surrogate: Losses of the surrogate comparator, and its trials; see ``LossTable.surrogate``.
+        healthy_trials: Trials of the healthy robot, or parts of them.
+        names: Names of the trials of the whole diagnosis, by path.
+        settings: Parameters of the search.
+
+    Attributes:
+        has_test: Whether hypotheses are compared by a paired test.
+    """
+
+    def __init__(
+        self,
+        table: LossTable,
+        space: HypothesisSpace,
+        trials: Parts,
+        *,
+        surrogate: tuple[LossTable, Parts],
+        healthy_trials: Parts,
+        names: Mapping[str, str],
+        settings: Settings,
+    ) -> None:
+        self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
+        self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
+        jams = observed_jams([part.rows for part in self.trials], space.anatomy)
+        self.space = replace(space, observed=jams)
+        self.has_test = table.is_piecewise([part.trial for part in self.trials])
+        # Closed-loop windows are correlated, and not compared with those of healthy trials.
+        every = [part.trial for part in (*self.healthy_trials, *self.trials)]
+        is_comparable = table.is_piecewise(every) and table.uses_segments(every)
+        self._comparable = self.healthy_trials if is_comparable else []
+
+    def within(
+        self, cut: Callable[[Sequence[Trial]], Parts], healthy_trials: Parts = ()
+    ) -> "Problem | None":
+        """Returns the problem of a part of the trials; None if the surrogate has too few pieces.
+
+        Args:
+            cut: Returns the parts of some trials.
+            healthy_trials: Healthy reference, if there are no trials of the healthy robot.
+        """
+        table, coarse = self.surrogate[0], cut([whole(one).trial for one in self.surrogate[1]])
+        if table.losses([INTACT], coarse).shape[1] < MIN_SURROGATE_PIECES:
+            return None
+        return Problem(
+            self.table,
+            self.space,
+            cut([part.trial for part in self.trials]),
+            surrogate=(table, coarse),
+            healthy_trials=self.healthy_trials or healthy_trials,
+            names=self.names,
+            settings=self.settings,
+        )
+
+    def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        """Returns the losses on the trials to explain, ``(n, pieces)``."""
+        return self.table.losses(hypotheses, self.trials)
+
+    def coarse(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        """Returns the losses on the same trials by the surrogate, ``(n, fewer pieces)``."""
+        table, trials = self.surrogate
+        return table.losses(hypotheses, trials)
+
+    def healthy(self, hypotheses: Sequence[Hypothesis]) -> FloatArray | None:
+        """Returns the losses on healthy trials, ``(n, healthy pieces)``.
+
+        The result is None without healthy trials, or if the losses are correlated over a trial and
+        so not comparable between trials.
+        """
+        return self.table.losses(hypotheses, self._comparable) if self._comparable else None
+
+    @cached_property
+    def reference(self) -> FloatArray | None:
+        """Losses of the empty hypothesis on all healthy trials, ``(pieces,)``; None without any.
+
+        Encoders that are lost in the trials to explain are left out of the healthy ones.
+        """
+        if not self.healthy_trials:
+            return None
+        return np.asarray(self.table.losses([INTACT], self._observed(self.healthy_trials))[0])
+
+    @cached_property
+    def has_joints(self) -> bool:
+        """Whether the comparator predicts the motion of single joints."""
+        return self.table.by_hinge([INTACT], self.trials) is not None
+
+    def of_joint(
+        self, joint: str, hypotheses: Sequence[Hypothesis], *, healthy: bool = False
+    ) -> FloatArray:
+        """Returns the losses of the motion of a joint on the trials to explain, ``(n, pieces)``.
+
+        A loss is the mean over the known hinges of the joint, and NaN where all are unknown, as for
+        a hypothesis that detaches the joint.
+
+        Args:
+            joint: Name of the joint.
+            hypotheses: The hypotheses.
+            healthy: Whether the losses are those on healthy trials; without any there are no
+                pieces.
+        """
+        trials = self._observed_comparable if healthy else self.trials
+        by_hinge = self.table.by_hinge(hypotheses, trials) if trials else None
+        if by_hinge is None:
+            return np.empty((len(hypotheses), 0))
+        anatomy = self.space.anatomy
+        losses = by_hinge[:, :, [anatomy.hinges.index(one) for one in anatomy.joint(joint).hinges]]
+        is_known = ~np.isnan(losses)
+        count = is_known.sum(axis=2)
+        total = np.where(is_known, losses, 0.0).sum(axis=2)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    @cached_property
+    def _observed_comparable(self) -> list[TrialPart]:
+        return self._observed(self._comparable)
+
+    def _observed(self, healthy: Sequence[TrialPart]) -> list[TrialPart]:
+        """Returns healthy trials without the encoders that are lost in the trials to explain."""
+        observed = [part.trial for part in self.trials]
+        return [replace(part, trial=observed_as(part.trial, observed)) for part in healthy]
+
+
+def by_total_loss(hypotheses: Sequence[Hypothesis], losses: LossFunction) -> list[Hypothesis]:
+    """Returns hypotheses sorted by the sum of their losses, smallest first; the sort is stable."""
+    if not hypotheses:
+        return []
+    order = np.argsort(losses(hypotheses).sum(axis=1), kind="stable")
+    return [hypotheses[i] for i in order]
+
+
+def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
+    """Returns for every joint a jam at the angle at which its encoders end.
+
+    The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
+    without torque predicts a short segment better than the jam: each segment begins at the logged
+    angle. The encoder contains the angle, whether the joint is jammed or not.
+
+    Returns:
+        Faults of the kind ``jam-angle``, in the order of the joints, without joints whose encoders
+        are unknown and joints whose hinges end at different angles.
+    """
+    behaviour = trials[-1].behaviour  # a fault may begin during the trials
+    medians = median_of_known(behaviour["joint_positions"][round((1 - END) * behaviour.steps) :])
+    ends = dict(zip(behaviour.names.hinges, medians, strict=True))
+    jams = []
+    for name in JAMMED_AT_ANGLE.parts(anatomy):
+        joint = anatomy.joint(name)
+        angles = [ends[hinge] for hinge in joint.hinges]
+        if np.isfinite(angles).all() and np.ptp(angles) <= MAX_JAM_SPREAD:
+            lows, highs = zip(*joint.limits, strict=True)
+            angle = min(max(round(float(np.mean(angles)), 3) + 0.0, *lows), *highs)
+            jams.append(Fault(JAMMED_AT_ANGLE, name, angle))
+    return tuple(jams)

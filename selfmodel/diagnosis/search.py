@@ -7,12 +7,12 @@ the EA decides alone. The local search:
 
 1. **Starts**: the best hypotheses of the EA, the empty hypothesis, and the ``STARTS`` best single
    faults by the surrogate comparator, one per kind and part. Severities are those of the
-   best levels by the surrogate (``severity.with_fitted_severities``), and they are pruned: most end
-   in the same few hypotheses.
+   best levels by the surrogate (``with_fitted_severities``), and they are pruned: most end in the
+   same few hypotheses.
 2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
    ``SHORTLIST_SIZE`` of them, the comparator chooses the best, with its best levels, until the
    total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A
-   hypothesis has at most ``max_faults`` faults.
+   hypothesis has at most as many faults as a genome has genes.
 3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
    not significantly better (``significance.is_better``), or its gain is model error
    (``is_model_error``).
@@ -22,26 +22,35 @@ the EA decides alone. The local search:
 6. **Choice**: from the empty hypothesis on, in order of the number of faults and then of the total
    loss, a hypothesis replaces the current best only if it is significantly better. Its severities
    are fitted by the comparator itself, and it is pruned again.
-7. **Mean severities** (``severity.with_mean_severities``), unless they make a fault prunable.
+7. **Mean severities** (``with_mean_severities``), unless they make a fault prunable.
 
 The surrogate comparator simulates a third of the segments (a tenth from three trials on), or the
 first third of each trial. No ablation of ``STARTS`` and ``SHORTLIST_SIZE`` is on record.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property, partial
 from itertools import combinations
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.problem import LossFunction, Problem, by_total_loss
-from selfmodel.diagnosis.severity import ZOOMS, with_fitted_severities, with_mean_severities
-from selfmodel.diagnosis.significance import MIN_Z_OF_STEP, gain_is_model_error, is_better
+from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.significance import (
+    MIN_Z_OF_STEP,
+    NEGLIGIBLE_LOSS,
+    gain_is_model_error,
+    is_better,
+    paired_z,
+)
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import Fault
 from selfmodel.settings import Settings
+
+Neighbours = Callable[[Hypothesis], list[Hypothesis]]
+"""Returns hypotheses near another one."""
 
 STARTS = 3
 """Single faults to start from, in addition to the known hypotheses."""
@@ -52,6 +61,12 @@ SHORTLIST_SIZE = 8
 PROMISING = 16
 """Faults that replace another, at most: so many of the best alone, and so many of the best added.
 A fault that lowers the loss in neither way is not tried in the place of each fault."""
+
+ZOOM_POINTS, ZOOMS, MAX_ROUNDS = 7, 2, 2
+"""Severities per zoom, zooms per fault, and passes over all faults of a hypothesis."""
+
+SEVERITY_DECIMALS = 4
+"""Decimals of a fitted severity."""
 
 
 def evolved(
@@ -79,9 +94,9 @@ def evolved(
 
     def fitness(genomes: FloatArray) -> FloatArray:
         hypotheses = [space.decode(genome) for genome in genomes]
-        found = distances(hypotheses)
-        totals.update(zip(hypotheses, map(float, found), strict=True))
-        return 0.0 - found  # not -found: a perfect fitness is 0, not -0
+        values = distances(hypotheses)
+        totals.update(zip(hypotheses, map(float, values), strict=True))
+        return 0.0 - values  # not -values: a perfect fitness is 0, not -0
 
     search = Evolution(
         settings.genes * GENE_VALUES,
@@ -115,8 +130,7 @@ class LocalSearch:
         self.problem = problem
         self.compared: set[Hypothesis] = set()
         self.proposed: set[Hypothesis] = set()
-        self._space = problem.space
-        self._ends: dict[Hypothesis, Hypothesis] = {}
+        self._space, self._max_faults = problem.space, problem.settings.genes
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials, ``(n, pieces)``; the hypotheses count as compared."""
@@ -134,17 +148,17 @@ class LocalSearch:
         Args:
             known: Hypotheses to start from, in addition to the best single faults and ``INTACT``.
         """
-        proposed = dict.fromkeys([*known, INTACT, *self.best_single_faults()[:STARTS]])
-        starts = dict.fromkeys(
-            self.pruned(self._fitted(start, self.coarse, zooms=0)) for start in proposed
-        )
+        fitted = partial(with_fitted_severities, space=self._space)
+        levels = partial(fitted, losses=self.coarse, zooms=0)
+        proposed = dict.fromkeys([*known, INTACT, *self.best_single_faults[:STARTS]])
+        starts = dict.fromkeys(self.pruned(levels(start)) for start in proposed)
         local_optima = {optimum for start in starts for optimum in self.local_optima(start)}
-        refits = {self.pruned(self._fitted(optimum, self.coarse)) for optimum in local_optima}
+        refits = {self.pruned(fitted(optimum, losses=self.coarse)) for optimum in local_optima}
         chosen = INTACT
         for hypothesis in sorted(refits, key=lambda one: (len(one), self.total_loss(one), one)):
             if is_better(*self.losses([hypothesis, chosen])):
                 chosen = hypothesis
-        best = self.pruned(self._fitted(chosen, self.losses))
+        best = self.pruned(fitted(chosen, losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
 
@@ -152,16 +166,11 @@ class LocalSearch:
         """Returns the sum of the losses of a hypothesis on the trials."""
         return float(self.losses([hypothesis])[0].sum())
 
-    def _fitted(
-        self, hypothesis: Hypothesis, losses: LossFunction, zooms: int = ZOOMS
-    ) -> Hypothesis:
-        return with_fitted_severities(hypothesis, losses, self._space, zooms)
-
+    @cached_property
     def best_single_faults(self) -> list[Hypothesis]:
         """Single faults, best first by the surrogate, one severity per kind and part."""
-        singles = self._allowed(self._space.with_one_more(INTACT))
         parts: dict[Fault, Hypothesis] = {}
-        for single in by_total_loss(singles, self.coarse):
+        for single in self._by_surrogate(self._space.with_one_more(INTACT)):
             (fault,) = single.faults
             parts.setdefault(Fault(fault.kind, fault.part), single)
         return list(parts.values())
@@ -172,67 +181,45 @@ class LocalSearch:
         The descent over replacements is needed because a replaced fault may lower the loss more
         and correct no more than model error.
         """
-        current = self.pruned(self._descended(start))
-        optima = dict.fromkeys([current])
-        while True:
-            current = self.pruned(self._descended_by_replacement(current))
-            if current in optima:
-                return list(optima)
-            optima[current] = None
+        current = self.pruned(self._descended(start, self._neighbours))
+        optima: list[Hypothesis] = []
+        while current not in optima:
+            optima.append(current)
+            current = self.pruned(self._descended(current, self._replaced))
+        return optima
 
     def pruned(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis after pruning: the fault whose removal costs least is removed first."""
-        current = hypothesis
-        while True:
-            sufficient = [
-                fewer
-                for fewer in self._shortlist(self._space.with_one_less(current))
-                if not self._is_required(current, fewer)
-            ]
-            if not sufficient:
-                return current
-            current = sufficient[0]
+        for fewer in self._shortlist(self._space.with_one_less(hypothesis)):
+            if not self._is_required(hypothesis, fewer):
+                return self.pruned(fewer)
+        return hypothesis
 
-    def _descended(self, start: Hypothesis) -> Hypothesis:
-        """The end of the descent over faults added, replaced and removed; known ends are kept."""
-        passed, current = [], start
-        while current not in self._ends:
-            passed.append(current)
-            more = self._by_surrogate(self._space.with_one_more(current))
-            others = [*self._replaced(current, more), *self._space.with_one_less(current)]
-            following = self._step(current, [*more[:SHORTLIST_SIZE], *others])
-            if following is None:
-                self._ends[current] = current
-            else:
-                current = following
-        self._ends |= dict.fromkeys(passed, self._ends[current])
-        return self._ends[current]
+    def _descended(self, start: Hypothesis, neighbours: Neighbours) -> Hypothesis:
+        """The end of the descent from a start over neighbours."""
+        current: Hypothesis | None = start
+        while current is not None:
+            start, current = current, self._step(current, neighbours(current))
+        return start
 
-    def _descended_by_replacement(self, start: Hypothesis) -> Hypothesis:
-        current = start
-        while True:
-            more = self._by_surrogate(self._space.with_one_more(current))
-            following = self._step(current, self._replaced(current, more))
-            if following is None:
-                return current
-            current = following
+    def _neighbours(self, current: Hypothesis) -> list[Hypothesis]:
+        """The hypotheses with one fault more (the best), replaced or less."""
+        more = self._by_surrogate(self._space.with_one_more(current))[:SHORTLIST_SIZE]
+        return [*more, *self._replaced(current), *self._space.with_one_less(current)]
 
     def _step(self, current: Hypothesis, neighbours: Sequence[Hypothesis]) -> Hypothesis | None:
         """The best neighbour with its best levels; None if the descent ends."""
-        best = self._shortlist(neighbours)
-        if not best or not self._is_step(best[0], current):
+        best, *_ = self._shortlist(neighbours) or [current]
+        if best == current or not self._is_step(best, current):
             return None
         # The fit by the surrogate may raise the loss of the comparator.
-        return min(best[0], self._fitted(best[0], self.coarse, zooms=0), key=self.total_loss)
+        fitted = with_fitted_severities(best, self.coarse, self._space, zooms=0)
+        return min(best, fitted, key=self.total_loss)
 
-    def _replaced(self, current: Hypothesis, more: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The hypotheses with a promising fault in the place of one fault.
-
-        Args:
-            current: Hypothesis whose faults are replaced.
-            more: The hypotheses with one fault more, best first.
-        """
-        singles = [single.faults[0] for single in self.best_single_faults()[:PROMISING]]
+    def _replaced(self, current: Hypothesis) -> list[Hypothesis]:
+        """The hypotheses with a promising fault in the place of one fault."""
+        more = self._by_surrogate(self._space.with_one_more(current))
+        singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
         added = [fault for one in more for fault in one.faults if fault not in current.faults]
         promising = dict.fromkeys([*singles, *added[:PROMISING]])
         faults = current.faults
@@ -267,19 +254,13 @@ class LocalSearch:
         )
 
     def _allowed(self, hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
-        return [one for one in hypotheses if len(one) <= self.problem.max_faults]
+        return [one for one in hypotheses if len(one) <= self._max_faults]
 
 
 def is_model_error(hypothesis: Hypothesis, fewer: Hypothesis, problem: Problem) -> bool:
     """Returns whether extra faults improve the healthy trials about as much as the damaged ones.
 
-    Args:
-        hypothesis: The hypothesis with the extra faults.
-        fewer: The hypothesis without the extra faults.
-        problem: The trials and their losses.
-
-    Returns:
-        False if there are no comparable healthy trials.
+    The result is False if there are no comparable healthy trials.
     """
     extra = [fault for fault in hypothesis.faults if fault not in fewer.faults]
     healthy = problem.healthy([problem.space.canonical(extra), INTACT])
@@ -295,3 +276,115 @@ def any_fault_is_model_error(hypothesis: Hypothesis, problem: Problem) -> bool:
         is_model_error(hypothesis, problem.space.canonical(rest), problem)
         for rest in combinations(hypothesis.faults, max(len(hypothesis) - 1, 0))
     )
+
+
+def with_fitted_severities(
+    hypothesis: Hypothesis, losses: LossFunction, space: HypothesisSpace, zooms: int = ZOOMS
+) -> Hypothesis:
+    """Returns the hypothesis with the severities of the lowest total loss, by coordinate descent.
+
+    Args:
+        hypothesis: In canonical form.
+        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
+        space: The hypotheses about the robot.
+        zooms: Number of grids between levels; 0 for the best levels.
+    """
+    current = hypothesis
+    for _ in range(MAX_ROUNDS):
+        before = current
+        for index in range(len(current)):
+            if index < len(current):  # a fault with a nominal severity was dropped
+                current = with_fitted_severity(current, index, losses, space, zooms)
+        if current == before:
+            break
+    return current
+
+
+def with_fitted_severity(
+    hypothesis: Hypothesis,
+    index: int,
+    losses: LossFunction,
+    space: HypothesisSpace,
+    zooms: int = ZOOMS,
+) -> Hypothesis:
+    """Returns the hypothesis with the severity of one fault of the lowest total loss.
+
+    It is the best of the kind's levels, then of ``zooms`` grids, each between the neighbours of the
+    best severity so far.
+    """
+    fault = hypothesis.faults[index]
+    bounds = space.severity_bounds(fault)
+    if bounds is None:
+        return hypothesis
+    severities = [fault.severity, *space.levels(fault)]
+    # A kind that edits the specification has no severities between its levels: each severity
+    # needs a compiled model.
+    for _ in range(1 if fault.kind.edits_specification else 1 + zooms):
+        tried = [space.with_severity(hypothesis, index, severity) for severity in severities]
+        chosen = int(np.argmin(losses(tried).sum(axis=1)))
+        severity, best = severities[chosen], tried[chosen]
+        severities = [severity, *_around(severity, severities, bounds)]
+    return best
+
+
+def with_mean_severities(
+    hypothesis: Hypothesis, losses: LossFunction, space: HypothesisSpace
+) -> Hypothesis:
+    """Returns the hypothesis with severities averaged over those that the trials do not rule out.
+
+    The loss is nearly flat around its minimum and rugged, so the position of the minimum is random.
+    With one seed and a true friction of 0.4, hardly any friction from 0.31 to 0.41 was a standard
+    error worse than another, 0.31 had the lowest loss, and the mean is 0.36. A severity whose loss
+    is z standard errors above the best, paired over the pieces, has the weight exp(-z^2 / 2).
+    Severities beyond a ruled-out severity have no weight.
+
+    Args:
+        hypothesis: With fitted severities.
+        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
+        space: The hypotheses about the robot.
+    """
+    current = hypothesis
+    for index in range(len(hypothesis)):
+        mean = _averaged(current, index, losses, space)
+        if len(mean) == len(current) and not is_better(*losses([current, mean])):
+            current = mean
+    return current
+
+
+def _averaged(
+    hypothesis: Hypothesis, index: int, losses: LossFunction, space: HypothesisSpace
+) -> Hypothesis:
+    fault = hypothesis.faults[index]
+    bounds = space.severity_bounds(fault)
+    if bounds is None or fault.kind.edits_specification:
+        return hypothesis
+    levels = [fault.severity, *space.levels(fault)]
+    severities = sorted({*levels, *_around(fault.severity, levels, bounds)})
+    if len(severities) == 1:
+        return hypothesis
+    rows = losses([space.with_severity(hypothesis, index, severity) for severity in severities])
+    weights = _weights(rows)
+    # Integrals, because severities are denser around the best.
+    mean = np.trapezoid(weights * severities, severities) / np.trapezoid(weights, severities)
+    return space.with_severity(hypothesis, index, round(float(mean), SEVERITY_DECIMALS))
+
+
+def _weights(rows: FloatArray) -> FloatArray:
+    """Weights of ascending severities, ``(n,)``; 0 from the first ruled-out one on either side."""
+    best = int(np.argmin(rows.sum(axis=1)))
+    z = np.array([paired_z(row, rows[best]) if np.isfinite(row).all() else 0.0 for row in rows])
+    worse = rows.mean(axis=1) > rows[best].mean() + NEGLIGIBLE_LOSS
+    out = np.array([is_better(rows[best], row) for row in rows]) | (worse & (z <= 0))
+    low = max(np.flatnonzero(out[:best]), default=-1)
+    high = best + min(np.flatnonzero(out[best:]), default=len(out))
+    weights: FloatArray = np.exp(-np.square(z) / 2)
+    weights[: low + 1] = weights[high:] = 0.0
+    return weights
+
+
+def _around(severity: float, known: Sequence[float], bounds: tuple[float, float]) -> list[float]:
+    """A grid from the next smaller known severity to the next larger one, or to the bounds."""
+    low = max((other for other in known if other < severity), default=bounds[0])
+    high = min((other for other in known if other > severity), default=bounds[1])
+    grid: list[float] = np.linspace(low, high, ZOOM_POINTS).round(SEVERITY_DECIMALS).tolist()
+    return grid

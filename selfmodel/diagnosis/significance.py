@@ -86,9 +86,9 @@ def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
     """Returns whether the first of two hypotheses predicts significantly better.
 
     Args:
-        one: Losses of the first hypothesis, ``(segments,)``; infinite where a simulation diverged.
-        other: Losses of the second hypothesis on the same segments, ``(segments,)``, likewise. A
-            hypothesis that diverged is never better; a finite one is better than a diverged one.
+        one: Losses of the first hypothesis, ``(pieces,)``; infinite where a simulation diverged.
+        other: Losses of the second hypothesis on the same pieces, likewise. A hypothesis that
+            diverged is never better; a finite one is better than a diverged one.
         min_z: Standard errors of the paired difference that are required.
     """
     if not np.isfinite(one).all():
@@ -97,14 +97,35 @@ def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
         return True
     if not other.mean() > one.mean() + NEGLIGIBLE_LOSS:
         return False
-    z_is_high = paired_z(other, one) >= min_z
-    return bool(z_is_high or other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS)
+    has_ratio = other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS
+    return bool(has_ratio or paired_z(other, one) >= min_z)
+
+
+def joint_is_better(one: FloatArray, other: FloatArray) -> bool:
+    """Returns whether the losses of a joint are significantly smaller.
+
+    Args:
+        one: Losses of a hypothesis, ``(pieces,)``; NaN if unknown.
+        other: Losses of another hypothesis on the same pieces.
+
+    Returns:
+        False with fewer than ``MIN_PIECES`` pieces that are known in both.
+    """
+    smaller, larger = known(np.stack([one, other]))
+    if len(smaller) < MIN_PIECES or not np.isfinite(smaller).all():
+        return False
+    return not np.isfinite(larger).all() or paired_z(larger, smaller) >= MIN_Z
+
+
+def known(rows: FloatArray) -> FloatArray:
+    """Returns the pieces that are known in every row, ``(n, known pieces)``."""
+    return np.asarray(rows[:, ~np.isnan(rows).any(axis=0)])
 
 
 def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
     """Returns the mean difference of finite losses divided by its standard error.
 
-    The result is 0 for fewer than two segments, and where all differences are equal.
+    The result is 0 for fewer than two pieces, and where all differences are equal.
     """
     difference = larger - smaller
     error = difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
@@ -120,16 +141,19 @@ def gain_exceeds_healthy_gain(
     ``MIN_Z_ACROSS_TRIALS`` standard errors, because hundreds of hypotheses are tested.
 
     Args:
-        one: Losses of the better hypothesis on the damaged trials, ``(segments,)``.
-        other: Losses of the other hypothesis on the same segments.
-        healthy_one: As ``one``, on the healthy trials, ``(healthy_segments,)``.
+        one: Losses of the better hypothesis on the damaged trials, ``(pieces,)``.
+        other: Losses of the other hypothesis on the same pieces.
+        healthy_one: As ``one``, on the healthy trials, ``(healthy pieces,)``.
         healthy_other: As ``other``, on the healthy trials.
     """
-    gains = _gains(one, other, healthy_one, healthy_other)
-    if gains is None or not gains[0].mean() > NEGLIGIBLE_LOSS:
+    if not _are_comparable(one, other, healthy_one, healthy_other):
         return False
-    more, error = _welch(*gains)
-    return paired_z(other, one) >= MIN_Z_ACROSS_TRIALS and more >= MIN_Z_ACROSS_TRIALS * error
+    gain, more, error = _gains(one, other, healthy_one, healthy_other)
+    return (
+        gain > NEGLIGIBLE_LOSS
+        and paired_z(other, one) >= MIN_Z_ACROSS_TRIALS
+        and more >= MIN_Z_ACROSS_TRIALS * error
+    )
 
 
 def gain_is_model_error(
@@ -139,29 +163,27 @@ def gain_is_model_error(
 
     Three conditions hold: the healthy trials gain; the damaged trials gain by less than ``MIN_Z``
     standard errors more; and the test has the power to show a real fault, which would worsen the
-    healthy trials by as much as it improves the damaged ones.
-
-    Args:
-        one: Losses of the better hypothesis; as for ``gain_exceeds_healthy_gain``.
-        other: Losses of the other hypothesis.
-        healthy_one: As ``one``, on the healthy trials.
-        healthy_other: As ``other``, on the healthy trials.
+    healthy trials by as much as it improves the damaged ones. The arguments are those of
+    ``gain_exceeds_healthy_gain``.
     """
-    gains = _gains(one, other, healthy_one, healthy_other)
-    if gains is None or not gains[1].mean() > NEGLIGIBLE_LOSS:
+    if not _are_comparable(one, other, healthy_one, healthy_other):
         return False
-    more, error = _welch(*gains)
-    return more < MIN_Z * error < 2 * float(gains[0].mean())
+    gain, more, error = _gains(one, other, healthy_one, healthy_other)
+    healthy_gain = float((healthy_other - healthy_one).mean())
+    return healthy_gain > NEGLIGIBLE_LOSS and more < MIN_Z * error < 2 * gain
+
+
+def _are_comparable(one: FloatArray, *others: FloatArray) -> bool:
+    """Returns whether all losses are finite, of two or more pieces each."""
+    return all(len(each) > 1 and np.isfinite(each).all() for each in (one, *others))
 
 
 def _gains(
     one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    """Gains of ``one`` per damaged and per healthy segment; None if infinite or fewer than 2."""
-    losses = (one, other, healthy_one, healthy_other)
-    if not all(np.isfinite(each).all() for each in losses) or min(len(one), len(healthy_one)) < 2:
-        return None
-    return other - one, healthy_other - healthy_one
+) -> tuple[float, float, float]:
+    """Mean gain, its excess over that on the healthy trials, and the excess's standard error."""
+    gains = other - one
+    return (float(gains.mean()), *_welch(gains, healthy_other - healthy_one))
 
 
 def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
@@ -169,15 +191,15 @@ def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
 
     Args:
         losses: Losses of the best hypothesis, ``(pieces,)``.
-        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy_pieces,)``.
+        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy pieces,)``.
 
     Returns:
         Welch's statistic; 0 if the means differ by at most ``LOSS_FLOOR``, and infinite without
         variance. With a single piece, or with infinite losses: infinite if the ratio of the means
         is significant, else 0.
     """
-    larger = bool(losses.mean() > LOSS_RATIO * healthy.mean() + LOSS_FLOOR)
     if min(len(losses), len(healthy)) < 2 or not np.isfinite([losses.mean(), healthy.mean()]).all():
+        larger = losses.mean() > LOSS_RATIO * healthy.mean() + LOSS_FLOOR
         return math.inf if larger else 0.0
     difference, error = _welch(losses, healthy)
     if difference <= LOSS_FLOOR:

@@ -4,9 +4,10 @@ import math
 import re
 from collections.abc import Sequence
 
-from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis
+from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Fit
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
+from selfmodel.diagnosis.verdict import is_too_high
 
 SIGMA = "\u03c3"  # standard errors
 
@@ -15,13 +16,14 @@ _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, th
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:
     """Returns the verdict, the change and the undetectable faults as sentences."""
-    change = str(diagnosis.change) if diagnosis.change else ""
-    besides = ", ".join(map(str, diagnosis.undetectable_faults))
-    return (
-        _verdict(diagnosis)
-        + (f" {change[0].upper()}{change[1:]}." if change else "")
-        + (f" Undetectable in these trials: {besides}." if besides else "")
-    )
+    sentences = [_verdict(diagnosis)]
+    if diagnosis.change is not None:
+        change = str(diagnosis.change)
+        sentences.append(f"{change[0].upper()}{change[1:]}.")
+    if diagnosis.undetectable:
+        faults = ", ".join(map(str, diagnosis.undetectable_faults))
+        sentences.append(f"Undetectable in these trials: {faults}.")
+    return " ".join(sentences)
 
 
 def fit_sentence(diagnosis: Diagnosis) -> str:
@@ -41,14 +43,12 @@ def fit_sentence(diagnosis: Diagnosis) -> str:
 
 def detectable_sentences(diagnosis: Diagnosis) -> list[str]:
     """Returns the smallest detectable severity of each kind as a sentence, if it was computed."""
-    rows = diagnosis.detectable
-    if not rows:
-        return []
-    kinds = dict.fromkeys(row.kind for row in rows)
-    limits = "; ".join(
-        f"{kind} {_limits([row for row in rows if row.kind == kind])}" for kind in kinds
-    )
-    return [f"These trials would have shown: {limits}. Smaller changes are below the limit."]
+    rows: dict[str, list[DetectableSeverity]] = {}
+    for row in diagnosis.detectable:
+        rows.setdefault(row.kind, []).append(row)
+    limits = "; ".join(f"{kind} {_limits(each)}" for kind, each in rows.items())
+    sentence = f"These trials would have shown: {limits}. Smaller changes are below the limit."
+    return [sentence] if limits else []
 
 
 def evidence_sentences(evidence: Sequence[DirectEvidence]) -> list[str]:
@@ -56,21 +56,15 @@ def evidence_sentences(evidence: Sequence[DirectEvidence]) -> list[str]:
     sentences = []
     for one in evidence:
         constant = [f"{each.sensor} ({each.reading:g})" for each in one.constant_sensors]
-        idle = ", ".join(one.commands_without_effect)
-        facts = [f"commands without effect: {idle}"] if idle else []
+        idle = one.commands_without_effect
+        facts = [f"commands without effect: {', '.join(idle)}"] if idle else []
         facts += [f"constant readings: {', '.join(constant)}"] if constant else []
         sentences += [f"In {one.trial}, {'; '.join(facts)}."] if facts else []
     return sentences
 
 
 def right_or_wrong(best: str, truth: str, *, correct: bool) -> str:
-    """Returns the judgement of the best hypothesis, given the true one.
-
-    Args:
-        best: Notation of the best hypothesis.
-        truth: Notation of the true hypothesis.
-        correct: Whether the best hypothesis counts as the true one.
-    """
+    """Returns the judgement of the notation of the best hypothesis, given that of the true one."""
     if correct:
         return "right"
     return "right except for severity" if _faults(best) == _faults(truth) else "wrong"
@@ -117,43 +111,42 @@ def _verdict(diagnosis: Diagnosis) -> str:
             return (
                 f"Ambiguous: the trials do not distinguish {best} from {others} ({diagnosis.test})."
             )
-    return _unexplained(diagnosis)
+        case "unexplained":
+            return f"Unexplained: {_missing(diagnosis)}"
 
 
-def _unexplained(diagnosis: Diagnosis) -> str:
+def _missing(diagnosis: Diagnosis) -> str:
+    """Returns what is known of the fault that is missing in an unexplained diagnosis."""
     best, unsearched, fit = diagnosis.best, diagnosis.unsearched, diagnosis.fit
-    if diagnosis.reason:
-        return f"Unexplained: {diagnosis.reason}."
+    if fit is None:
+        return f"{diagnosis.reason}."
     if unsearched is not None:
-        also = f" ({', '.join(unsearched.others)} would do so too)" if unsearched.others else ""
+        also = f" ({', '.join(map(str, unsearched.others))} would do so too)"
         return (
-            f"Unexplained: {unsearched.hypothesis} predicts the trials significantly better than "
-            f"{best}{also}; add {unsearched.kind} to --kinds."
+            f"{unsearched.hypothesis} predicts the trials significantly better than "
+            f"{best}{also if unsearched.others else ''}; add {unsearched.kind} to --kinds."
         )
-    listed = ", ".join(
-        f"{name} ({_excess(excess)})" for name, excess in (fit.joints if fit else {}).items()
-    )
+    listed = ", ".join(f"{name} ({_excess(excess)})" for name, excess in fit.joints.items())
     joints = f" Joints that the healthy trials predict better: {listed}." if listed else ""
-    if fit is not None and joints and not fit.is_too_high:
+    if joints and not is_too_high(fit):
         return (
-            f"Unexplained: {best} predicts the trials as a whole, and not all joints.{joints} "
-            f"There is a fault of a kind that was not searched (--kinds), or a combination of "
-            f"faults."
+            f"{best} predicts the trials as a whole, and not all joints.{joints} There is a fault "
+            f"of a kind that was not searched (--kinds), or a combination of faults."
         )
     return (
-        f"Unexplained: even {best} predicts the trials significantly worse than the self-model "
-        f"predicts the healthy robot; there is another fault, or one of a kind that was not "
-        f"searched (--kinds).{_residual(diagnosis)}{joints}"
+        f"even {best} predicts the trials significantly worse than the self-model predicts the "
+        f"healthy robot; there is another fault, or one of a kind that was not searched "
+        f"(--kinds).{_residual(diagnosis, fit)}{joints}"
     )
 
 
-def _residual(diagnosis: Diagnosis) -> str:
+def _residual(diagnosis: Diagnosis, fit: Fit) -> str:
     """Returns the share, the signals and the time of the loss that is left, as a sentence."""
-    left, share = diagnosis.residual, diagnosis.fit.left if diagnosis.fit else None
-    if left is None:
+    residual = diagnosis.residual
+    if residual is None:
         return ""
-    amount = "Most" if share is None else f"{share:.0%} of the loss"
+    amount = "Most" if fit.left is None else f"{fit.left:.0%} of the loss"
     return (
-        f" {amount} is left: in {', '.join(left.signals)}, most of it at t = {left.begin:.1f} to "
-        f"{left.end:.1f} s of {left.trial}."
+        f" {amount} is left: in {', '.join(residual.signals)}, most of it at t = "
+        f"{residual.begin:.1f} to {residual.end:.1f} s of {residual.trial}."
     )

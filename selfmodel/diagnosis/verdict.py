@@ -7,38 +7,48 @@ the ranking are the search's.)
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.alternatives import (
-    best_severities,
-    detectable_severities,
-    indistinguishable,
-    undetectable,
-    unsearched_fault,
-    without_severities,
-)
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
+    DetectableSeverity,
     Diagnosis,
     Fit,
     Residual,
     UnsearchedFault,
     Verdict,
 )
-from selfmodel.diagnosis.joints import excesses
-from selfmodel.diagnosis.problem import Problem
-from selfmodel.diagnosis.search import by_distance
+from selfmodel.diagnosis.joints import excesses, predicts_joints_worse
+from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.search import (
+    SHORTLIST_SIZE,
+    any_fault_is_model_error,
+    by_distance,
+    with_fitted_severity,
+)
 from selfmodel.diagnosis.significance import (
+    FAULTY_RATIO,
+    LOSS_FLOOR,
+    LOSS_RATIO,
+    MIN_Z_ACROSS_TRIALS,
     MIN_Z_OF_JOINT,
     MIN_Z_OF_ONE_GAIT,
     MIN_Z_OF_OTHER_GAITS,
+    NEGLIGIBLE_LOSS,
     TEST,
     excess_over_healthy,
+    gain_exceeds_healthy_gain,
+    is_better,
+    paired_z,
 )
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.trials.trial import have_one_gait, whole
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
+from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.trials.trial import have_one_gait
 
 EQUAL_DISTANCES = "equal distances"
 """Name of the test for a comparator with one distance per trial."""
@@ -67,87 +77,73 @@ def verdict_of(
         alike: Hypotheses that are indistinguishable from the best.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it is better.
     """
-    if unsearched is not None or fit.is_unexplained:
+    if unsearched is not None or is_too_high(fit) or fit.joints:
         return "unexplained"
     if alike:
         return "ambiguous"
     return "explained" if best else "intact"
 
 
-def judged(best: Hypothesis, compared: Iterable[Hypothesis], problem: Problem) -> Diagnosis:
-    """Returns the diagnosis of a refined search, for a comparator with losses.
+def is_too_high(fit: Fit) -> bool:
+    """Returns whether the loss is higher than that of healthy trials, significantly and by much.
+
+    Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss of a
+    hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
+    """
+    if fit.healthy_loss is None or fit.excess is None:
+        return False
+    if fit.loss > LOSS_RATIO * fit.healthy_loss + LOSS_FLOOR:
+        return True
+    is_much = fit.loss > FAULTY_RATIO * fit.healthy_loss + LOSS_FLOOR
+    return fit.excess > fit.threshold and (is_much or not fit.has_faults)
+
+
+def diagnosis_of(
+    problem: Problem, compared: Iterable[Hypothesis], best: Hypothesis | None = None
+) -> Diagnosis:
+    """Returns the diagnosis of a search.
+
+    A comparator with one distance per trial has no test: the best hypothesis, and those at the same
+    distance, are of those that were compared.
 
     Args:
-        best: The best hypothesis.
-        compared: Every hypothesis that was compared with the trials, the best included: they are
-            ranked.
         problem: The trials and their losses.
+        compared: Every hypothesis that was compared with the trials: they are ranked.
+        best: The best of them by the paired tests; None for that with the smallest distance.
     """
-    totals = _totals(compared, problem)
+    listed = list({*compared, INTACT})
+    distances = problem.table.distances(listed, problem.trials)
+    totals = dict(zip(listed, map(float, distances), strict=True))
+    ranked, kept = by_distance(totals), problem.settings.kept
+    if best is None or not math.isfinite(totals[best]):
+        best = ranked[0]
     if not math.isfinite(totals[best]):
-        best = by_distance(totals)[0]
-    if not math.isfinite(totals[best]):
-        return _all_diverged(by_distance(totals), problem)
-    ranked = best_severities([best, *(one for one in by_distance(totals) if one != best)])
-    kept = problem.kept
-    alike = indistinguishable(best, problem)
-    unsearched = unsearched_fault(best, problem)
+        return _all_diverged(ranked, problem)
+    order = best_severities([best, *ranked])
+    if problem.has_test:
+        alike, unsearched = indistinguishable(best, problem), unsearched_fault(best, problem)
+    else:
+        equal = [one for one in order if totals[one] == totals[best]]
+        alike, unsearched = [one for one in equal if not _has_more(one, best)], None
     fit = _fit_of(best, problem)
     verdict = verdict_of(best, fit, alike, unsearched)
-    severities = () if best else detectable_severities(best, problem.space, problem.losses)
+    has_severities = problem.has_test and not best
+    severities = (
+        detectable_severities(best, problem.space, problem.losses) if has_severities else []
+    )
     return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in ranked[:kept]),
+        ranked=tuple(Candidate(one, totals[one]) for one in order[:kept]),
         trials=len(problem.trials),
         intact_distance=totals[INTACT],
         indistinguishable=tuple(alike[:kept]),
         verdict=verdict,
-        test=TEST,
+        test=TEST if problem.has_test else EQUAL_DISTANCES,
         unsearched=unsearched,
-        undetectable=tuple(undetectable(best, problem)[:kept]),
+        undetectable=tuple(undetectable(best, problem)[:kept]) if problem.has_test else (),
         detectable=tuple(severities),
         fit=fit,
         residual=_residual_of(best, problem) if verdict == "unexplained" else None,
     )
-
-
-def ranked_by_distance(found: Iterable[Hypothesis], problem: Problem) -> Diagnosis:
-    """Returns the diagnosis of a comparator without losses: hypotheses by their distance.
-
-    There is no test and no refinement: the best hypothesis, and those at the same distance, are of
-    those that the EA compared.
-
-    Args:
-        found: Every hypothesis that was compared with the trials.
-        problem: The trials and their distances.
-    """
-    totals = _totals({*found, INTACT}, problem)
-    ranked, kept = by_distance(totals), problem.kept
-    best = ranked[0]
-    if not math.isfinite(totals[best]):
-        return _all_diverged(ranked, problem)
-    parts = without_severities(best)
-    equal = best_severities(
-        one
-        for one in ranked[1:]
-        if totals[one] == totals[best] and not parts <= without_severities(one)
-    )
-    fit = _fit_of(best, problem)
-    return Diagnosis(
-        ranked=tuple(Candidate(one, totals[one]) for one in best_severities(ranked)[:kept]),
-        trials=len(problem.trials),
-        intact_distance=totals[INTACT],
-        indistinguishable=equal[:kept],
-        verdict=verdict_of(best, fit, equal, None),
-        test=EQUAL_DISTANCES,
-        fit=fit,
-    )
-
-
-def _totals(hypotheses: Iterable[Hypothesis], problem: Problem) -> dict[Hypothesis, float]:
-    """Returns the distance of each hypothesis."""
-    listed = list(hypotheses)
-    distances = problem.table.distances(listed, problem.trials)
-    return dict(zip(listed, map(float, distances), strict=True))
 
 
 def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
@@ -155,8 +151,8 @@ def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
 
     The verdict is ``unexplained``: the trials do not support any of the hypotheses.
     """
-    logs = ", ".join(whole(trial).trial.path for trial in problem.trials)
-    kept = best_severities(ranked)[: problem.kept]
+    logs = ", ".join(part.trial.path for part in problem.trials)
+    kept = best_severities(ranked)[: problem.settings.kept]
     return Diagnosis(
         ranked=tuple(Candidate(hypothesis, math.inf) for hypothesis in kept),
         trials=len(problem.trials),
@@ -178,9 +174,9 @@ def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
     the joints otherwise, and 16 of 24 healthy robots would be suspected.
     """
     losses, intact = problem.losses([best, INTACT])
-    rows = ([whole(one).rows for one in each] for each in (problem.trials, problem.healthy_trials))
+    rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))
     is_one_gait = have_one_gait(*rows)
-    found = excesses(INTACT, problem) if is_one_gait and not best else {}
+    joints = excesses(INTACT, problem) if is_one_gait and not best else {}
     reference = problem.reference
     return Fit(
         loss=float(losses.mean()),
@@ -190,7 +186,7 @@ def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
         threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
         has_faults=bool(best),
         left=None if reference is None else _share_left(losses, intact, reference),
-        joints={joint: z for joint, z in found.items() if z >= MIN_Z_OF_JOINT},
+        joints={joint: z for joint, z in joints.items() if z >= MIN_Z_OF_JOINT},
     )
 
 
@@ -222,7 +218,251 @@ def _residual_of(best: Hypothesis, problem: Problem) -> Residual | None:
     last = min(first + width - 1, int(np.flatnonzero(timeline.trial == trial)[-1]))
     return Residual(
         signals={name: excess[name] for name in largest[:MAX_SIGNALS]},
-        trial=problem.names[whole(trials[trial]).trial.path],
+        trial=problem.names[trials[trial].trial.path],
         begin=float(timeline.begin[first]),
         end=float(timeline.end[last]),
     )
+
+
+def best_severities(hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """Returns the first of the hypotheses that differ in severities alone, in the same order."""
+    first: dict[frozenset[tuple[FaultKind, str]], Hypothesis] = {}
+    for one in hypotheses:
+        first.setdefault(without_severities(one), one)
+    return list(first.values())
+
+
+def without_severities(hypothesis: Hypothesis) -> frozenset[tuple[FaultKind, str]]:
+    """Returns the kind and the part of each fault."""
+    return frozenset((fault.kind.without_severity, fault.part) for fault in hypothesis.faults)
+
+
+def _has_more(one: Hypothesis, best: Hypothesis) -> bool:
+    """Returns whether a hypothesis has all faults of the best one, whatever their severities."""
+    return without_severities(best) <= without_severities(one)
+
+
+def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
+    """Returns the neighbours of the best hypothesis that predict the trials about as well.
+
+    The neighbours have one fault less than the best, or another fault of the searched kinds in the
+    place of one of its faults, or are single faults; they have at most as many faults. The eight
+    best by the surrogate are compared, with the severity of the other fault fitted. A neighbour is
+    indistinguishable unless it is significantly worse, by the loss or by that of a joint at which
+    the two differ, or one of its faults corrects model error.
+
+    Returns:
+        Hypotheses sorted by total loss. Of those that differ in severities alone, the one with the
+        smallest loss.
+    """
+    space = problem.space
+    neighbours = dict.fromkeys(
+        [*space.with_one_less(best), *space.with_one_replaced(best), *space.with_one_more(INTACT)]
+    )
+    smaller = [one for one in neighbours if len(one) <= len(best) and not _has_more(one, best)]
+    few = best_severities(by_total_loss(smaller, problem.coarse))[:SHORTLIST_SIZE]
+    fitted = [_with_fitted_others(one, best, problem) for one in few]
+    candidates = by_total_loss(list(dict.fromkeys([*few, *fitted])), problem.losses)
+    best_losses, *rows = problem.losses([best, *candidates])
+    return best_severities(
+        one
+        for one, row in zip(candidates, rows, strict=True)
+        if without_severities(one) != without_severities(best)
+        and not is_better(best_losses, row)
+        and not any_fault_is_model_error(one, problem)
+        and not (problem.has_joints and predicts_joints_worse(one, best, problem))
+    )
+
+
+def _with_fitted_others(one: Hypothesis, best: Hypothesis, problem: Problem) -> Hypothesis:
+    """Returns a neighbour with the severities fitted of the faults that the best lacks.
+
+    A neighbour that is far from the best by the surrogate stays as it is: no fit makes up for it.
+    """
+    best_losses, losses = problem.coarse([best, one])
+    if losses.mean() > LOSS_RATIO * best_losses.mean() + NEGLIGIBLE_LOSS:
+        return one
+    for fault in one.faults:
+        if fault not in best.faults and fault in one.faults:
+            index = one.faults.index(fault)
+            one = with_fitted_severity(one, index, problem.coarse, problem.space)
+    return one
+
+
+def undetectable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
+    """Returns the best hypothesis with one fault more, for each fault that does not show.
+
+    Added to the best hypothesis, an undetectable fault changes the loss significantly in neither
+    direction. An example is a dead touch sensor in a foot that the gait never puts down. Kinds with
+    severities are excluded: most have a severity that is too small to detect. Hypotheses that the
+    surrogate comparator distinguishes from the best are not simulated further.
+
+    Returns:
+        Hypotheses sorted by total loss.
+    """
+    space = problem.space
+    faults = [fault for fault in space.coarse_candidates if fault.kind.bounds is None]
+    distinct = dict.fromkeys(space.canonical([*best.faults, fault]) for fault in faults)
+    candidates = [one for one in distinct if len(one) > len(best)]
+    for losses in (problem.coarse, problem.losses):
+        best_losses, *rows = losses([best, *candidates])
+        candidates = [
+            one
+            for one, row in zip(candidates, rows, strict=True)
+            if np.isfinite(best_losses).all()
+            and not is_better(best_losses, row)
+            and not is_better(row, best_losses)
+        ]
+    return by_total_loss(candidates, problem.losses)
+
+
+def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | None:
+    """Returns the best hypothesis with one fault of an unsearched kind, if significantly better.
+
+    One fault of a built-in kind is added to the best hypothesis, or replaces all faults of the same
+    part. The gain has to be significant, and significantly larger than the gain of the fault alone
+    on healthy trials; otherwise the fault corrects model error.
+
+    Returns:
+        The hypothesis with the lowest total loss that passes, with the best hypothesis of each
+        other kind that passes; None if there is none, or if there are no comparable healthy trials.
+    """
+    (best_losses,) = problem.losses([best])
+    is_exact = not np.isfinite(best_losses).all() or best_losses.mean() <= NEGLIGIBLE_LOSS
+    if problem.healthy([INTACT]) is None or is_exact:
+        return None
+    faults = _with_unsearched(best, problem.space)
+    better: dict[str, Hypothesis] = {}
+    for candidate in _largest_gains(best, list(faults), problem):
+        fault = faults[candidate]
+        healthy = problem.healthy([problem.space.canonical([fault]), INTACT])
+        if healthy is None or fault.kind.name in better:
+            continue
+        # A reading that healthy trials predict better with the fault is predicted badly as such.
+        if not fault.kind.affects_dynamics and is_better(*healthy):
+            continue
+        if gain_exceeds_healthy_gain(problem.losses([candidate])[0], best_losses, *healthy):
+            better[fault.kind.name] = candidate
+    if not better:
+        return None
+    (first, hypothesis), *others = better.items()
+    return UnsearchedFault(hypothesis, first, dict(others))
+
+
+def _with_unsearched(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesis, Fault]:
+    """Returns hypotheses with a fault of an unsearched kind, each with that fault.
+
+    Kinds that edit the specification, such as rough terrain, are excluded: each hypothesis needs a
+    compiled model.
+    """
+    kinds = [kind for kind in ALL_KINDS if kind not in space.kinds and not kind.edits_specification]
+    unsearched: dict[Hypothesis, Fault] = {}
+    for fault in replace(space, kinds=tuple(kinds)).coarse_candidates:
+        others = [other for other in best.faults if other.part != fault.part]
+        for faults in ((*best.faults, fault), (*others, fault)):
+            unsearched.setdefault(space.canonical(faults), fault)
+    unsearched.pop(best, None)
+    return unsearched
+
+
+def _largest_gains(
+    best: Hypothesis, candidates: list[Hypothesis], problem: Problem
+) -> list[Hypothesis]:
+    """The most significant gains by the surrogate, sorted by total loss of the comparator."""
+    best_losses, *rows = problem.coarse([best, *candidates])
+    z = [
+        paired_z(best_losses, row) if np.isfinite([best_losses, row]).all() else -np.inf
+        for row in rows
+    ]
+    few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST_SIZE]]
+    return by_total_loss(few, problem.losses)
+
+
+@dataclass
+class _Side:
+    """Severities of a fault on one side of the nominal one, nearest first, and a bisection.
+
+    All severities from index ``high`` on show; those before ``low`` do not.
+    """
+
+    fault: Fault
+    severities: Sequence[float]
+    low: int
+    high: int
+
+    @property
+    def middle(self) -> int:
+        return (self.low + self.high) // 2
+
+    @property
+    def smallest(self) -> float | None:
+        return self.severities[self.high] if self.high < len(self.severities) else None
+
+
+def detectable_severities(
+    best: Hypothesis, space: HypothesisSpace, losses: LossFunction
+) -> list[DetectableSeverity]:
+    """Returns the smallest detectable severities of every kind with a nominal severity.
+
+    The nominal friction is the model's; the level with the smallest loss is taken for it. Parts
+    with a fault in the best hypothesis are left out. A severity beyond one that shows is assumed to
+    show too, so that a bisection over the kind's levels finds the limit. A fault shows if it
+    predicts the trials worse by ``MIN_Z_ACROSS_TRIALS`` standard errors: a diagnosis requires
+    ``MIN_Z``, but the losses of a trial with the fault are not known. On the log of a real robot,
+    weaknesses with ``MIN_Z`` were found in half of the cases.
+
+    Args:
+        best: The best hypothesis.
+        space: The hypotheses about the robot.
+        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
+
+    Returns:
+        In the order of the kinds and their parts.
+    """
+    faulty = {fault.part for fault in best.faults}
+    faults = [
+        Fault(kind, part)
+        for kind in space.kinds
+        if kind.bounds is not None and not kind.edits_specification
+        for part in kind.parts(space.anatomy)
+        if part not in faulty
+    ]
+    pairs = []
+    for fault in faults:
+        nominal = _nominal(fault, best, space, losses)
+        if nominal is not None:
+            levels = sorted(space.levels(fault))
+            below = [level for level in reversed(levels) if level < nominal]
+            above = [level for level in levels if level > nominal]
+            pairs.append((_side(fault, nominal, below), _side(fault, nominal, above)))
+    while undecided := [side for pair in pairs for side in pair if side.low < side.high]:
+        tried = [replace(one.fault, severity=one.severities[one.middle]) for one in undecided]
+        candidates = [space.canonical([*best.faults, fault]) for fault in tried]
+        best_losses, *rows = losses([best, *candidates])
+        for side, row in zip(undecided, rows, strict=True):
+            if is_better(best_losses, row, MIN_Z_ACROSS_TRIALS):
+                side.high = side.middle
+            else:
+                side.low = side.middle + 1
+    return [
+        DetectableSeverity(below.fault.kind.name, below.fault.part, below.smallest, above.smallest)
+        for below, above in pairs
+    ]
+
+
+def _side(fault: Fault, nominal: float, levels: Sequence[float]) -> _Side:
+    """Returns the levels on one side, after half of the nearest one."""
+    severities = [(nominal + levels[0]) / 2, *levels] if levels else []
+    return _Side(fault, severities, 0, len(severities))
+
+
+def _nominal(
+    fault: Fault, best: Hypothesis, space: HypothesisSpace, losses: LossFunction
+) -> float | None:
+    """Returns the severity at which a fault has no effect; None if the kind has none."""
+    known = [value for value, to in fault.kind.degenerates_to.items() if to is None]
+    if known or fault.part != ENVIRONMENT:
+        return known[0] if known else None
+    levels = space.levels(fault)
+    rows = losses([space.canonical([*best.faults, replace(fault, severity=s)]) for s in levels])
+    return levels[int(np.argmin(rows.sum(axis=1)))]

@@ -25,12 +25,12 @@ from .sensors import (
     SENSOR_NOISE as SENSOR_NOISE,
     SILENT_NEURON as SILENT_NEURON,
 )
-from .terrain import ROUGHNESS as ROUGHNESS
 from .world import (
     CROSSWIND as CROSSWIND,
     FRICTION as FRICTION,
     GROWN_DELAY as GROWN_DELAY,
     PAYLOAD as PAYLOAD,
+    ROUGHNESS as ROUGHNESS,
     SLOPE as SLOPE,
     WIND as WIND,
 )

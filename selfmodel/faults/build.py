@@ -7,7 +7,8 @@ from mujoco import MjModel, MjSpec
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.faults.kind import FaultKind
+from selfmodel.robot.anatomy import Anatomy, Joint
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
@@ -48,15 +49,9 @@ def build(
 def compile_model(
     robot: Robot, hypothesis: Hypothesis, seed: int = 0, edits: Sequence[SpecEdit] = ()
 ) -> MjModel:
-    """Returns the compiled model with the faults that edit the specification.
+    """Returns the compiled model with the faults that edit the specification; see ``build``.
 
     The result is the robot's own model, not a copy, if the specification is not edited.
-
-    Args:
-        robot: The nominal robot.
-        hypothesis: Hypothesis in canonical form.
-        seed: As for ``build``.
-        edits: As for ``build``.
     """
     faults = hypothesis.spec_part.faults
     if not faults and not edits:
@@ -79,7 +74,7 @@ def apply_faults(
         model: The model as ``compile_model`` returns it; it is not changed.
         anatomy: The robot's parts.
         hypothesis: Hypothesis in canonical form.
-        seed: As for ``build``.
+        seed: Seed of the random parts of the faults.
     """
     embodiment = Embodiment.of(model, anatomy, seed)
     if not hypothesis.faults:
@@ -107,34 +102,18 @@ def _mean_inertia(model: MjModel, data: mujoco.MjData) -> float:
 
 
 def detached_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) -> frozenset[int]:
-    """Returns the ids of the bodies that a hypothesis detaches.
-
-    Args:
-        anatomy: The robot's parts.
-        model: Model with the robot's bodies.
-        hypothesis: The hypothesis.
-    """
-    names = (
-        name
-        for fault in hypothesis.faults
-        if fault.kind == BROKEN
-        for name in anatomy.joint(fault.part).bodies
-    )
-    return frozenset(int(model.body(name).id) for name in names)
+    """Returns the ids in a model of the bodies that a hypothesis detaches."""
+    broken = _joints_with((BROKEN,), anatomy, hypothesis)
+    return frozenset(int(model.body(name).id) for joint in broken for name in joint.bodies)
 
 
 def jammed_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) -> frozenset[int]:
-    """Returns the ids of the bodies at the joints that a hypothesis jams.
+    """Returns the ids in a model of the bodies at the joints that a hypothesis jams."""
+    jammed = _joints_with((JAMMED, JAMMED_AT_ANGLE), anatomy, hypothesis)
+    return frozenset(int(model.joint(one).bodyid[0]) for joint in jammed for one in joint.hinges)
 
-    Args:
-        anatomy: The robot's parts.
-        model: Model with the robot's hinges.
-        hypothesis: The hypothesis.
-    """
-    hinges = (
-        hinge
-        for fault in hypothesis.faults
-        if fault.kind in (JAMMED, JAMMED_AT_ANGLE)
-        for hinge in anatomy.joint(fault.part).hinges
-    )
-    return frozenset(int(model.joint(hinge).bodyid[0]) for hinge in hinges)
+
+def _joints_with(
+    kinds: Sequence[FaultKind], anatomy: Anatomy, hypothesis: Hypothesis
+) -> list[Joint]:
+    return [anatomy.joint(fault.part) for fault in hypothesis.faults if fault.kind in kinds]

@@ -60,21 +60,15 @@ def canonical(faults: Iterable[Fault], anatomy: Anatomy) -> Hypothesis:
     given = filter(None, (fault.canonical for fault in faults))
     for fault in sorted(given, key=lambda one: (one.kind, one.part if one.kind.is_single else "")):
         distinct.setdefault((fault.kind, "" if fault.kind.is_single else fault.part), fault)
+
+    def absorbs(one: Fault, other: Fault) -> bool:
+        return one is not other and one.kind.absorbs(one, other, anatomy)
+
     for key, fault in list(distinct.items()):
-        simpler = fault.canonical_alone
-        rest = [other for other in distinct.values() if other is not fault]
-        if simpler is not fault and not any(
-            simpler.kind.absorbs(simpler, other, anatomy) for other in rest
-        ):
+        simpler, others = fault.canonical_alone, distinct.keys() - {key}
+        if simpler is not fault and not any(absorbs(simpler, distinct[one]) for one in others):
             del distinct[key]
             distinct[simpler.kind, simpler.part] = simpler
-    kept = [
-        fault
-        for fault in distinct.values()
-        if not any(
-            other.kind.absorbs(other, fault, anatomy)
-            for other in distinct.values()
-            if other is not fault
-        )
-    ]
+    listed = distinct.values()
+    kept = (one for one in listed if not any(absorbs(other, one) for other in listed))
     return Hypothesis(tuple(sorted(kept)))

@@ -71,11 +71,7 @@ class HypothesisSpace:
         return cls(anatomy, applicable)
 
     def parse(self, text: str) -> Hypothesis:
-        """Returns the hypothesis of a notation; it may name ``kinds`` and all built-in kinds.
-
-        Raises:
-            InputError: See ``notation.parse``.
-        """
+        """Returns the hypothesis of a notation; it may name ``kinds`` and all built-in kinds."""
         return notation.parse(text, self.anatomy, notation_kinds(self.kinds))
 
     def canonical(self, faults: Iterable[Fault]) -> Hypothesis:
@@ -97,14 +93,13 @@ class HypothesisSpace:
         An observed fault takes the place of the levels of its kind and part.
         """
         known = {(fault.kind, fault.part) for fault in self.observed}
-        spaced = (
-            Fault(kind, part, levels[i])
+        spaced = [
+            Fault(kind, part, level)
             for kind in self.kinds
             for part in kind.parts(self.anatomy)
             if (kind, part) not in known
-            for levels in (kind.levels_at(self.anatomy, part),)
-            for i in _evenly_spaced(len(levels))
-        )
+            for level in _evenly_spaced(kind.levels_at(self.anatomy, part))
+        ]
         return (*spaced, *(fault for fault in self.observed if fault.kind in self.kinds))
 
     def decode(self, genome: FloatArray) -> Hypothesis:
@@ -146,11 +141,12 @@ class HypothesisSpace:
                 )
             parts, levels = fault.kind.parts(self.anatomy), self.levels(fault)
             nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
+            # The middle of an index's interval of [0, 1) is exact under int(value * count).
             gene[:] = (
                 0.75,
-                _interval_middle(self.kinds.index(fault.kind), len(self.kinds)),
-                _interval_middle(parts.index(fault.part), len(parts)),
-                _interval_middle(nearest, len(levels)),
+                (self.kinds.index(fault.kind) + 0.5) / len(self.kinds),
+                (parts.index(fault.part) + 0.5) / len(parts),
+                (nearest + 0.5) / len(levels),
             )
         return genome.ravel()
 
@@ -162,21 +158,15 @@ class HypothesisSpace:
 
     def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Returns the hypotheses with one coarse candidate added."""
-        return self._others(
-            hypothesis, [(*hypothesis.faults, fault) for fault in self.coarse_candidates]
-        )
+        more = [(*hypothesis.faults, fault) for fault in self.coarse_candidates]
+        return self._others(hypothesis, more)
 
     def with_one_replaced(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Returns the hypotheses with a coarse candidate in the place of one fault."""
         faults = hypothesis.faults
-        return self._others(
-            hypothesis,
-            [
-                (*faults[:i], *faults[i + 1 :], fault)
-                for i in range(len(faults))
-                for fault in self.coarse_candidates
-            ],
-        )
+        fewer = [(*faults[:i], *faults[i + 1 :]) for i in range(len(faults))]
+        replaced = [(*rest, fault) for rest in fewer for fault in self.coarse_candidates]
+        return self._others(hypothesis, replaced)
 
     def with_one_less(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Returns the hypotheses with one fault removed, or degenerated to a simpler kind."""
@@ -190,14 +180,6 @@ class HypothesisSpace:
         ]
         return self._others(hypothesis, [*fewer, *simpler])
 
-    def neighbours(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Returns the hypotheses that differ by one fault: one more, one replaced, one less."""
-        return (
-            self.with_one_more(hypothesis)
-            + self.with_one_replaced(hypothesis)
-            + self.with_one_less(hypothesis)
-        )
-
     def _others(
         self, hypothesis: Hypothesis, changed: Iterable[Sequence[Fault]]
     ) -> list[Hypothesis]:
@@ -206,12 +188,7 @@ class HypothesisSpace:
         return [other for other in distinct if other != hypothesis]
 
 
-def _evenly_spaced(count: int) -> Iterable[int]:
-    """Returns at most ``COARSE_LEVELS`` indices below ``count``, with the first and the last."""
-    indices = np.linspace(0, count - 1, COARSE_LEVELS).round().astype(int).tolist()
-    return dict.fromkeys(indices)
-
-
-def _interval_middle(index: int, count: int) -> float:
-    """Returns the middle of an index's interval of [0, 1), exact under ``int(value * count)``."""
-    return (index + 0.5) / count
+def _evenly_spaced(levels: Sequence[float]) -> list[float]:
+    """Returns at most ``COARSE_LEVELS`` of some levels, with the first and the last."""
+    indices = np.linspace(0, len(levels) - 1, COARSE_LEVELS).round().astype(int).tolist()
+    return [levels[i] for i in dict.fromkeys(indices)]

@@ -149,11 +149,9 @@ class WeakMotor(MotorFault):
 class DampedJoint(JointFault):
     """A joint whose viscous damping is scaled by a factor.
 
-    The severity is a factor from 0 to 100; 1 is nominal. A joint without damping in the model gets
-    ``factor - 1`` times the damping that slows it with a time constant of 1 s. The velocity gain of
-    a servo is no part of the damping. The search proposes larger damping only: smaller damping has
-    hardly an effect beside the velocity gain of a servo. A jammed joint, and a broken joint at or
-    before the joint, absorb its damping.
+    A joint without damping in the model gets ``factor - 1`` times the damping that slows it with a
+    time constant of 1 s. The search proposes larger damping only: smaller damping has hardly an
+    effect beside the velocity gain of a servo, which is no part of the damping.
     """
 
     def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -165,10 +163,8 @@ class DampedJoint(JointFault):
 class JointFriction(MotorFault):
     """A joint with dry friction, which stops it below a threshold of torque.
 
-    The severity is a fraction of the largest torque of the joint's motors, from 0 to 1, in addition
-    to the dry friction in the model; 0 is nominal. Only joints with motors have the fault. A jammed
-    joint, and a broken joint at or before the joint, absorb its friction. A weak motor does not
-    change it.
+    The severity is a fraction of the largest torque of the joint's motors, in addition to the dry
+    friction in the model. A weak motor does not change it.
     """
 
     def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -180,13 +176,10 @@ class JointFriction(MotorFault):
 class EncoderOffset(JointFault):
     """A joint whose encoder measures its angle plus a constant.
 
-    The severity is the measured minus the true angle from -1 to 1 rad; 0 is nominal. It shifts the
-    logged joint positions and the readings of the angle sensors of the joint. A prediction begins
-    at the true angle, which is the logged angle minus the offset. The servo has a measurement of
-    its own and is not affected. Faults of both encoder kinds at one joint add up.
-
-    A broken joint at or before the joint absorbs the fault; a jammed joint does not, because its
-    constant angle is measured with the offset.
+    The severity, the measured minus the true angle, shifts the logged joint positions and the
+    readings of the angle sensors of the joint. A prediction begins at the true angle, the logged
+    one minus the offset. The servo has a measurement of its own. Faults of both encoder kinds at
+    one joint add up. A jammed joint does not absorb the fault: its angle is measured with it.
     """
 
     def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
@@ -202,10 +195,8 @@ class EncoderOffset(JointFault):
 class EncoderSlip(EncoderOffset):
     """A joint whose encoder, which its servo uses, measures its angle plus a constant.
 
-    Under the same commands, the true angle is lower by the offset. A joint without a servo, such as
-    one with a torque motor, has an encoder offset only. Motors that move a jammed joint only have
-    no force, so both kinds are equal there. A weak motor scales the force that the slip adds, as
-    all of its force.
+    Under the same commands, the true angle is lower by the offset. A weak motor scales the force
+    that the slip adds, as all of its force.
     """
 
     def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
@@ -220,12 +211,9 @@ class EncoderSlip(EncoderOffset):
 
 
 class LostGrip(FaultKind):
-    """A foot whose sliding friction is scaled by a factor.
+    """A foot, what the last joint of a limb moves, whose sliding friction is scaled by a factor.
 
-    The severity is a factor from 0 to 1 of the friction of every contact of the foot; 1 is nominal.
-    The foot is what the last joint of a limb moves, and has the name of that joint. The friction of
-    the ground, ``friction``, applies to all feet, and the factor to what results. A broken joint at
-    or before the foot absorbs the fault.
+    The friction of the ground, ``friction``, applies to all feet, and the factor to what results.
     """
 
     def parts(self, anatomy: Anatomy) -> tuple[str, ...]:

@@ -107,12 +107,8 @@ class FaultKind:
     def edit_specification(self, spec: "MjSpec", fault: "Fault", seed: int) -> None:
         """Edits the robot's specification before it is compiled; by default, not at all.
 
-        It is for changes that a compiled model does not allow. The sizes of MjData stay.
-
-        Args:
-            spec: The specification, edited in place.
-            fault: A fault of this kind.
-            seed: Seed of the random parts.
+        It is for changes that a compiled model does not allow. The sizes of MjData stay. The seed
+        is that of the random parts.
         """
 
     def adapt_to_contacts(
@@ -120,10 +116,7 @@ class FaultKind:
     ) -> None:
         """Adapts an embodiment to a trial before its segments are predicted; by default, not.
 
-        Args:
-            embodiment: The embodiment, edited in place.
-            fault: A fault of this kind.
-            points: Contact points observed in the trial, ``(n, 3)``, world frame, m.
+        The points are contacts observed in the trial, ``(n, 3)``, world frame, m.
         """
 
     def contradicted(self, _fault: "Fault", behaviour: Behaviour) -> BoolArray:
@@ -156,7 +149,7 @@ class FaultKind:
     def degenerate_kinds(self) -> tuple["FaultKind", ...]:
         """Kinds that a fault of this kind degenerates to."""
         kinds = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
-        return tuple(dict.fromkeys(kind for kind in kinds if kind is not None))
+        return tuple(dict.fromkeys(filter(None, kinds)))
 
     @property
     def without_severity(self) -> "FaultKind":

@@ -42,19 +42,14 @@ def parse(
     faults = [_fault(term.strip(), text, anatomy, accepted) for term in text.split("+")]
     first: dict[tuple[str, str, str], Fault] = {}
     for fault in faults:
-        earlier = first.setdefault(_key(fault), fault)
+        kind, part = fault.kind, fault.part
+        earlier = first.setdefault((kind.keyword, part, kind.prefix), fault)
         if earlier.severity != fault.severity:
             raise InputError(
-                f"{text!r} gives {fault.kind.keyword}{':' if fault.part else ''}{fault.part} "
-                f"two severities, {earlier.severity!r} and {fault.severity!r}: keep one of "
-                f"the terms"
+                f"{text!r} gives {kind.keyword}{':' if part else ''}{part} two severities, "
+                f"{earlier.severity!r} and {fault.severity!r}: keep one of the terms"
             )
     return canonical(faults, anatomy)
-
-
-def _key(fault: Fault) -> tuple[str, str, str]:
-    """Returns the key of a fault; a hypothesis has at most one severity per key."""
-    return fault.kind.keyword, fault.part, fault.kind.prefix
 
 
 def _fault(term: str, text: str, anatomy: Anatomy, kinds: tuple[FaultKind, ...]) -> Fault:
@@ -70,7 +65,9 @@ def _fault(term: str, text: str, anatomy: Anatomy, kinds: tuple[FaultKind, ...])
     named = [kind for kind in kinds if kind.keyword == word]
     if not colon and ENVIRONMENT not in {part for kind in named for part in kind.parts(anatomy)}:
         raise _unreadable(term, text, kinds)
-    kind = _graded(term, named, value) if equals else _plain(named)
+    # Without a severity, the kind that has none, if any.
+    plain = next((kind for kind in named if kind.bounds is None), named[0])
+    kind = _graded(term, named, value) if equals else plain
     parts = kind.parts(anatomy)
     if part not in parts:
         if parts == (ENVIRONMENT,):
@@ -88,18 +85,9 @@ def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputErro
     )
 
 
-def _plain(named: list[FaultKind]) -> FaultKind:
-    """Returns the kind of a term without a severity, if any; otherwise the first kind."""
-    return next((kind for kind in named if kind.bounds is None), named[0])
-
-
 def _graded(term: str, named: list[FaultKind], value: str) -> FaultKind:
     """Returns the kind of a term with a severity, by the prefix of the severity."""
-    graded = sorted(
-        (kind for kind in named if kind.bounds),
-        key=lambda kind: len(kind.prefix),
-        reverse=True,
-    )
+    graded = sorted((kind for kind in named if kind.bounds), key=lambda kind: -len(kind.prefix))
     for kind in graded:
         if value.startswith(kind.prefix):
             return kind

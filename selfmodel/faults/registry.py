@@ -1,7 +1,7 @@
 """The fault kinds of selfmodel by name, their sets, and the failures of the paper's Table I."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 
 from selfmodel.faults.joints import (
     BROKEN,
@@ -22,9 +22,16 @@ from selfmodel.faults.sensors import (
     SENSOR_NOISE,
     SILENT_NEURON,
 )
-from selfmodel.faults.terrain import ROUGHNESS
-from selfmodel.faults.world import CROSSWIND, FRICTION, GROWN_DELAY, PAYLOAD, SLOPE, WIND
-from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
+from selfmodel.faults.world import (
+    CROSSWIND,
+    FRICTION,
+    GROWN_DELAY,
+    PAYLOAD,
+    ROUGHNESS,
+    SLOPE,
+    WIND,
+)
+from selfmodel.robot.anatomy import Anatomy, Joint
 
 KINDS: Mapping[str, FaultKind] = {
     kind.name: kind
@@ -72,14 +79,10 @@ def kind_names(names: str) -> str:
     Returns:
         Names of kinds, each once, separated by commas; unknown names are unchanged.
     """
-    given = (name.strip() for name in names.split(","))
-    return ",".join(
-        dict.fromkeys(
-            single
-            for name in given
-            for single in ([kind.name for kind in KIND_SETS[name]] if name in KIND_SETS else [name])
-        )
-    )
+    single: list[str] = []
+    for name in (each.strip() for each in names.split(",")):
+        single += [kind.name for kind in KIND_SETS[name]] if name in KIND_SETS else [name]
+    return ",".join(dict.fromkeys(single))
 
 
 def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:
@@ -90,21 +93,6 @@ def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:
     """
     named = [kind for each in kinds for kind in (each, *each.degenerate_kinds)]
     return tuple(dict.fromkeys((*KINDS.values(), *named)))
-
-
-@dataclass(frozen=True)
-class _Limb:
-    """A kinematic chain without branches, and its sensors.
-
-    Attributes:
-        joints: Joints, the one nearest to the root body first.
-        touch: Names of the touch sensors, the outermost first.
-        angle: Names of the angle sensors of the joints.
-    """
-
-    joints: tuple[Joint, ...]
-    touch: tuple[str, ...]
-    angle: tuple[str, ...]
 
 
 def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Mapping[int, str]:
@@ -123,61 +111,52 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
             whether the limb is a leg, such as ``reaches_ground``.
     """
     limbs = _limbs(anatomy)
-    limbs = [limb for limb in limbs if is_leg(limb.joints)] or limbs
-    by_number: dict[int, str | None] = dict.fromkeys(range(1, 9))
-    if limbs:
-        first, others = limbs[0], limbs[1:]
-        detached_limb = f"break:{first.joints[0].name}"
-        by_number[1] = f"break:{first.joints[-1].name}" if len(first.joints) > 1 else None
-        by_number[2] = detached_limb
-        by_number[3] = _failed(first.touch)
-        by_number[4] = _compound(
-            detached_limb, _failed(name for limb in others for name in limb.touch)
-        )
-        by_number[5] = _failed(first.angle)
-        by_number[6] = f"jam:{first.joints[0].name}"
-        # The paper jams the leg behind the detached leg, not the opposite leg.
-        jammed = next(iter(others[1:] or others), None)
-        by_number[7] = _compound(detached_limb, f"jam:{jammed.joints[0].name}" if jammed else None)
-        rest = [limb for limb in others if limb is not jammed and limb.angle]
-        by_number[8] = by_number[7] and _compound(
-            by_number[7], _failed(rest[-1].angle if rest else ())
-        )
-    cases = {number: notation for number, notation in by_number.items() if notation}
-    return cases | {9: "intact", 10: "neuron:0"}
+    limbs = [limb for limb in limbs if is_leg(limb)] or limbs
+    if not limbs:
+        return {9: "intact", 10: "neuron:0"}
+    first, *others = limbs
+    failed = partial(_failed_sensor, anatomy)
+    lost = f"break:{first[0].name}"
+    # The paper jams the leg behind the detached leg, not the opposite leg.
+    behind = next(iter(others[1:] or others), None)
+    jammed = behind and _compound(lost, f"jam:{behind[0].name}")
+    rest = [failed("angle", limb) for limb in others if limb is not behind]
+    by_number = {
+        1: f"break:{first[-1].name}" if len(first) > 1 else None,
+        2: lost,
+        3: failed("touch", first),
+        4: _compound(lost, next(filter(None, (failed("touch", limb) for limb in others)), None)),
+        5: failed("angle", first),
+        6: f"jam:{first[0].name}",
+        7: jammed,
+        8: jammed and _compound(jammed, next(filter(None, reversed(rest)), None)),
+        9: "intact",
+        10: "neuron:0",
+    }
+    return {number: notation for number, notation in by_number.items() if notation}
 
 
-def _limbs(anatomy: Anatomy) -> Sequence[_Limb]:
+def _limbs(anatomy: Anatomy) -> list[tuple[Joint, ...]]:
+    """Returns the joints of each limb, the one nearest to the root body first."""
     joints = {joint.name: joint for joint in anatomy.joints}
     beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
-    ends = [name for name in joints if not beyond[name]]
+    ends = {name for name in joints if not beyond[name]}
     limbs = []
-    for end in ends:
-        # A joint with two chain ends beyond it belongs to no limb.
-        chain = [n for n in joints if n == end or (end in beyond[n] and _is_chain(beyond, n))]
-        chain.sort(key=lambda name: -len(beyond[name]))
-        limbs.append(_limb([joints[name] for name in chain], anatomy.sensors))
-    return sorted(limbs, key=lambda limb: not limb.touch)  # stable
+    for end in joints:
+        if end in ends:
+            # A joint with two chain ends beyond it belongs to no limb.
+            chain = [one for one in joints if one == end or beyond[one] & ends == {end}]
+            chain.sort(key=lambda name: -len(beyond[name]))
+            limbs.append(tuple(joints[name] for name in chain))
+    return sorted(limbs, key=lambda limb: not _failed_sensor(anatomy, "touch", limb))  # stable
 
 
-def _is_chain(beyond: Mapping[str, frozenset[str]], name: str) -> bool:
-    return sum(not beyond[other] for other in beyond[name]) == 1
-
-
-def _limb(joints: Sequence[Joint], sensors: Iterable[Sensor]) -> _Limb:
-    own = [sensor for sensor in sensors if sensor.body in joints[0].bodies]
-    outwards = {s.name: sum(s.body in joint.bodies for joint in joints) for s in own}
-    touch = [sensor.name for sensor in own if sensor.kind == "touch"]
-    return _Limb(
-        joints=tuple(joints),
-        touch=tuple(sorted(touch, key=lambda name: -outwards[name])),  # stable
-        angle=tuple(sensor.name for sensor in own if sensor.kind == "angle"),
-    )
-
-
-def _failed(sensors: Iterable[str]) -> str | None:
-    first = next(iter(sensors), None)
-    return first and f"sensor:{first}"
+def _failed_sensor(anatomy: Anatomy, kind: str, limb: Sequence[Joint]) -> str | None:
+    """Returns the failure of a limb's first angle sensor, or outermost touch sensor."""
+    sensors = [one for one in anatomy.sensors if one.kind == kind and one.body in limb[0].bodies]
+    if kind == "touch":
+        sensors.sort(key=lambda one: -sum(one.body in joint.bodies for joint in limb))  # stable
+    return f"sensor:{sensors[0].name}" if sensors else None
 
 
 def _compound(first: str, second: str | None) -> str | None:

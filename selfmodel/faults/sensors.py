@@ -95,13 +95,7 @@ def _readings(fault: Fault, behaviour: Behaviour) -> FloatArray:
 
 
 def _reads_as_if_binary(fault: Fault, behaviour: Behaviour, value: float) -> BoolArray:
-    """Returns a mask of the steps with a reading of a sensor that reads 0 and 1 only, ``(steps,)``.
-
-    Args:
-        fault: A fault of the sensor.
-        behaviour: The log.
-        value: The reading, 0 or 1.
-    """
+    """Returns a mask of the steps with a reading, of a sensor that reads 0 and 1 only."""
     readings = _readings(fault, behaviour)
     is_known = np.isfinite(readings)
     if not np.isin(readings[is_known], (0.0, 1.0)).all():

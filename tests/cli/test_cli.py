@@ -62,7 +62,7 @@ def test_recover_prints_one_json_object_with_every_key(run: str, request: pytest
     assert (told["controller"], told["neurons"]) == ("network", 3)
     assert told["verdict"] in {"intact", "explained", "ambiguous", "unexplained"}
     if run == "recovered":
-        assert told["outside"] is None, "without a gap, a fault that is searched explains all"
+        assert told["unsearched"] is None, "without a gap, a fault that is searched explains all"
     assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
     assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
     stages = [trial["stage"] for trial in told["trials"]]

@@ -18,7 +18,7 @@ SUITE = ("suite", "run", "--domains", "walker,biped.xml", "--cases", "1,5", *TIN
 
 THEIRS = """
 from dataclasses import dataclass
-from selfmodel.comparators.forward_displacement import ForwardDisplacement
+from selfmodel.comparators.paper import ForwardDisplacement
 from selfmodel.errors import InputError
 
 @dataclass(frozen=True)

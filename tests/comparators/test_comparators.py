@@ -8,10 +8,8 @@ import pytest
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.losses import LossTable, simulate
+from selfmodel.diagnosis.losses import simulate
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
-from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
@@ -225,15 +223,6 @@ def segments(trial: Trial, horizon: int = 25) -> Segments:
 ENSEMBLE = Ensemble(("joint_positions",), members=4, level=0.05)
 
 
-def test_the_contract_kit_judges_requests_of_every_kind(logged_and_simulated: Both):
-    trial, _ = logged_and_simulated
-    steps = trial.behaviour.steps
-
-    check_comparator(Pieces(ClosedLoop(("joint_positions",))), trial, runs_of_shape(trial, steps))
-    check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 3, 26))
-    check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 4, steps))
-
-
 def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
 
@@ -283,16 +272,6 @@ def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
 
     with pytest.raises(ValueError, match=message):
         check_comparator(comparator, trial, runs_of_shape(trial, 300))
-
-
-def test_segments_are_given_their_commands_and_cannot_record_them(
-    quadruped: Robot, logged_and_simulated: Both
-):
-    trial, _ = logged_and_simulated
-    asks = replace(segments(trial), record=("joint_positions", "commands"))
-
-    with pytest.raises(InputError, match=r"'pieces' requested the signals .*'commands'.*, of "):
-        LossTable(Simulator(quadruped, 1), Pieces(asks)).losses([INTACT], [trial])
 
 
 def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated: Both):

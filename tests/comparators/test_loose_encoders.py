@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.comparators.encoders import LooseEncoders, loose_encoders, with_loose_encoders
 from selfmodel.trials.behaviour import Behaviour
-from tests.helpers.gaits import LEGS, changed, gait, logged
+from tests.helpers.gaits import LEGS, changed, gait
 
 HORIZON = 12
 STARTS = np.arange(0, 450, 50)
@@ -86,13 +85,6 @@ def test_an_encoder_that_follows_its_motor_with_a_lag_is_recognised(
         np.testing.assert_allclose(found.angles[..., 0], clean[rows], atol=1e-9)
 
 
-def test_an_encoder_may_follow_the_motor_of_another_joint():
-    found = one_loose(lagging(COMMANDS[:, 2], 2.0))
-
-    assert found is not None
-    assert found.hinges.tolist() == [0]
-
-
 @pytest.mark.parametrize(
     "angles",
     [
@@ -106,18 +98,6 @@ def test_an_encoder_may_follow_the_motor_of_another_joint():
 )
 def test_other_encoders_do_not_follow_commands(angles: Callable[[], np.ndarray]):
     assert one_loose(angles()) is None
-
-
-def test_an_encoder_with_gaps_is_recognised_by_its_known_rows():
-    angles = lagging(COMMANDS[:, 0], 3.0)
-    angles[200:400] = np.nan
-    found = one_loose(angles)
-
-    assert found is not None
-    assert np.isfinite(found.angles).all()
-    almost_all = lagging(COMMANDS[:, 0], 3.0)
-    almost_all[10:] = np.nan
-    assert one_loose(almost_all) is None
 
 
 def test_readings_derived_from_the_angle_follow_it_and_others_stay():
@@ -164,19 +144,3 @@ def test_predictions_change_only_for_hypotheses_that_detach_the_hinge(detached: 
         )
         np.testing.assert_array_equal(after["sensors"][0, ..., 1], loose.readings[..., 0])
     np.testing.assert_array_equal(after["base_position"], before["base_position"])
-
-
-def test_the_predictions_of_the_simulator_are_not_changed_in_place():
-    loose = one_loose(lagging(COMMANDS[:, 0], 3.0))
-    assert loose is not None
-    before = simulated(detached=True)
-    kept = before["joint_positions"].copy()
-    with_loose_encoders(before, loose)
-
-    np.testing.assert_array_equal(before["joint_positions"], kept)
-
-
-def test_a_trial_without_loose_encoders_is_compared_as_it_is():
-    prepared = SEGMENT_PREDICTION.prepare(logged(behaviour_of(*LOADED)))
-
-    assert prepared.loose is None

@@ -1,16 +1,33 @@
-"""Promises of how ``segment-prediction`` judges readings: what is sure, and what contradicts."""
+"""Promises of the readings and commands in segments: what is sure, what contradicts, and noise."""
+
+import dataclasses
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.comparators.encoders import encoder_motion_loss, logged_motion
-from selfmodel.comparators.readings import CONTRADICTION
+from selfmodel.comparators.readings import (
+    CONTRADICTION,
+    command_errors,
+    command_spans,
+    noise_level_loss,
+)
+from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.playback import Playback
+from selfmodel.faults.notation import parse
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
 from selfmodel.testing import shown
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import JOINTS
-from selfmodel.trials.signals import PREDICTION_ERROR_SCALES
+from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, SIGNALS
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
+from tests.helpers.memory import in_memory
 
 TOUCH = 0
 """The column of a sensor of touch."""
@@ -39,17 +56,6 @@ def test_a_touch_at_the_beginning_of_a_segment_is_judged_only_where_the_robot_st
     found = losses(walking, readings)
     assert found[0] > 0
     assert not found[1:].any()
-
-
-def test_an_angle_at_the_beginning_of_a_segment_is_judged_everywhere():
-    walking = gait()
-    sensors = walking["sensors"].copy()
-    sensors[:, TOUCH] = 0.4
-    graded = changed(walking, sensors=sensors)
-    readings = predicted(graded)
-    readings[:, 0, TOUCH] += 0.3
-
-    assert (losses(graded, readings) > 0).all()
 
 
 def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
@@ -103,14 +109,135 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, see
     assert not prepared.request.independent
 
 
-def test_a_sensor_that_was_never_observed_has_no_loss_whatever_is_predicted():
-    walking = gait()
-    sensors = walking["sensors"].copy()
-    sensors[:, TOUCH] = np.nan
-    unseen = changed(walking, sensors=sensors)
-    dead, noisy = predicted(walking), predicted(walking)
-    dead[..., 1], noisy[..., 1] = 0.5, 0.5  # an error of another sensor
-    dead[..., TOUCH] = 0
-    noisy[..., TOUCH] = np.random.default_rng(0).normal(size=noisy.shape[:2])
+STEPS = 60
 
-    np.testing.assert_array_equal(losses(unseen, dead), losses(unseen, noisy))
+
+def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
+    controller = random_controllers(robot, number + 1)[number]
+    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
+    return in_memory(robot)(physical, TrialPlan("t", "after", controller, STEPS, 0))
+
+
+def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
+    behaviour = one.behaviour
+    changed = {**{signal: behaviour[signal] for signal in SIGNALS}, **signals}
+    return dataclasses.replace(one, behaviour=Behaviour(behaviour.names, behaviour.time, changed))
+
+
+@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])
+def test_a_working_controller_has_errors_of_exactly_0_under_any_other_fault(
+    robot: Robot, truth: str
+):
+    one = trial(robot, truth.replace("front_left_knee", robot.anatomy.joints[0].name))
+
+    assert np.array_equal(command_errors(one), np.zeros((STEPS, len(robot.anatomy.motors))))
+
+
+def test_command_spans_are_relative_to_the_paper_s_range(quadruped: Robot):
+    one = trial(quadruped)
+    network = network_for(quadruped)
+    wide = dataclasses.replace(network, ranges=((0.0, np.pi / 2), *network.ranges[1:]))
+    driver = Controller(wide, one.plan.controller.genome)
+    other = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_spans(one), np.ones(8))
+    assert np.array_equal(command_spans(other), [2, *np.ones(7)])
+
+
+def test_a_silent_neuron_causes_errors_in_every_motor_at_once(robot: Robot):
+    errors = command_errors(trial(robot, "neuron:1"))
+
+    assert np.abs(errors[0]).max() > 0.01
+    assert np.all(np.abs(errors).max(axis=0) > 0.01)
+
+
+def test_a_wrong_command_is_the_error_at_its_step_and_motor(quadruped: Robot):
+    one = trial(quadruped)
+    commands = one.behaviour["commands"].copy()
+    commands[20, 3] += 0.25
+    errors = command_errors(with_signals(one, commands=commands))
+
+    assert errors[20, 3] == pytest.approx(0.25)
+    errors[20, 3] = 0
+    assert not errors.any()
+
+
+def test_errors_are_nan_from_the_first_unobserved_reading(quadruped: Robot):
+    one = trial(quadruped)
+    readings = one.behaviour["sensors"].copy()
+    readings[25, 2] = np.nan
+    errors = command_errors(with_signals(one, sensors=readings))
+
+    assert np.array_equal(errors[:25], np.zeros((25, len(quadruped.anatomy.motors))))
+    assert np.isnan(errors[25:]).all()
+
+
+def test_a_playback_has_errors_of_exactly_0(quadruped: Robot):
+    one = trial(quadruped, "neuron:0")
+    driver = Playback(quadruped.anatomy.motors, one.behaviour["commands"])
+    played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
+
+    assert np.array_equal(command_errors(played), np.zeros((STEPS, len(driver.motors))))
+
+
+SEGMENTS, ROWS, SENSORS = 80, 13, 4
+ALL = np.ones((1, SENSORS), dtype=bool)
+
+
+def moving(radians_per_step: float) -> np.ndarray:
+    """Readings of sensors that swing from end to end of their range, each out of step."""
+    step = np.arange(SEGMENTS)[:, np.newaxis] * 7.3 + np.arange(ROWS)
+    return np.sin(radians_per_step * step[..., np.newaxis] + np.arange(SENSORS))
+
+
+def noisy(readings: np.ndarray, *deviations: float, seed: int = 0) -> np.ndarray:
+    """The readings with noise."""
+    return readings + np.random.default_rng(seed).normal(size=readings.shape) * deviations
+
+
+def loss(predicted: np.ndarray, logged: np.ndarray, graded: np.ndarray = ALL) -> float:
+    """Of one prediction."""
+    return float(noise_level_loss(predicted[np.newaxis], logged, graded)[0])
+
+
+@given(st.integers(0, 99), st.floats(0, 0.8))
+def test_a_prediction_that_trembles_as_the_log_does_is_at_0(seed: int, deviation: float):
+    logged = noisy(moving(0.1), 0, 0, 0, deviation, seed=seed)
+
+    assert loss(logged, logged) == 0
+
+
+@pytest.mark.parametrize("deviation", [0.2, 0.3, 0.6])
+def test_the_right_noise_of_the_right_sensor_is_nearest(deviation: float):
+    logged = noisy(moving(0.1), 0.05, 0.05, 0.05 + deviation, 0.05)
+    predicted = {
+        "right": noisy(moving(0.1), 0, 0, deviation, 0, seed=1),
+        "none": moving(0.1),
+        "twice": noisy(moving(0.1), 0, 0, 2 * deviation, 0, seed=1),
+        "other": noisy(moving(0.1), 0, 0, 0, deviation, seed=1),
+    }
+    losses = {name: loss(one, logged) for name, one in predicted.items()}
+
+    assert losses["right"] < losses["none"] / 2
+    assert losses["right"] < losses["twice"] / 2
+    assert losses["none"] < losses["other"]
+
+
+@pytest.mark.parametrize("radians_per_step", [0.02, 0.3, 0.6])
+def test_a_joint_that_swings_alone_is_no_noisy_one_up_to_ten_steps_a_swing(
+    radians_per_step: float,
+):
+    logged = moving(radians_per_step)
+    logged[..., 1:] = 0
+
+    assert loss(np.zeros((SEGMENTS, ROWS, SENSORS)), logged) == 0
+
+
+def test_what_was_not_received_does_not_count():
+    whole = noisy(moving(0.1), 0.05, 0.05, 0.4, 0.05)
+    holes = whole.copy()
+    holes[::2, :, 2] = np.nan
+    never = np.full_like(whole, np.nan)
+
+    assert loss(moving(0.1), holes) == pytest.approx(loss(moving(0.1), whole), rel=0.1)
+    assert loss(moving(0.1), never) == 0

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from selfmodel.diagnosis.problem import LossFunction, Problem
+from selfmodel.diagnosis.losses import LossFunction, Problem
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.settings import Settings
 
 HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
 
@@ -36,8 +37,8 @@ class Synthetic(Problem):
         hinges: HingeLosses | None = None,
         hinges_before: HingeLosses | None = None,
     ) -> None:
-        self.space, self.max_faults, self.kept = space, most, 10
-        self.trials = self.healthy_trials = ()
+        self.space, self.settings, self.has_test = space, Settings(genes=most), True
+        self.trials, self.healthy_trials, self._observed_comparable = ["damaged"], [], ["healthy"]
         self.losses = losses
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
@@ -48,10 +49,6 @@ class Synthetic(Problem):
         """Returns the given losses."""
         return self._before(hypotheses) if self._before else None
 
-    def healthy_of_joint(self, joint: str, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        """Returns the given losses of a joint."""
-        return self._of_joint(joint, hypotheses, "healthy")
-
     def _by_hinge(self, hypotheses: Sequence[Hypothesis], trials: object) -> np.ndarray | None:
-        given = self._hinges_before if trials == "healthy" else self._hinges
+        given = self._hinges_before if trials == ["healthy"] else self._hinges
         return given(hypotheses) if given else None

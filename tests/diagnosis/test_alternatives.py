@@ -8,19 +8,16 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparators import SEGMENT_PREDICTION, SENSOR_SERIES
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.alternatives import (
+from selfmodel.diagnosis.diagnosis import DetectableSeverity, UnsearchedFault
+from selfmodel.diagnosis.losses import LossFunction
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
+from selfmodel.diagnosis.verdict import (
     detectable_severities,
     indistinguishable,
     undetectable,
     unsearched_fault,
 )
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, UnsearchedFault
-from selfmodel.diagnosis.problem import LossFunction
-from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
-from selfmodel.diagnosis.text import verdict_sentences
 from selfmodel.faults import BROKEN, FRICTION, ROUGHNESS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -31,12 +28,10 @@ from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS
 from selfmodel.faults.world import PAYLOAD
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.diagnosis.synthetic import Synthetic
-from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
 PIECES = 60
@@ -81,13 +76,6 @@ def test_neighbours_that_predict_as_well_are_indistinguishable_and_others_are_no
     assert named(found) == [f"{BREAK}+sensor:back_left_touch", f"{BREAK}+{JAM}"]
 
 
-def test_a_single_fault_in_the_place_of_two_is_a_neighbour():
-    best = f"{BREAK}+{TOUCH}"
-    losses = of({best: 1.0, JAM: 1.0}, otherwise=2.0)
-
-    assert named(indistinguishable(said(best), Synthetic(PAPER, losses))) == [JAM]
-
-
 def test_the_same_faults_at_another_severity_are_no_alternative_and_others_are_fitted():
     space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
     best = said("friction=0.4")
@@ -113,10 +101,6 @@ def test_the_same_faults_at_another_severity_are_no_alternative_and_others_are_f
     assert found.faults[0].severity == pytest.approx(0.37, abs=0.021)
 
 
-def test_nothing_is_indistinguishable_from_intact():
-    assert indistinguishable(INTACT, Synthetic(PAPER, of({}))) == []
-
-
 def test_an_alternative_that_corrects_model_error_or_misses_a_joint_is_none():
     best = said(f"motor:{KNEE}=0.4")
     space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
@@ -140,16 +124,6 @@ def test_a_fault_that_makes_no_difference_is_undetectable_and_one_that_makes_one
     losses = of({"intact": 1.0, TOUCH: 1.0, BREAK: 0.5}, otherwise=2.0)
 
     assert named(undetectable(INTACT, Synthetic(PAPER, losses))) == [TOUCH]
-
-
-def test_undetectable_faults_are_sorted_and_each_is_one_more():
-    # The difference is below NEGLIGIBLE_LOSS.
-    more = {f"{BREAK}+sensor:back_left_touch": 1.0, f"{BREAK}+{JAM}": 1 - 1e-7}
-    losses = of({BREAK: 1.0, **more}, otherwise=2.0)
-
-    found = undetectable(said(BREAK), Synthetic(PAPER, losses))
-
-    assert named(found) == list(more)[::-1]
 
 
 @pytest.mark.parametrize("means", [{"intact": 1.0}, {}])
@@ -203,10 +177,6 @@ def test_beside_an_exact_or_diverged_hypothesis_no_unsearched_fault_is_simulated
     assert unsearched_fault(INTACT, problem) is None
 
 
-def test_without_comparable_healthy_trials_no_unsearched_fault_is_simulated():
-    assert unsearched_fault(INTACT, Synthetic(PAPER, of({}), coarse=never)) is None
-
-
 def test_only_unsearched_kinds_are_asked_about_and_none_that_reshapes_the_model():
     asked: set[Hypothesis] = set()
 
@@ -224,12 +194,6 @@ def test_only_unsearched_kinds_are_asked_about_and_none_that_reshapes_the_model(
     # A sensor gain replaces the failed sensor; all other faults are added to it.
     assert said("sensor:back_left_angle=gain0.5") in asked
     assert all(best.faults[0] in one.faults or len(one) == 1 for one in asked)
-
-
-def test_with_all_kinds_searched_nothing_is_unsearched():
-    space = HypothesisSpace(ANATOMY, ALL_KINDS)
-
-    assert unsearched_fault(INTACT, Synthetic(space, of({}), before=of({}))) is None
 
 
 NOISE = np.random.default_rng(0).normal(0, 0.1, 40)
@@ -275,31 +239,6 @@ def test_the_bisection_finds_the_same_severity_as_a_scan_of_the_levels(limit: fl
     assert row.below == expected
 
 
-def test_a_bisection_asks_for_few_of_the_severities():
-    asked: set[Hypothesis] = set()
-    of = with_effect(shows(KNEE, 0.25, 1.0))
-
-    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        asked.update(hypotheses)
-        return of(hypotheses)
-
-    space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
-    detectable_severities(INTACT, space, losses)
-    own = {one for one in asked if any(fault.part == KNEE for fault in one.faults)}
-
-    assert 0 < len(own) <= np.ceil(np.log2(len(WEAK_MOTOR.levels_at(ANATOMY, KNEE)) + 2))
-
-
-def test_both_sides_of_a_nominal_severity_have_a_limit():
-    slope = KINDS["slope"]
-    rows = limits(shows(ENVIRONMENT, 0.1, 0.0), slope)
-    levels = slope.levels_at(ANATOMY, ENVIRONMENT)
-
-    assert [(one.kind, one.part) for one in rows] == [("slope", ENVIRONMENT)]
-    assert rows[0].above == min(level for level in levels if level >= 0.1)
-    assert rows[0].below == max(level for level in levels if level <= -0.1)
-
-
 @pytest.mark.parametrize("true", [0.5, 0.8])
 def test_the_nominal_friction_is_the_level_with_the_smallest_loss(true: float):
     """The model has its own friction, which no severity of the kind is nominal for."""
@@ -318,30 +257,11 @@ def test_the_nominal_friction_is_the_level_with_the_smallest_loss(true: float):
     assert row.above == min((one for one in levels if one >= nominal + 0.19), default=None)
 
 
-def test_parts_with_a_fault_are_left_out():
-    faulty = Hypothesis((Fault(WEAK_MOTOR, KNEE, 0.5),))
-    parts = [one.part for one in limits(shows(KNEE, 0.25, 1.0), WEAK_MOTOR, best=faulty)]
-
-    assert len(parts) == 7
-    assert KNEE not in parts
-
-
 def test_kinds_without_a_severity_and_kinds_that_edit_the_specification_are_left_out():
     assert limits(shows(KNEE, 0.25, 1.0), JAMMED, BROKEN) == []
     assert limits(shows(KNEE, 0.25, 1.0), KINDS["roughness"]) == []
     parts = [(one.kind, one.part) for one in limits(shows(KNEE, 0.25, 1.0), JAMMED, PAYLOAD)]
     assert parts == [("payload", part) for part in PAYLOAD.parts(ANATOMY)]
-
-
-def test_a_severity_that_diverges_shows_and_a_best_that_diverges_shows_nothing():
-    rows = limits(lambda fault: np.inf if fault.severity < 0.5 else 0.0, WEAK_MOTOR)
-    assert {one.below for one in rows} == {
-        max(level for level in WEAK_MOTOR.levels_at(ANATOMY, KNEE) if level < 0.5)
-    }
-
-    space = HypothesisSpace.of([WEAK_MOTOR], ANATOMY)
-    rows = detectable_severities(INTACT, space, lambda many: np.full((len(many), 40), np.inf))
-    assert {one.below for one in rows} == {None}
 
 
 def test_only_losses_clearly_worse_than_the_best_show():
@@ -369,56 +289,3 @@ def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return in_memory(robot)(physical, plan)
-
-
-def diagnosed(robot: Robot, truth: str, gait: Controller) -> Diagnosis:
-    search = DiagnosticSearch(
-        Simulator(robot, 1),
-        SEGMENT_PREDICTION,
-        SMALL,
-        healthy_trials=[trial(robot, "intact", gait, "before", 0)],
-    )
-    after = [trial(robot, truth, gait, "after", 1)]
-    return search(after, [], np.random.default_rng(0), lambda _: None)
-
-
-@pytest.mark.parametrize(
-    ("truth", "kind"),
-    [
-        ("wind=30", "wind"),
-        pytest.param("sensor:back_left_angle=gain0.3", "sensor-gain", marks=pytest.mark.search),
-        pytest.param("intact", None, marks=pytest.mark.search),
-    ],
-)
-def test_a_weak_failure_of_another_kind_is_unexplained_and_named_across_a_gap(
-    quadruped: Robot, truth: str, kind: str | None
-):
-    found = diagnosed(quadruped, truth, random_controllers(quadruped, 5)[2])
-
-    assert (found.verdict == "unexplained") == (kind is not None)
-    assert (found.unsearched.kind if found.unsearched else None) == kind
-    told = verdict_sentences(found)
-    assert told.startswith(
-        f"Unexplained: {found.unsearched.hypothesis}" if found.unsearched else "Intact"
-    )
-    assert (f"add {kind} to --kinds" in told) == (kind is not None)
-    assert all(fault.kind in PAPER_KINDS for one in found.ranked for fault in one.hypothesis.faults)
-
-
-@pytest.mark.search
-def test_comparators_of_whole_trials_ask_for_nothing_outside(quadruped: Robot):
-    gait = random_controllers(quadruped, 5)[2]
-    search = DiagnosticSearch(
-        Simulator(quadruped, 1),
-        SENSOR_SERIES,
-        dataclasses.replace(SMALL, steps=300),
-        healthy_trials=[trial(quadruped, "intact", gait, "before", 0)],
-    )
-    found = search(
-        [trial(quadruped, "wind=30", gait, "after", 1)],
-        [],
-        np.random.default_rng(0),
-        lambda _: None,
-    )
-
-    assert found.unsearched is None

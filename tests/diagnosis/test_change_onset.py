@@ -75,15 +75,6 @@ def test_a_jam_in_the_middle_of_a_trial_is_found_and_dated(
     assert abs(found.change.time - onset) <= 0.2
 
 
-def test_a_robot_that_jams_in_the_middle_of_a_trial_is_explained(
-    quadruped: Robot, gait: Controller
-):
-    healthy = trial(quadruped, gait, "intact")
-    damaged = glued(healthy, trial(quadruped, gait, JAM), 120)
-
-    assert diagnosed(quadruped, damaged, intact=(healthy,)).verdict == "explained"
-
-
 def test_a_jam_in_the_second_of_three_trials_is_dated_in_that_trial(
     quadruped: Robot, gait: Controller
 ):

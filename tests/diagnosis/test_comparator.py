@@ -60,16 +60,6 @@ def test_the_best_comparator_is_the_first_that_the_trial_allows(
     assert ("all signals" in chosen.reason) == (not lost)
 
 
-def test_several_trials_have_the_best_comparator_that_all_allow(robot: Robot, trial: Trial):
-    blind, slow = without(trial, BASE, "a.mcap"), without(trial, VELOCITIES, "b.mcap")
-
-    assert best_comparator(PREFERENCE, robot, [trial, blind]).comparator.name == ONBOARD
-    chosen = best_comparator(PREFERENCE, robot, [trial, blind, slow])
-    assert chosen.comparator.name == NOISY
-    assert f"a.mcap: {SEGMENTS} needs base_position" in chosen.reason
-    assert f"b.mcap: {ONBOARD} needs joint_velocities" in chosen.reason
-
-
 def test_a_given_comparator_is_refused_with_each_log_s_signal_and_with_one_that_can_judge(
     robot: Robot, trial: Trial
 ):
@@ -108,20 +98,6 @@ def test_the_preferred_comparators_can_judge_all_that_any_other_can(
     except TrialRefusedError:
         return
     best_comparator(PREFERENCE, robot, [rest])
-
-
-def test_an_absurd_number_is_refused_and_no_reason_for_another_comparator(
-    robot: Robot, trial: Trial
-):
-    positions = trial.behaviour["base_position"].copy()
-    positions[7] = 1e9
-    signals = {**trial.behaviour.signals, "base_position": positions}
-    absurd = dataclasses.replace(
-        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
-    )
-
-    with pytest.raises(InputError, match="base_position"):
-        best_comparator(PREFERENCE, robot, [absurd])
 
 
 def test_an_error_of_a_third_party_s_comparator_is_a_refusal(robot: Robot, trial: Trial):

@@ -44,21 +44,6 @@ def test_a_joint_that_stands_within_its_noise_while_commanded_is_named(quadruped
     assert found.commands_without_effect == quadruped.anatomy.joint(KNEE).motors
 
 
-def test_a_joint_that_stands_because_it_is_not_commanded_is_no_command_without_effect(
-    quadruped: Robot,
-):
-    found = evidence(quadruped, 0.3, commanded=0.0)
-
-    assert {one.joint for one in found.joints if one.motion == "stands"} == {KNEE}
-    assert not found.commands_without_effect
-
-
-def test_a_knee_that_swings_a_sixth_of_a_radian_moves(quadruped: Robot):
-    found = evidence(quadruped, 0.085 * np.sin(np.arange(STEPS) * 0.1))
-
-    assert {one.motion for one in found.joints} == {"moves"}
-
-
 @pytest.mark.parametrize("deviation", [0.01, 0.02, 0.05])
 def test_noise_neither_hides_a_swing_of_twice_its_deviation_nor_makes_one(
     quadruped: Robot, deviation: float

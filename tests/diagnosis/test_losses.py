@@ -6,37 +6,38 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
-from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES
+from selfmodel.comparators import (
+    FORWARD_DISPLACEMENT,
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+    SENSOR_SERIES,
+)
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.losses import LossTable, contradiction_losses, observed_jams
+from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
-from selfmodel.faults import BROKEN
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.simulation import rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
-from tests.helpers.hostile import exploding
+from tests.helpers.gaits import changed
+from tests.helpers.hostile import exploding, lacking
 from tests.helpers.memory import in_memory
 
 STEPS = 60
-SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=600)
-TINY = dataclasses.replace(Settings().scaled(12), generations=2, steps=STEPS)
-TEXTS = ("intact", "jam:back_left_knee", "break:front_left_knee")
-
+KNEE = "front_left_knee"
 CLOSED_LOOP = ClosedLoop(("base_position",))
 
 
@@ -80,42 +81,54 @@ class CountingSimulator(Simulator):
 
 @dataclasses.dataclass(frozen=True)
 class Plain:
-    """A comparator with a given request and given distances."""
+    """A comparator with a given request, and given distances or losses."""
 
     asks: Request = CLOSED_LOOP
     gives: Callable[[int], object] = np.ones
+    has_pieces: bool = False
     name: str = "plain"
 
-    def prepare(self, _trial: Trial) -> Prepared:
+    def prepare(self, _trial: Trial) -> Prepared | PreparedPieces:
         """Prepares with both."""
-        return Prepared(self.asks, self._given)
+        return (PreparedPieces if self.has_pieces else Prepared)(self.asks, self._given)
 
     def _given(self, simulated: Behaviour) -> object:
         return self.gives(len(next(iter(simulated.signals.values()))))
 
 
-@dataclasses.dataclass(frozen=True)
-class InPieces(Plain):
-    """The same, with losses."""
-
-    def prepare(self, _trial: Trial) -> PreparedPieces:
-        """Prepares with both."""
-        return PreparedPieces(self.asks, self._given)
+def in_pieces(gives: Callable[[int], object]) -> Plain:
+    return Plain(gives=gives, has_pieces=True)
 
 
-@pytest.fixture(scope="module")
-def trials(quadruped: Robot) -> list[Trial]:
-    """Two trials, each with a controller of its own."""
-    damaged = SimulatedRobot(quadruped, parse("break:front_left_knee", quadruped.anatomy))
+def jammed(robot: Robot, *steps: int) -> list[Trial]:
+    """Trials of a jammed robot, each with a controller of its own."""
+    damaged = SimulatedRobot(robot, parse(f"jam:{KNEE}", robot.anatomy))
+    gaits = random_controllers(robot, 1 + len(steps))[1:]
     return [
-        in_memory(quadruped)(damaged, TrialPlan(f"{k}", "after", controller, STEPS, 0))
-        for k, controller in enumerate(random_controllers(quadruped, 3)[1:])
+        in_memory(robot)(damaged, TrialPlan(f"{k}", "after", gait, count, 0))
+        for k, (gait, count) in enumerate(zip(gaits, steps, strict=True))
     ]
 
 
 @pytest.fixture(scope="module")
+def trials(quadruped: Robot) -> list[Trial]:
+    return jammed(quadruped, STEPS, STEPS)
+
+
+@pytest.fixture(scope="module")
+def long(quadruped: Robot) -> list[Trial]:
+    return jammed(quadruped, 240, 180)
+
+
+@pytest.fixture(scope="module")
+def table(quadruped: Robot) -> LossTable:
+    return LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+
+
+@pytest.fixture(scope="module")
 def three(quadruped: Robot) -> list[Hypothesis]:
-    return [parse(text, quadruped.anatomy) for text in TEXTS]
+    texts = ("intact", "break:back_left_knee", f"jam:{KNEE}")
+    return [parse(text, quadruped.anatomy) for text in texts]
 
 
 REQUESTS = [
@@ -127,62 +140,31 @@ REQUESTS = [
 
 
 @pytest.mark.parametrize("comparator", REQUESTS)
-def test_losses_are_the_same_in_small_batches(
+def test_losses_are_the_same_in_small_batches_and_nothing_is_simulated_twice(
     comparator: Comparator,
     quadruped: Robot,
     trials: list[Trial],
     three: list[Hypothesis],
     monkeypatch: pytest.MonkeyPatch,
 ):
-    whole = LossTable(Simulator(quadruped, 1), comparator).losses(three, trials)
-    request = comparator.prepare(trials[0]).request
-    needed = hypothesis_bytes(quadruped, request, STEPS)
+    whole = LossTable(Simulator(quadruped, 1), comparator)
+    losses = [whole.losses(three, [trial]) for trial in trials]
+    needed = hypothesis_bytes(quadruped, comparator.prepare(trials[0]).request, STEPS)
     monkeypatch.setattr(rollout, "batch_bytes", lambda: 2 * needed)
-    small = CountingSimulator(quadruped)
-    batched = LossTable(small, comparator).losses(three, trials)
-
-    assert small.calls == 2 * len(trials)
-    assert np.array_equal(whole, batched)
-
-
-@pytest.mark.parametrize("comparator", REQUESTS)
-def test_nothing_is_simulated_twice(
-    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
-):
     simulator = CountingSimulator(quadruped)
-    evidence = LossTable(simulator, comparator)
-    evidence.distances([*three[:2], three[0]], trials[:1])
-    evidence.losses(three, trials)
-    evidence.distances(three[::-1], trials[::-1])
+    batched = LossTable(simulator, comparator)
 
-    assert set(simulator.times.values()) == {1}
+    assert np.array_equal(batched.losses(three, trials), np.concatenate(losses, axis=1))
+    assert simulator.calls == 2 * len(trials)
+    distances = batched.distances([*three[::-1], three[0]], trials)
+    assert np.array_equal(distances[2::-1], sum(one.mean(axis=1) for one in losses))
+    batched.by_hinge(three, trials)
+    batched.by_signal(INTACT, trials)
     assert len(simulator.times) == len(three) * len(trials)
-    assert {hypothesis for hypothesis, _ in simulator.times} == set(three)
+    assert set(simulator.times.values()) == {1}
 
 
-@pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SENSOR_SERIES, SEGMENT_PREDICTION])
-def test_a_hypothesis_that_was_only_probed_is_not_simulated_again_and_not_ranked(
-    comparator: Comparator, quadruped: Robot, trials: list[Trial]
-):
-    # The truth with a failed sensor, of a kind that is not searched: nearly as close as the truth.
-    probed = parse("break:front_left_knee+sensor:back_left_touch", quadruped.anatomy)
-    simulator = CountingSimulator(quadruped)
-    search = DiagnosticSearch(simulator, comparator, TINY, [BROKEN])
-    search.losses.losses([probed], trials)
-    found = search(trials, [], np.random.default_rng(0), lambda _: None)
-
-    assert [n for (one, _), n in simulator.times.items() if one == probed] == [1] * len(trials)
-    assert probed not in {candidate.hypothesis for candidate in found.ranked}
-    assert probed not in found.indistinguishable
-    assert (
-        found.ranked
-        == DiagnosticSearch(Simulator(quadruped, 1), comparator, TINY, [BROKEN])(
-            trials, [], np.random.default_rng(0), lambda _: None
-        ).ranked
-    )
-
-
-def test_a_trial_is_prepared_once_and_its_opening_is_another_trial(
+def test_a_trial_is_known_by_its_content_and_prepared_once(
     quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
 ):
     times: Counter = Counter()
@@ -191,81 +173,23 @@ def test_a_trial_is_prepared_once_and_its_opening_is_another_trial(
         name = "counting"
 
         def prepare(self, trial: Trial) -> PreparedTrial:
-            times[trial.path, trial.behaviour.steps] += 1
+            times[trial.behaviour.steps] += 1
             return SENSOR_SERIES.prepare(trial)
 
-    opening = dataclasses.replace(trials[0], behaviour=trials[0].behaviour.first(STEPS // 2))
-    evidence = LossTable(Simulator(quadruped, 1), Counting())
-    whole, part = evidence.losses(three, trials[:1]), evidence.losses(three, [opening])
-    evidence.check(trials)
-    evidence.losses(three, [*trials, opening])
-
-    assert whole.shape[1] > part.shape[1]
-    assert times == {
-        (trials[0].path, STEPS): 1,
-        (trials[1].path, STEPS): 1,
-        (trials[0].path, STEPS // 2): 1,
-    }
-
-
-@pytest.mark.parametrize("comparator", REQUESTS)
-def test_the_distance_is_the_sum_over_the_trials_of_the_mean_over_the_pieces(
-    comparator: Comparator, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
-):
-    evidence = LossTable(Simulator(quadruped, 1), comparator)
-    losses = [evidence.losses(three, [trial]) for trial in trials]
-    together = evidence.losses(three, trials)
-
-    assert np.array_equal(together, np.concatenate(losses, axis=1))
-    assert np.array_equal(
-        evidence.distances(three, trials), sum(one.mean(axis=1) for one in losses)
+    trial, simulator = trials[0], CountingSimulator(quadruped)
+    table = LossTable(simulator, Counting())
+    opening = dataclasses.replace(trial, behaviour=trial.behaviour.first(STEPS // 2))
+    position = trial.behaviour["base_position"] + np.linspace(0, 5, STEPS)[:, np.newaxis]
+    elsewhere = dataclasses.replace(
+        trial, behaviour=changed(trial.behaviour, base_position=position)
     )
-    assert not np.array_equal(losses[0], losses[1]) or isinstance(comparator, Plain)
+    first = table.losses(three, [trial])
 
-
-@pytest.mark.search
-def test_a_diagnosis_simulates_nothing_twice_and_ranks_nothing_that_is_not_considered(
-    quadruped: Robot,
-):
-    gait = random_controllers(quadruped, 6)[5]
-    after, before = (
-        in_memory(quadruped)(
-            SimulatedRobot(quadruped, parse(truth, quadruped.anatomy)),
-            TrialPlan(stage, stage, gait, SMALL.steps, 0),
-        )
-        for truth, stage in (("friction=0.3", "after"), ("intact", "before"))
-    )
-    simulator = CountingSimulator(quadruped)
-    search = DiagnosticSearch(
-        simulator, SEGMENT_PREDICTION, SMALL, PAPER_KINDS, healthy_trials=[before]
-    )
-    found = search([after], [], np.random.default_rng(0), lambda _: None)
-
-    assert found.unsearched is not None
-    assert found.unsearched.kind == "friction"
-    assert max(simulator.times.values()) == 1
-    simulated = {hypothesis for hypothesis, _ in simulator.times}
-    considered = {
-        one for one in simulated if {fault.kind for fault in one.faults} <= {*PAPER_KINDS}
-    }
-    assert search.distinct_hypotheses <= len(considered) < len(simulated)
-
-
-def test_a_trial_is_known_by_its_content_and_not_by_its_path(
-    quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
-):
-    simulator = CountingSimulator(quadruped)
-    table = LossTable(simulator, FORWARD_DISPLACEMENT)
-    first = table.losses(three, trials[:1])
-    signals = dict(trials[0].behaviour.signals)
-    signals["base_position"] = signals["base_position"] + np.linspace(0, 5, STEPS)[:, np.newaxis]
-    moved = dataclasses.replace(trials[0].behaviour, signals=signals)
-
-    renamed = dataclasses.replace(trials[0], path="elsewhere")
-    assert np.array_equal(table.losses(three, [renamed]), first)
-    assert set(simulator.times.values()) == {1}
-    elsewhere = table.losses([INTACT], [dataclasses.replace(trials[0], behaviour=moved)])
-    assert elsewhere[0, 0] != first[0, 0]
+    assert np.array_equal(table.losses(three, [dataclasses.replace(trial, path="copy")]), first)
+    assert table.losses(three, [opening]).shape[1] < first.shape[1]
+    assert set(simulator.times.values()) == {2}, "the opening is another trial"
+    assert times == {STEPS: 1, STEPS // 2: 1}
+    assert not np.array_equal(table.losses([INTACT], [elsewhere])[0], first[0])
 
 
 @pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SEGMENT_PREDICTION, SENSOR_SERIES])
@@ -274,43 +198,30 @@ def test_a_hypothesis_that_diverges_is_infinitely_far_and_harms_no_other(
 ):
     alone = LossTable(Simulator(quadruped, 1), comparator).losses([INTACT], trials)
     simulator = Simulator(quadruped, 1)
-    bad = exploding(simulator, "jam:front_left_knee")
-    evidence = LossTable(simulator, comparator)
-    losses = evidence.losses([bad, INTACT], trials)
+    bad = exploding(simulator, f"jam:{KNEE}")
+    table = LossTable(simulator, comparator)
+    losses, hinges = table.losses([bad, INTACT], trials), table.by_hinge([bad, INTACT], trials)
 
     assert simulator.stats.diverged == len(trials)
     assert np.all(np.isinf(losses[0]))
     assert np.array_equal(losses[1:], alone)
-    assert evidence.distances([bad], trials) == np.inf
-
-
-def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: list[Trial]):
-    class Preparing:
-        name = "nothing"
-
-        def prepare(self, _trial: Trial) -> None:
-            """Prepares nothing."""
-
-    with pytest.raises(InputError, match="'nothing' prepared None, which has no request"):
-        LossTable(Simulator(quadruped, 1), Preparing()).check(trials)
+    assert table.distances([bad], trials) == np.inf
+    assert table.by_signal(bad, trials) == {}
+    assert (hinges is None) == (comparator is not SEGMENT_PREDICTION)
+    assert hinges is None or (np.isinf(hinges[0]).all() and np.isfinite(hinges[1]).all())
 
 
 @pytest.mark.parametrize(
     ("comparator", "message"),
     [
         (Plain(gives=lambda _: 1.0), r"returned losses \(1,\) for 2 simulations"),
-        (Plain(gives=lambda n: np.ones((n, 1))), r"returned losses \(2, 1, 1\) for 2"),
         (Plain(gives=lambda n: np.full(n, -1.0)), "not a number of at least 0"),
         (Plain(gives=lambda n: np.full(n, np.nan)), "not a number of at least 0"),
-        (
-            InPieces(gives=lambda n: Losses(np.ones((n, 3)), {}, np.ones((n, 3)))),
-            "losses of hinges",
-        ),
-        (InPieces(gives=np.ones), r"returned losses \(2,\) for 2 simulations"),
-        (InPieces(gives=lambda n: np.ones((n + 1, 3))), r"returned losses \(3, 3\) for 2"),
-        (InPieces(gives=lambda n: np.ones((n, 0))), r"returned losses \(2, 0\) for 2"),
-        (InPieces(gives=lambda n: np.full((n, 3), -1.0)), "not a number of at least 0"),
-        (InPieces(gives=lambda n: np.full((n, 3), np.nan)), "not a number of at least 0"),
+        (in_pieces(lambda n: Losses(np.ones((n, 3)), {}, np.ones((n, 3)))), "losses of hinges"),
+        (in_pieces(np.ones), r"returned losses \(2,\) for 2 simulations"),
+        (in_pieces(lambda n: np.ones((n + 1, 3))), r"returned losses \(3, 3\) for 2"),
+        (in_pieces(lambda n: np.ones((n, 0))), r"returned losses \(2, 0\) for 2"),
+        (in_pieces(lambda n: np.full((n, 3), np.nan)), "not a number of at least 0"),
         (Plain(asks=ClosedLoop(())), r"requested the signals \(\), of sensors, commands"),
         (Plain(asks=ClosedLoop(("smell",))), r"requested the signals \('smell',\), of sensors"),
     ],
@@ -318,24 +229,160 @@ def test_what_is_prepared_must_be_a_prepared_trial(quadruped: Robot, trials: lis
 def test_a_comparator_that_breaks_its_contract_is_named_with_what_it_did(
     comparator: Plain, message: str, quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
 ):
-    evidence = LossTable(Simulator(quadruped, 1), comparator)
+    table = LossTable(Simulator(quadruped, 1), comparator)
 
     with pytest.raises(InputError, match=f"the comparator 'plain' .*{message}.*check_comparator"):
-        evidence.distances(three[:2], trials)
+        table.distances(three[:2], trials)
 
 
-def test_all_trials_that_cannot_be_judged_are_named_at_once(quadruped: Robot, trials: list[Trial]):
+def test_all_trials_that_are_refused_are_named_at_once(quadruped: Robot, trials: list[Trial]):
     first, second = (
-        dataclasses.replace(trial, behaviour=_blind(trial.behaviour), path=f"{k}.mcap")
+        dataclasses.replace(lacking(trial, ("base_position",)), path=f"{k}.mcap")
         for k, trial in enumerate(trials)
     )
-    evidence = LossTable(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
-    evidence.check(trials)
+    table = LossTable(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
 
     with pytest.raises(InputError, match=r"0\.mcap: .* needs .*; 1\.mcap: .* needs "):
-        evidence.check([first, trials[0], second])
+        table.check([first, trials[0], second])
 
 
-def _blind(behaviour: Behaviour) -> Behaviour:
-    nothing = {signal: np.full_like(rows, np.nan) for signal, rows in behaviour.signals.items()}
-    return Behaviour(behaviour.names, behaviour.time, nothing)
+@settings(max_examples=30)
+@given(times=st.tuples(st.floats(-1, 3), st.floats(-1, 3)))
+def test_losses_of_a_part_are_the_columns_of_the_whole_within_its_bounds(
+    table: LossTable, long: list[Trial], three: list[Hypothesis], times: tuple[float, float]
+):
+    begin, end = sorted(times)
+    trial, other = long
+    timeline = table.timeline([trial])
+    assert timeline is not None
+    inside = (timeline.begin >= begin) & (timeline.end <= end)
+    part = TrialPart(trial, begin, end)
+    whole, losses = table.losses(three, long), table.losses(three, [part, other])
+
+    pieces = len(timeline.begin)
+    np.testing.assert_array_equal(losses[:, : inside.sum()], whole[:, :pieces][:, inside])
+    np.testing.assert_array_equal(losses[:, inside.sum() :], whole[:, pieces:])
+    hinges = table.by_hinge(three, [part, other])
+    np.testing.assert_array_equal(hinges[:, inside.sum() :], table.by_hinge(three, [other]))
+    if inside.any():
+        expected = whole[:, :pieces][:, inside].mean(axis=1)
+        np.testing.assert_allclose(table.distances(three, [part]), expected)
+
+
+def test_the_timeline_has_the_times_of_the_columns_of_the_losses(
+    table: LossTable, long: list[Trial]
+):
+    timeline = table.timeline(long)
+    assert timeline is not None
+    counts = [table.losses([INTACT], [trial]).shape[1] for trial in long]
+
+    assert timeline.trial.tolist() == [0] * counts[0] + [1] * counts[1]
+    np.testing.assert_allclose(timeline.end - timeline.begin, SEGMENT_PREDICTION.horizon * 0.01)
+    for index, trial in enumerate(long):
+        inside = timeline.trial == index
+        assert timeline.begin[inside][0] == trial.behaviour.time[0]
+        assert timeline.end[inside][-1] == trial.behaviour.time[-1]
+        assert (np.diff(timeline.begin[inside]) > 0).all()
+
+
+def test_an_error_within_a_piece_is_in_the_column_of_its_time(
+    table: LossTable, long: list[Trial], three: list[Hypothesis]
+):
+    trial = long[0]
+    orientation = trial.behaviour["base_orientation"].copy()
+    orientation[100:103] = [0, 1, 0, 0]
+    wrong = dataclasses.replace(
+        trial, behaviour=changed(trial.behaviour, base_orientation=orientation)
+    )
+    timeline = table.timeline([wrong])
+    assert timeline is not None
+    more = table.losses(three[2:], [wrong])[0] > table.losses(three[2:], [trial])[0] + 0.1
+
+    assert more.any()
+    assert not more[~((timeline.begin <= 1.02) & (timeline.end >= 1.0))].any()
+
+
+def test_a_comparator_without_times_has_no_timeline_and_no_signals(
+    quadruped: Robot, long: list[Trial], three: list[Hypothesis]
+):
+    table = LossTable(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
+
+    assert table.timeline(long) is None
+    assert table.by_signal(INTACT, long) == {}
+    part = TrialPart(long[0], 1.0, 2.0)
+    np.testing.assert_array_equal(table.losses(three, [part]), table.losses(three, long[:1]))
+
+
+@pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
+def test_the_losses_of_the_signals_sum_to_the_mean_loss(
+    quadruped: Robot, long: list[Trial], comparator: Comparator
+):
+    table = LossTable(Simulator(quadruped, 1), comparator)
+    parts = [TrialPart(long[0], 0.5, 1.7), long[1]]
+    losses = table.by_signal(INTACT, parts)
+
+    assert {"commands", "joint_positions", "sensors", "encoder motion"} <= set(losses)
+    assert sum(losses.values()).mean() == pytest.approx(table.losses([INTACT], parts).mean())
+
+
+def test_a_jam_shows_in_its_hinge_and_a_detached_hinge_has_no_losses(
+    table: LossTable, long: list[Trial], three: list[Hypothesis]
+):
+    intact, broken, jam = table.by_hinge(three, long)
+    hinges = long[0].behaviour.names.hinges
+
+    assert hinges[int(np.argmax(intact.mean(axis=0)))] == KNEE
+    unknown = np.isnan(broken).all(axis=0)
+    assert [hinges[column] for column in np.flatnonzero(unknown)] == ["back_left_knee"]
+    assert jam.max() < 1e-6, "a jam at the angle of an exact encoder has losses"
+
+
+PIECES = np.array([[0, 12], [12, 24], [60, 72], [107, 119]])
+
+
+@pytest.mark.parametrize(
+    ("fault", "contradicted"),
+    [
+        ("", [True, True, True, False]),
+        ("=gain0.2", [True, True, True, False]),
+        ("=bias0.3", [True, True, True, True]),
+    ],
+)
+def test_a_reading_contradicts_a_fault_of_its_sensor_in_every_piece_with_its_step(
+    quadruped: Robot, fault: str, contradicted: list[bool]
+):
+    sensor = "front_left_touch"
+    sensors = np.zeros((120, len(quadruped.anatomy.sensors)))
+    sensors[[12, 65], quadruped.anatomy.names.sensors.index(sensor)] = 1.0
+    positions = np.zeros((120, len(quadruped.anatomy.hinges)))
+    commands = np.zeros((120, len(quadruped.anatomy.motors)))
+    behaviour = Trial.from_arrays(quadruped, positions, commands, sensors=sensors).behaviour
+    hypothesis = parse(f"sensor:{sensor}{fault}+break:back_left_knee", quadruped.anatomy)
+
+    losses = contradiction_losses([INTACT, hypothesis], behaviour, PIECES)
+
+    assert losses.tolist() == [[0] * 4, [CONTRADICTION * one for one in contradicted]]
+
+
+def jam_of(robot: Robot, *knees: np.ndarray) -> float | None:
+    """The observed jam of a knee with these angles in some trials; other joints stand at 0."""
+    trials = []
+    for angles in knees:
+        positions = np.zeros((90, len(robot.anatomy.hinges)))
+        positions[:, robot.anatomy.hinges.index(KNEE)] = angles
+        trials.append(
+            Trial.from_arrays(robot, positions, np.zeros((90, len(robot.anatomy.motors))))
+        )
+    jams = {jam.part: jam.severity for jam in observed_jams(trials, robot.anatomy)}
+    assert jams.keys() - {KNEE} == {joint.name for joint in robot.anatomy.joints} - {KNEE}
+    return jams.get(KNEE)
+
+
+def test_a_jam_is_at_the_median_angle_of_the_last_third_of_the_last_trial(quadruped: Robot):
+    moved = np.where(np.arange(90) < 60, np.linspace(-0.4, 0.4, 90), 0.25)
+    limit = quadruped.anatomy.joint(KNEE).limits[0][1]
+
+    assert jam_of(quadruped, moved) == 0.25
+    assert jam_of(quadruped, moved, np.full(90, -0.1)) == -0.1
+    assert jam_of(quadruped, np.full(90, limit + 0.5)) == limit
+    assert jam_of(quadruped, np.where(np.arange(90) < 60, 0.2, np.nan)) is None

@@ -84,32 +84,12 @@ def test_an_excess_below_the_floor_is_none_however_exact_the_prediction():
     assert exceeds(np.array([1.01 * LOSS_FLOOR]), np.zeros(1))
 
 
-def test_of_a_single_piece_nothing_but_the_ratio_can_tell():
-    small, twice, four_times = np.array([[1.0], [2.0], [4.0]])
-
-    assert paired_z(twice, small) == 0
-    assert not is_better(small, twice)
-    assert is_better(small, four_times)
-    assert not exceeds(twice, small)
-    assert exceeds(four_times, small)
-
-
 def test_whatever_predicts_at_all_is_better_than_what_diverged():
     finite = np.full(5, 1e9)
 
     assert is_better(finite, DIVERGED)
     assert not is_better(DIVERGED, finite)
     assert not is_better(DIVERGED, DIVERGED)
-
-
-def test_a_hypothesis_that_diverged_in_one_trial_is_worse_than_ever():
-    mixed = np.array([0.0, 0.0, np.inf])
-
-    assert exceeds(mixed, np.ones(3))
-    assert exceeds(DIVERGED, np.ones(3))
-    assert not exceeds(np.ones(3), DIVERGED)
-    assert not exceeds(DIVERGED, DIVERGED)
-    assert is_better(np.full(3, 1e9), mixed)
 
 
 def test_losses_of_other_trials_are_compared_as_welch_did():
@@ -131,14 +111,6 @@ def test_of_two_at_most_one_is_better(pair: np.ndarray):
     assert not (is_better(one, other) and is_better(other, one))
     assert not is_better(one, one)
     assert not exceeds(one, one)
-
-
-@given(arrays(float, (2, 6), elements=LOSSES), st.permutations(range(6)))
-def test_the_order_of_the_pieces_does_not_matter(pair: np.ndarray, order: list[int]):
-    one, other = pair
-    z = paired_z(other, one) if np.isfinite(pair).all() else 0.0
-    if abs(z - MIN_Z) > 1e-6:  # where the result does not depend on rounding
-        assert is_better(one[order], other[order]) == is_better(one, other)
 
 
 @pytest.mark.parametrize(
@@ -170,13 +142,6 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     assert paired_z(one + gain, one) > MIN_Z_ACROSS_TRIALS
     assert not gain_exceeds_healthy_gain(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
     assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
-
-
-def test_what_made_it_worse_before_has_to_help_all_the_same():
-    one, before = np.full(100, 10.0), np.full(100, 10.0)
-    hardly = one + of_mean_and_error(0.2, 0.1)
-
-    assert not gain_exceeds_healthy_gain(one, hardly, before, before - 1)
 
 
 def test_what_diverged_or_has_a_single_piece_has_not_become_better():

@@ -137,10 +137,6 @@ def test_the_limits_of_a_kind_are_one_clause_and_equal_limits_are_named_together
     ]
 
 
-def test_without_limits_there_is_no_sentence():
-    assert detectable_sentences(diagnosis()) == []
-
-
 def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
     knees = ("front_left_knee", "back_left_knee")
     touch, ones = ConstantSensor("front_left_touch", 0.0), ConstantSensor("a", 1.0)

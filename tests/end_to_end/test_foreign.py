@@ -196,7 +196,7 @@ def row(truth: list[str], best: str, verdict: str, **more: object) -> dict[str, 
             "diagnosis": [{"hypothesis": best, "distance": 1.0}],
             "kinds": ["break", "jam", "jam-angle", "motor"],
             "verdict": verdict,
-            "rivals": [],
+            "indistinguishable": [],
             **more,
         },
     }
@@ -225,8 +225,12 @@ def test_a_verdict_is_right_if_it_is_about_the_truth(
 
 
 def test_an_ambiguous_verdict_is_right_if_it_names_the_truth():
-    assert judged(row(["break:a"], "jam:a", "ambiguous", rivals=["break:a"])).verdict_right
-    assert not judged(row(["break:a"], "jam:a", "ambiguous", rivals=["jam:b"])).verdict_right
+    assert judged(
+        row(["break:a"], "jam:a", "ambiguous", indistinguishable=["break:a"])
+    ).verdict_right
+    assert not judged(
+        row(["break:a"], "jam:a", "ambiguous", indistinguishable=["jam:b"])
+    ).verdict_right
 
 
 def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():

@@ -25,7 +25,6 @@ from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import estimated_states
-from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 
@@ -81,17 +80,6 @@ def trial() -> Trial:
 
 def without_marks(trial: Trial) -> Trial:
     return replace(trial, behaviour=replace(trial.behaviour, late=None))
-
-
-def test_a_command_is_steady_unless_the_step_after_it_was_late(trial: Trial):
-    behaviour = trial.behaviour
-    stood_longer = np.flatnonzero(np.isnan(behaviour.steady_commands).all(axis=1))
-    steady = ~np.isin(np.arange(STEPS), stood_longer)
-
-    assert stood_longer.tolist() == [k - 1 for k in LATE]
-    assert np.array_equal(behaviour.steady_commands[steady], behaviour["commands"][steady])
-    unmarked = without_marks(trial).behaviour
-    assert unmarked.steady_commands is unmarked["commands"]
 
 
 @pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
@@ -163,17 +151,3 @@ def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
     hurried = replace(trial, behaviour=replace(trial.behaviour, late=late))
     with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
         SEGMENT_PREDICTION.prepare(hurried)
-
-
-def test_late_fits_the_steps(trial: Trial):
-    with pytest.raises(ValueError, match=r"late must be \(steps,\) = \(250,\), got \(3,\)"):
-        Behaviour(
-            NAMES,
-            trial.behaviour.time,
-            {signal: trial.behaviour[signal] for signal in SIGNALS},
-            np.zeros(3, dtype=bool),
-        )
-
-
-def test_the_marks_are_those_of_the_environment_that_stuttered(trial: Trial):
-    assert np.flatnonzero(trial.behaviour.late).tolist() == list(LATE)

@@ -54,14 +54,13 @@ def diagnosis(
 
 
 @pytest.mark.parametrize(
-    ("truth", "hinges"),
+    ("truth", "hinges", "first"),
     [
-        ("break:front_left_knee", ("front_left_knee",)),
-        ("break:front_left_shoulder", ("front_left_shoulder", "front_left_knee")),
-        ("jam:back_right_shoulder", ("front_left_knee",)),
+        ("break:front_left_knee", ("front_left_knee",), 0),
+        ("break:front_left_shoulder", ("front_left_shoulder", "front_left_knee"), 200),
+        ("jam:back_right_shoulder", ("front_left_knee",), 200),
     ],
 )
-@pytest.mark.parametrize("first", [0, 200])
 def test_a_fault_is_found_without_the_encoders_of_a_limb(
     truth: str, hinges: tuple[str, ...], first: int, quadruped: Robot
 ):

@@ -1,29 +1,16 @@
 """Tests of the canonical form: equal hypotheses have equal effects, with the fewest faults."""
 
-import dataclasses
-
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.faults.hypothesis import INTACT, canonical
+from selfmodel.faults.hypothesis import canonical
 from selfmodel.faults.kind import Fault
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import KINDS
 from selfmodel.faults.world import PAYLOAD
 from selfmodel.tasks import ROBOTS
 from tests.helpers.strategies import faults
 
 ANATOMIES = {name: entry.robot().anatomy for name, entry in ROBOTS.items()}
-
-
-@pytest.mark.parametrize("name", ANATOMIES)
-@given(data=st.data())
-def test_order_and_repetition_do_not_matter(name: str, data: st.DataObject):
-    anatomy = ANATOMIES[name]
-    chosen = data.draw(st.lists(faults(anatomy, graded=False), max_size=6))
-    shuffled = data.draw(st.permutations(chosen + chosen[:2]))
-
-    assert canonical(chosen, anatomy) == canonical(shuffled, anatomy)
 
 
 @pytest.mark.parametrize("name", ANATOMIES)
@@ -64,6 +51,10 @@ def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
         ),
         ("sensor:back_left_angle+sensor:back_left_angle=bias0.5", "sensor:back_left_angle"),
         ("sensor:back_left_angle=noise0.5+sensor:back_left_angle", "sensor:back_left_angle"),
+        ("jam:front_left_knee+damping:front_left_knee=8", "jam:front_left_knee"),
+        ("break:front_left_knee+joint-friction:front_left_knee=0.4", "break:front_left_knee"),
+        ("break:front_left_shoulder+grip:front_left_knee=0.2", "break:front_left_shoulder"),
+        ("break:front_left_knee+encoder-offset:front_left_knee=slip0.1", "break:front_left_knee"),
     ],
 )
 def test_what_another_fault_leaves_without_effect_is_absorbed(said: str, meant: str):
@@ -91,28 +82,6 @@ def test_faults_that_both_matter_are_both_kept(said: str):
     assert len(parse(said, ANATOMIES["quadruped"])) == 2
 
 
-def test_no_faults_mean_intact():
-    assert canonical([], ANATOMIES["quadruped"]) == INTACT
-    assert str(INTACT) == "intact"
-
-
-def test_one_degree_a_part_is_kept():
-    kind = KINDS["jam-angle"]
-    twice = [Fault(kind, "front_left_knee", 0.1), Fault(kind, "front_left_knee", 0.2)]
-
-    assert canonical(twice, ANATOMIES["quadruped"]).faults == (twice[0],)
-
-
-def test_of_a_joint_said_to_be_jammed_at_zero_and_at_an_angle_zero_counts():
-    both = [
-        Fault(KINDS["jam"], "front_left_knee"),
-        Fault(KINDS["jam-angle"], "front_left_knee", 0.2),
-    ]
-
-    assert str(canonical(both, ANATOMIES["quadruped"])) == "jam:front_left_knee"
-    assert str(canonical(both[::-1], ANATOMIES["quadruped"])) == "jam:front_left_knee"
-
-
 PAYLOADS = [
     Fault(PAYLOAD, part, severity)
     for part in PAYLOAD.parts(ANATOMIES["quadruped"])
@@ -133,11 +102,3 @@ def test_of_a_single_kind_the_first_part_is_kept_in_any_order(
 
     assert found == canonical([*payloads, *others], ANATOMIES["quadruped"])
     assert [fault for fault in found.faults if fault.kind == PAYLOAD] == [min(payloads)]
-
-
-def test_a_kind_that_is_not_single_keeps_all_its_parts():
-    many = dataclasses.replace(PAYLOAD, name="cargo", keyword="cargo", is_single=False)
-    parts = PAYLOAD.parts(ANATOMIES["quadruped"])
-    found = canonical([Fault(many, part, 0.2) for part in parts], ANATOMIES["quadruped"])
-
-    assert {fault.part for fault in found.faults} == set(parts)

@@ -1,12 +1,14 @@
 """Tests of the hypothesis space: genomes, neighbours, severities."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT, canonical
+from selfmodel.faults.hypothesis import canonical
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
@@ -42,14 +44,6 @@ def test_any_genome_decodes_to_a_hypothesis_with_notation_and_a_genome(
     assert canonical(hypothesis.faults, ANATOMIES[name]) == hypothesis
 
 
-def test_the_paper_s_genome_says_nothing_by_its_fourth_value():
-    rng = np.random.default_rng(0)
-    for genome in rng.random((200, GENES * GENE_VALUES)):
-        other = genome.copy()
-        other[3::GENE_VALUES] = rng.random(GENES)
-        assert SPACES["quadruped"].decode(genome) == SPACES["quadruped"].decode(other)
-
-
 @pytest.mark.parametrize(
     ("said", "nearest"),
     [
@@ -66,43 +60,15 @@ def test_a_degree_between_two_levels_seeds_the_nearest(said: str, nearest: str):
     assert str(space.decode(genome)) == nearest
 
 
-def test_dormant_genes_say_nothing():
-    genome = np.full(GENES * GENE_VALUES, 0.9)
-    genome[::GENE_VALUES] = 0.49
-
-    assert SPACES["quadruped"].decode(genome) == INTACT
-
-
 @pytest.mark.parametrize(("active", "faults"), [(0.0, 0), (0.499, 0), (0.5, 1), (0.999, 1)])
 def test_a_gene_is_active_from_one_half_on(active: float, faults: int):
     assert len(SPACES["quadruped"].decode(np.array([active, 0.0, 0.0, 0.0]))) == faults
-
-
-@pytest.mark.parametrize("name", ANATOMIES)
-def test_every_part_of_every_kind_can_be_reached(name: str):
-    anatomy = ANATOMIES[name]
-    expected = {f"{kind.keyword}:{part}" for kind in PAPER_KINDS for part in kind.parts(anatomy)}
-    kind_and_part = (np.arange(200) + 0.5) / 200
-    reached = {
-        str(SPACES[name].decode(np.array([1.0, kind, part, 0.0])))
-        for kind in kind_and_part[::20]
-        for part in kind_and_part
-    }
-
-    assert reached == expected
 
 
 @pytest.mark.parametrize("text", ["neuron:0", "jam:front_left_knee=0.3", "friction=0.4"])
 def test_what_no_genome_can_express_is_refused(text: str):
     with pytest.raises(InputError, match="no diagnostic genome can express"):
         SPACES["quadruped"].encode(parse(text, ANATOMIES["quadruped"]), GENES)
-
-
-def test_more_faults_than_genes_are_refused():
-    both = parse("break:front_left_knee+jam:back_left_knee", ANATOMIES["quadruped"])
-
-    with pytest.raises(InputError, match="1 genes has no room for the 2 faults"):
-        SPACES["quadruped"].encode(both, 1)
 
 
 @pytest.mark.parametrize("kinds", [PAPER_KINDS, ALL_KINDS], ids=["paper", "all"])
@@ -116,7 +82,8 @@ def test_neighbours_are_canonical_and_differ_from_the_hypothesis_by_one_fault(
     hypothesis = space.canonical(data.draw(st.lists(candidates, max_size=3)))
     own = set(hypothesis.faults)
 
-    for one in space.neighbours(hypothesis):
+    neighbours = (space.with_one_more, space.with_one_replaced, space.with_one_less)
+    for one in itertools.chain(*(each(hypothesis) for each in neighbours)):
         assert one != hypothesis
         assert one == space.canonical(one.faults)
     assert all(len(set(one.faults) - own) <= 1 for one in space.with_one_replaced(hypothesis))
@@ -135,12 +102,3 @@ def test_a_severity_that_means_another_kind_or_nothing_changes_the_fault():
     assert str(space.with_severity(weak, 0, 0.25)).startswith("motor:front_left_knee=0.25+")
     assert str(space.with_severity(weak, 0, 1.0)) == "sensor:back_left_angle=gain0.5"
     assert str(space.with_severity(weak, 1, 0.0)).endswith("+sensor:back_left_angle")
-
-
-def test_a_gain_of_0_is_a_failed_sensor_but_with_a_bias_a_reading_that_is_stuck():
-    space = HypothesisSpace(ANATOMIES["quadruped"], ALL_KINDS)
-    stuck = space.parse("sensor:back_left_angle=gain0.0+sensor:back_left_angle=bias0.3")
-
-    assert len(stuck) == 2
-    assert space.parse(str(stuck)) == stuck
-    assert str(space.with_severity(stuck, 0, 0.0)) == "sensor:back_left_angle"

@@ -17,7 +17,6 @@ from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
 from tests.faults.test_registry import BARE
 from tests.helpers.drivers import random_motion
-from tests.helpers.robots.arms import quadruped_on_a_stand
 
 STEPS = 60
 OFFSET = 0.1
@@ -83,22 +82,6 @@ def test_a_physical_robot_logs_what_a_simulation_logs(quadruped: Robot, other: s
         np.testing.assert_array_equal(logged[signal], run[signal][0])
 
 
-def test_the_sensor_of_a_jammed_joint_measures_the_angle_with_the_offset(quadruped: Robot):
-    run = simulated(quadruped, [f"encoder-offset:{JOINT}={OFFSET}+jam:{JOINT}=0.2"])
-    sensor = quadruped.anatomy.sensor("front_left_angle")
-    column = quadruped.anatomy.sensors.index(sensor)
-
-    assert run["sensors"][0, :, column] == pytest.approx(sensor.reading(0.2 + OFFSET))
-
-
-@pytest.mark.parametrize("prefix", ["", "slip"])
-def test_a_broken_joint_has_no_encoder(quadruped: Robot, prefix: str):
-    text = f"break:{JOINT}+encoder-offset:front_left_knee={prefix}0.1"
-    both = parse(text, quadruped.anatomy)
-
-    assert str(both) == f"break:{JOINT}"
-
-
 def motion(robot: Robot, model: mujoco.MjModel, targets: np.ndarray) -> np.ndarray:
     """The generalized positions under motor targets, by MuJoCo alone, ``(steps + 1, nq)``."""
     data = mujoco.MjData(model)
@@ -125,39 +108,6 @@ def test_a_robot_with_a_slip_moves_as_under_commands_that_are_lower_by_it(quadru
     expected = motion(quadruped, quadruped.model, lowered(quadruped, targets))
     np.testing.assert_allclose(moved, expected, atol=1e-9, rtol=0)
     assert np.abs(expected - motion(quadruped, quadruped.model, targets)).max() > 0.05
-
-
-def test_a_robot_with_a_slip_rests_at_the_commanded_angle_by_its_encoder_alone():
-    robot = quadruped_on_a_stand()
-    targets = np.full((200, len(robot.anatomy.motors)), 0.05)
-    address = int(robot.model.joint(JOINT).qposadr[0])
-    true = motion(robot, robot.model, lowered(robot, targets))[-1, address]
-    logged = {}
-    for text in ("intact", f"encoder-offset:{JOINT}=slip{OFFSET}"):
-        physical = SimulatedRobot(robot, parse(text, robot.anatomy))
-        samples = physical.run(Playback(robot.anatomy.motors, targets), len(targets))
-        behaviour = collect(robot.anatomy.names, samples)
-        logged[text] = behaviour["joint_positions"][-1, robot.anatomy.hinges.index(JOINT)]
-    intact, slipped = logged.values()
-
-    assert slipped == pytest.approx(intact, abs=0.01)
-    assert slipped - true == pytest.approx(OFFSET, abs=1e-6)
-    assert intact - true == pytest.approx(OFFSET, abs=0.01)
-
-
-def test_offset_and_slip_of_one_joint_add_up(quadruped: Robot):
-    text = f"encoder-offset:{JOINT}=slip0.2+encoder-offset:{JOINT}=-0.3"
-    both = parse(text, quadruped.anatomy)
-    own, slip = build(quadruped, both), parse(f"encoder-offset:{JOINT}=slip0.2", quadruped.anatomy)
-
-    assert str(both) == f"encoder-offset:{JOINT}=-0.3+encoder-offset:{JOINT}=slip0.2"
-    np.testing.assert_allclose(own.encoder_offset, -shift(quadruped), atol=1e-12)
-    np.testing.assert_array_equal(
-        own.model.actuator_biasprm, build(quadruped, slip).model.actuator_biasprm
-    )
-    column = quadruped.anatomy.sensors.index(quadruped.anatomy.sensor("front_left_angle"))
-    half_range = quadruped.anatomy.sensors[column].half_range
-    assert own.offset[column] == pytest.approx(-OFFSET / half_range)
 
 
 @pytest.mark.parametrize("other", [f"motor:{JOINT}=0.4", f"motor:{JOINT}=0", f"jam:{JOINT}=0.2"])

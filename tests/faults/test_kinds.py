@@ -14,22 +14,19 @@ from selfmodel import arguments, plugins
 from selfmodel.arguments import kinds_of
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
-from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind
-from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import (
     ALL_KINDS,
-    KIND_SETS,
     KINDS,
     PAPER_KINDS,
     kind_names,
-    notation_kinds,
 )
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS
 from selfmodel.testing import check_fault_kind
 from tests.helpers.drivers import random_motion
 
@@ -47,24 +44,15 @@ GRAVITY = example("gravity").GRAVITY
 
 
 @pytest.mark.parametrize("kind", [*KINDS.values(), GRAVITY], ids=lambda kind: kind.name)
-def test_a_kind_keeps_its_contract(kind: FaultKind, robot: Robot):
-    check_fault_kind(kind, robot)
+def test_a_kind_keeps_its_contract(kind: FaultKind):
+    # Joints of the hexapod have several hinges.
+    check_fault_kind(kind, ROBOTS["hexapod" if kind.is_of_joint else "quadruped"].robot())
 
 
 def test_the_registry_knows_each_kind_by_its_name():
     assert all(KINDS[name].name == name for name in KINDS)
     assert [kind.name for kind in PAPER_KINDS] == ["break", "jam", "sensor"]
     assert set(KINDS.values()) - set(ALL_KINDS) == {KINDS["neuron"]}
-
-
-@pytest.mark.parametrize("name", [kind.name for kind in ALL_KINDS if kind.bounds])
-def test_a_kind_of_degree_proposes_a_few_levels(name: str, robot: Robot):
-    kind = KINDS[name]
-
-    for part in kind.parts(robot.anatomy):
-        levels = kind.levels_at(robot.anatomy, part)
-        assert 3 <= len(levels) <= 16
-        assert list(levels) == sorted(set(levels))
 
 
 def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
@@ -143,13 +131,6 @@ def test_the_contract_kit_sees_each_way_to_break_it(kind: FaultKind, said: str, 
         check_fault_kind(kind, quadruped)
 
 
-def test_the_contract_kit_sees_a_kind_of_joints_with_other_parts(quadruped: Robot):
-    kind = dataclasses.replace(KINDS["sensor"], is_of_joint=True)
-
-    with pytest.raises(ValueError, match=r"front_left_touch.* is no joint"):
-        check_fault_kind(kind, quadruped)
-
-
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
     robot = arguments.unadapted_robot("quadruped", 0.01)
 
@@ -184,11 +165,6 @@ def test_a_set_of_kinds_has_a_name_that_mixes_with_single_kinds():
     assert kind_names(" paper , motor,brake") == "break,jam,sensor,motor,brake"
 
 
-@pytest.mark.parametrize("name", KIND_SETS)
-def test_no_kind_has_the_name_of_a_set(name: str):
-    assert name not in KINDS
-
-
 def names_of(names: str) -> tuple[str, ...]:
     """The names of the kinds that a text names."""
     return tuple(kind.name for kind in plugins.kinds(names))
@@ -219,12 +195,3 @@ def test_a_name_of_no_kind_says_what_was_meant(names: str, said: str):
 
 SECOND_WIND = dataclasses.replace(GRADED, name="second-wind", keyword="wind")
 OTHER_JAM = dataclasses.replace(GRADED, name="jam", keyword="cling")
-
-
-def test_notation_names_a_third_party_s_kind_where_it_is_considered(quadruped: Robot):
-    said = parse("break:front_left_knee+gravity=2.5", quadruped.anatomy, notation_kinds([GRAVITY]))
-
-    assert str(said) == "break:front_left_knee+gravity=2.5"
-    assert build(quadruped, said).model.opt.gravity[2] == -2.5
-    with pytest.raises(InputError, match="unknown kind of fault"):
-        parse("gravity=2.5", quadruped.anatomy)

@@ -79,12 +79,6 @@ def test_a_degree_is_printed_as_it_parses(said: str, printed: str):
     assert parse(printed, ANATOMIES["quadruped"]) == hypothesis
 
 
-def test_spaces_around_terms_are_welcome():
-    spaced = parse(" break:front_left_knee + sensor:back_left_touch ", ANATOMIES["quadruped"])
-
-    assert str(spaced) == "break:front_left_knee+sensor:back_left_touch"
-
-
 @given(text=st.text(max_size=40))
 def test_any_text_is_either_a_hypothesis_or_an_input_error(text: str):
     try:

@@ -1,35 +1,22 @@
 """Tests of the kinds of a search: those that apply to the robot, and those they degenerate to."""
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 
-from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
-from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import (
     ALL_KINDS,
     KINDS,
     PAPER_KINDS,
 )
-from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
-from selfmodel.simulation.simulator import Simulator
 from selfmodel.testing import check_fault_kind
-from selfmodel.trials.trial import TrialPlan
-from tests.helpers.command import selfmodel
-from tests.helpers.drivers import random_controllers
-from tests.helpers.memory import in_memory
 
-SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 ANGLES = (KINDS["break"], KINDS["jam-angle"])
 
 BARE = """\
@@ -86,32 +73,3 @@ class Stick(FaultKind):
     def apply(self, embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
         """Adds the friction."""
         embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
-
-
-def test_a_recovery_of_a_robot_with_nothing_to_strike_is_refused_before_any_trial(tmp_path: Path):
-    (tmp_path / "bare.xml").write_text(BARE, encoding="utf-8")
-    nothing = ("--set", "touch=[]", "--set", "angle=[]", "--controller", "cpg")
-    done = selfmodel(
-        *("recover", "bare.xml", "--damage", "break:hip", "--kinds", "sensor", *nothing),
-        *("--out", "run"),
-        cwd=tmp_path,
-    )
-
-    assert done.returncode == 2
-    assert "sensor cannot affect any part" in done.stderr
-    assert list(tmp_path.rglob("*.mcap*")) == []
-
-
-@pytest.mark.search
-def test_a_joint_that_turns_out_to_be_jammed_at_0_is_found_among_angles_trial_after_trial(
-    quadruped: Robot,
-):
-    hidden = parse("jam:front_left_shoulder", quadruped.anatomy)
-    run_trial, physical = in_memory(quadruped), SimulatedRobot(quadruped, hidden)
-    trials = [
-        run_trial(physical, TrialPlan(f"{number:02d}-after", "after", gait, SMALL.steps, 0))
-        for number, gait in enumerate(random_controllers(quadruped, 4)[1:])
-    ]
-    search = DiagnosticSearch(Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, ANGLES)
-
-    assert diagnose_trials(trials, search, 0, lambda _: None).best == hidden

@@ -9,13 +9,11 @@ import pytest
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import cases_of
 from selfmodel.robot.legs import reaches_ground
-from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
-from selfmodel.tasks import ROBOTS, entry, suite_bodies
+from selfmodel.tasks import ROBOTS, entry
 from tests.helpers.robots.bodies import BODIES
-from tests.robot.mjcf.samples import SAMPLES
 
-SUITE = [suite_bodies.name(domain, tasks[0]) for domain, tasks in suite_bodies.DOMAINS.items()]
+SUITE = ["suite-humanoid-walk", "suite-fish-swim", "suite-swimmer-swimmer6"]
 
 
 def cases(robot: Robot) -> Mapping[int, str]:
@@ -93,52 +91,3 @@ def test_the_legs_of_a_humanoid_begin_at_the_hip_and_its_arms_are_no_legs():
     assert own[3] == "sensor:right_right_foot_touch"
     assert own[7] == "break:right_hip+jam:left_hip"
     assert 8 not in own
-
-
-@pytest.mark.parametrize(
-    ("name", "seventh", "eighth"),
-    [
-        ("suite-humanoid_CMU-walk", "break:lfemurr+jam:rfemurr", None),
-        (
-            "suite-dog-walk",
-            "break:hip_L+jam:scapula_L",
-            "break:hip_L+jam:scapula_L+sensor:scapula_R_supinate_angle",
-        ),
-        (
-            "suite-fish-swim",
-            "break:tail+jam:finleft",
-            "break:tail+jam:finleft+sensor:finright_roll_angle",
-        ),
-        (
-            "suite-quadruped-walk",
-            "break:hip_front_left+jam:hip_back_right",
-            "break:hip_front_left+jam:hip_back_right+sensor:yaw_back_left_angle",
-        ),
-    ],
-)
-def test_necks_heads_tails_and_hands_are_no_legs_but_fins_are_limbs(
-    name: str, seventh: str, eighth: str | None
-):
-    own = entry(name).cases
-
-    assert (own[7], own.get(8)) == (seventh, eighth)
-
-
-@pytest.mark.parametrize(
-    ("name", "seventh"),
-    [
-        ("ant", "break:hip_1+jam:hip_3"),
-        ("humanoid", "break:right_hip+jam:left_hip"),
-        ("half_cheetah", "break:bthigh+jam:fthigh"),
-        ("walker2d", "break:thigh_joint+jam:thigh_left_joint"),
-        ("swimmer", None),
-    ],
-)
-def test_the_legs_of_gymnasiums_bodies_are_their_limbs(name: str, seventh: str | None):
-    assert cases(load_mjcf(SAMPLES[f"gymnasium {name}"])).get(7) == seventh
-
-
-def test_all_limbs_of_a_robot_without_legs_count():
-    anatomy = entry("quadruped").robot().anatomy
-
-    assert cases_of(anatomy, lambda _: False) == cases_of(anatomy, lambda _: True)

@@ -14,8 +14,8 @@ from selfmodel.cli import main
 SMALL = ("--population", "8", "--generations", "2")
 
 DIAGNOSIS = (
-    *("diagnosis", "verdict", "rivals", "unseen", "test", "intact_distance"),
-    *("outside", "calibration", "reason", "fit", "change", "residual"),
+    *("diagnosis", "verdict", "indistinguishable", "undetectable", "test", "intact_distance"),
+    *("unsearched", "calibration", "reason", "fit", "change", "residual"),
 )
 """JSON keys of a diagnosis, in the output of a recovery and of `selfmodel diagnose`."""
 

@@ -193,7 +193,7 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
         {"hypothesis": "break:left_hip", "distance": None},
     ]
     assert (item["verdict"], item["test"]) == ("ambiguous", "by eye")
-    assert item["rivals"] == ["break:left_hip", "jam:left_hip"]
+    assert item["indistinguishable"] == ["break:left_hip", "jam:left_hip"]
     assert item["intact_distance"] == 0.1 + 0.2
     assert not list(journal.folder.glob("*.part"))
 

@@ -170,8 +170,8 @@ COMMON = {
     "calibration": None,
     "diagnosis": [{"hypothesis": "intact", "distance": 1}],
     "verdict": "intact",
-    "rivals": [],
-    "unseen": [],
+    "indistinguishable": [],
+    "undetectable": [],
     "test": "none",
     "intact_distance": 1.0,
 }

@@ -11,7 +11,7 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.faults.terrain import (
+from selfmodel.faults.world import (
     CELL_SIZE,
     HALF_EXTENT,
     MIN_CELL_CONTACTS,

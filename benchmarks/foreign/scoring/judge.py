@@ -154,7 +154,7 @@ def _severity_error(best: Terms, real: Terms) -> float | None:
 def _rivals(answer: dict[str, Any]) -> list[str]:
     return [
         rival["hypothesis"] if isinstance(rival, dict) else rival
-        for rival in answer.get("rivals", [])
+        for rival in answer.get("indistinguishable", [])
     ]
 
 

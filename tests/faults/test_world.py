@@ -1,14 +1,15 @@
-"""Tests of a control delay that grew."""
+"""Tests of a control delay that grew, and of payloads."""
 
 import dataclasses
 
+import mujoco
 import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.faults.world import PAYLOAD
 from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import nominal, with_parameters
@@ -16,6 +17,7 @@ from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_motion
 
 STEPS = 60
@@ -58,18 +60,48 @@ def test_a_grown_delay_is_the_robot_with_that_delay_beside_robots_without_it(
         np.testing.assert_array_equal(predicted[signal][1], alone[signal][0])
 
 
-def test_a_physical_robot_has_the_delay_of_its_fault(quadruped: Robot):
-    fault = parse("delay=2", quadruped.anatomy)
-    driver = playback(quadruped)
-    path = [
-        sample.values["base_position"]
-        for sample in SimulatedRobot(quadruped, fault).run(driver, STEPS)
-    ]
-    expected = Simulator(quadruped, 1).run([(fault, driver)], STEPS, ["base_position"])
-
-    np.testing.assert_array_equal(path, expected.behaviour["base_position"][0])
-
-
 def test_a_delay_grows_by_whole_steps_up_to_the_largest_delay():
     assert [added_steps(0, added) for added in (0.0, 0.4, 1.6, 3.0)] == [0, 0, 2, 3]
     assert [added_steps(delay, 3.0) for delay in (2, 2.5, 3, 5)] == [3, 2, 2, 0]
+
+
+LOADED_STEPS = 30
+"""Control steps of a comparison: later, contacts amplify the tolerance of the solver."""
+
+
+@pytest.mark.parametrize(("place", "at"), [("", 0.0), (":front", 0.4), (":back", -0.4)])
+def test_a_payload_is_a_torso_with_that_inertia(quadruped: Robot, place: str, at: float):
+    spec, own = mujoco.MjSpec.from_string(quadruped.mjcf), quadruped.model.body("torso")
+    load = 0.3 * float(quadruped.model.body_subtreemass[0])
+    share = load / (own.mass[0] + load)
+    torso = spec.body("torso")
+    torso.explicitinertial, torso.iquat = True, [1, 0, 0, 0]
+    torso.mass = own.mass[0] + load
+    torso.ipos = [at * share, 0, 0]
+    torso.inertia = own.inertia + own.mass[0] * share * at**2 * np.array([0, 1, 1])
+    loaded = built(quadruped, f"payload{place}=0.3")
+
+    assert_same_paths(
+        follow(quadruped, loaded, LOADED_STEPS), follow(quadruped, spec.compile(), LOADED_STEPS)
+    )
+
+
+def test_a_payload_is_a_fraction_of_the_healthy_mass_beside_a_broken_limb(quadruped: Robot):
+    broken = built(quadruped, "break:front_left_shoulder")
+    both = built(quadruped, "break:front_left_shoulder+payload=0.5")
+
+    added = both.body("torso").mass - broken.body("torso").mass
+    assert added == pytest.approx(0.5 * quadruped.model.body_subtreemass[0])
+
+
+def test_a_robot_with_a_fixed_base_has_no_payload():
+    robot = Robot(
+        "arm",
+        """<mujoco><worldbody><body name="stand"><geom size="0.1"/><body name="arm">
+          <joint name="elbow" axis="0 1 0" range="-60 60"/>
+          <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/></body></body></worldbody>
+        <actuator><position name="elbow" joint="elbow" ctrlrange="-1 1"/></actuator></mujoco>""",
+        0.02,
+    )
+
+    assert PAYLOAD.parts(robot.anatomy) == ()

@@ -1,0 +1,153 @@
+"""Tests of damped joints, dry friction, and feet that lost their grip."""
+
+import copy
+
+import mujoco
+import numpy as np
+import pytest
+
+from selfmodel.faults.notation import parse
+from selfmodel.robot.robot import Robot
+from tests.faults.test_build import built, follow
+
+UNDAMPED = Robot(
+    "undamped",
+    """<mujoco><option timestep="0.005"/><worldbody><geom type="plane" size="0 0 1"/>
+    <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+      <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body></worldbody>
+    <actuator><motor name="hip" joint="hip" ctrlrange="-1 1" gear="3"/></actuator></mujoco>""",
+    0.02,
+)
+
+
+def test_a_damped_joint_moves_more_slowly_and_the_others_have_their_damping(robot: Robot):
+    joint = robot.anatomy.joints[0]
+    damped = built(robot, f"damping:{joint.name}=30")
+    dofs = [robot.model.joint(hinge).dofadr[0] for hinge in joint.hinges]
+
+    assert damped.dof_damping[dofs] == pytest.approx(30 * robot.model.dof_damping[dofs])
+    others = np.setdiff1d(np.arange(robot.model.nv), dofs)
+    np.testing.assert_array_equal(damped.dof_damping[others], robot.model.dof_damping[others])
+    ways = [
+        np.abs(np.diff(follow(robot, model, 100)[joint.hinges[0]])).sum()
+        for model in (damped, robot.model)
+    ]
+    assert ways[0] < 0.7 * ways[1]
+
+
+def test_a_joint_without_damping_in_the_model_is_damped_relative_to_its_inertia():
+    damped = built(UNDAMPED, "damping:hip=4")
+
+    assert damped.dof_damping[-1] == pytest.approx(3 * UNDAMPED.model.dof_M0[-1])
+    assert str(parse("damping:hip=1", UNDAMPED.anatomy)) == "intact"
+
+
+def test_joint_friction_is_that_part_of_the_largest_torque_of_one_joint(quadruped: Robot):
+    stiff = built(quadruped, "joint-friction:front_left_knee=0.25")
+
+    friction = np.zeros(quadruped.model.nv)
+    friction[quadruped.model.joint("front_left_knee").dofadr[0]] = 0.25 * 12
+    assert stiff.dof_frictionloss == pytest.approx(friction)
+
+
+def test_a_joint_moves_only_above_its_friction(quadruped: Robot):
+    # At 0.03 rad the servo has 1.8 N m, at 0.3 rad its limit of 12 N m; the friction is 3 N m.
+    stiff, angles = built(quadruped, "joint-friction:front_left_knee=0.25"), {}
+    for target in (0.03, 0.3):
+        for name, model in (("stiff", stiff), ("healthy", copy.copy(quadruped.model))):
+            model.opt.gravity[:] = 0.0
+            data = mujoco.MjData(model)
+            data.actuator("front_left_knee").ctrl = target
+            mujoco.mj_step(model, data, 40)
+            angles[name, target] = float(data.joint("front_left_knee").qpos[0])
+
+    # MuJoCo's dry friction creeps.
+    assert angles["stiff", 0.03] < 0.6 * angles["healthy", 0.03]
+    assert angles["stiff", 0.3] > 0.7 * angles["healthy", 0.3]
+
+
+def test_the_largest_torque_of_a_motor_without_a_limit_is_that_of_its_largest_command():
+    robot = Robot(
+        "geared",
+        """<mujoco><option timestep="0.005"/><worldbody><geom type="plane" size="0 0 1"/>
+        <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size="0.1 0.1 0.1"/>
+          <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+            <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02"/></body></body></worldbody>
+        <actuator><motor name="hip" joint="hip" ctrlrange="-0.5 2" gear="-3"/></actuator>
+        </mujoco>""",
+        0.02,
+    )
+
+    assert built(robot, "joint-friction:hip=0.1").dof_frictionloss[-1] == pytest.approx(0.6)
+
+
+FOOT = "front_left_knee"
+
+
+def contacts(model: mujoco.MjModel) -> dict[str, mujoco.MjData]:
+    """The parameters of the contact of each geom with the ground, in the initial pose, lowered."""
+    data = mujoco.MjData(model)
+    data.qpos[2] -= 0.02
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 4
+    return {
+        model.geom(int(contact.geom[1])).name: (
+            contact.friction.copy(),
+            contact.solref.copy(),
+            contact.solimp.copy(),
+            contact.dim,
+        )
+        for contact in data.contact
+    }
+
+
+def test_one_foot_has_a_fraction_of_its_friction_and_nothing_else_changes(quadruped: Robot):
+    slippery, nominal = contacts(built(quadruped, f"grip:{FOOT}=0.2")), contacts(quadruped.model)
+
+    for geom, (friction, solref, solimp, dim) in nominal.items():
+        factor = 0.2 if geom == "front_left_lower" else 1.0
+        np.testing.assert_allclose(slippery[geom][0][:2], factor * friction[:2])
+        np.testing.assert_array_equal(slippery[geom][0][2:], friction[2:])
+        np.testing.assert_array_equal(slippery[geom][1], solref)
+        np.testing.assert_allclose(slippery[geom][2], solimp)
+        assert slippery[geom][3] == dim
+
+
+def test_only_the_foot_without_grip_slides(quadruped: Robot):
+    model = built(quadruped, f"grip:{FOOT}=0.01")
+    model.opt.gravity[:] = [1.5, 0.0, -9.81]  # friction above 0.15 holds the robot
+    paths = [follow(quadruped, each, 100)[quadruped.root] for each in (model, quadruped.model)]
+    assert np.abs(paths[0][-1, :2] - paths[1][-1, :2]).max() > 1e-3
+
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 100)  # settled
+    feet = [data.site(f"{leg}_foot") for leg in ("front_left", "front_right", "back_left")]
+    before = [foot.xpos.copy() for foot in feet]
+    data.actuator(FOOT).ctrl = 0.3
+    mujoco.mj_step(model, data, 200)
+    slid = [np.linalg.norm((foot.xpos - old)[:2]) for foot, old in zip(feet, before, strict=True)]
+    assert slid[0] > 3 * max(slid[1:])
+
+
+def test_the_contact_parameters_are_those_of_the_mixed_geoms():
+    mjcf = """<mujoco><worldbody>
+      <geom name="ground" type="plane" size="0 0 1" solref="0.04 1" solmix="3" friction="0.4 0.1"
+        solimp="0.8 0.9 0.01" condim="1"/>
+      <body name="ball" pos="0 0 0.15"><freejoint/><geom name="trunk" size="0.05"/>
+        <body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+          <geom name="foot" pos="0 0 -0.1" size="0.06" condim="4"/></body></body></worldbody>
+      <actuator><position name="hip" joint="hip" ctrlrange="-1 1"/></actuator></mujoco>"""
+    robot = Robot("ball", mjcf, 0.002)
+    found = []
+    for model in (robot.model, built(robot, "grip:hip=0.5")):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        (contact,) = data.contact
+        found.append((contact.solimp.copy(), contact.friction.copy()))
+        assert contact.dim == 4
+        np.testing.assert_allclose(contact.solref, [0.035, 1])
+    (nominal_solimp, nominal_friction), (solimp, friction) = found
+    np.testing.assert_allclose(solimp, nominal_solimp)
+    np.testing.assert_allclose(friction[:2], 0.5 * nominal_friction[:2])
+    np.testing.assert_array_equal(friction[2:], nominal_friction[2:])
