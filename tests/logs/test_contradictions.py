@@ -1,6 +1,6 @@
 """Sound files whose content is no trial, or of an impossible one, are refused by name."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,11 +15,9 @@ from selfmodel.logs import (
     SchemaMismatchError,
     UnsupportedError,
     read_log,
-    reader,
 )
 from selfmodel.logs.inspection import verify
-from selfmodel.logs.log_file import Contents, read_contents
-from selfmodel.logs.records import CONTROLLER_FILE, HIDDEN, MODEL_FILE, RESULT, SOFTWARE, TRIAL
+from selfmodel.logs.records import CONTROLLER_FILE, MODEL_FILE, RESULT, SOFTWARE, TRIAL
 from tests.logs.edits import Change, attach, holds, rewritten, says, without
 
 HALF_A_SECOND = 50 * 10**7
@@ -159,19 +157,6 @@ def test_verify_compares_the_digest_of_the_file(log: Path):
     assert verify(log, digest).model_loaded
     with pytest.raises(CorruptError, match=f"{'0' * 64}.*{digest}"):
         verify(log, "0" * 64)
-
-
-def test_the_hidden_record_does_not_reach_the_reader(log: Path, monkeypatch: pytest.MonkeyPatch):
-    reached = []
-
-    def watched(path: Path, unread: Collection[str]) -> Contents:
-        contents = read_contents(path, unread)
-        reached.append(HIDDEN in contents.metadata)
-        return contents
-
-    monkeypatch.setattr(reader, "read_contents", watched)
-    read_log(log)
-    assert reached == [False]
 
 
 def test_names_are_harmless_in_a_terminal_and_as_paths(log: Path):

@@ -1,7 +1,5 @@
-import contextlib
 import hashlib
 import io
-import warnings
 import zipfile
 from pathlib import Path
 
@@ -15,7 +13,6 @@ from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.logs.controllers import MAX_CONTROLLER_BYTES, controller_bytes, parse_controller
-from tests.helpers.damage import damaged
 
 PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
 
@@ -133,15 +130,3 @@ def test_a_bomb_is_not_unpacked():
             archive_file.writestr(f"{name}.npy", bytes(MAX_CONTROLLER_BYTES))
     with pytest.raises(InputError, match="unpacks to more than"):
         parse_controller(file.getvalue(), "here")
-
-
-@pytest.mark.parametrize("kind", ["network", "cpg"])
-@given(data=st.data())
-def test_a_damaged_controller_is_refused_by_its_name_or_is_a_controller(
-    kind: str, data: st.DataObject
-):
-    design = {"network": controller().design, "cpg": CPG}[kind]
-    spoilt = data.draw(damaged(controller_bytes(Controller(design, np.zeros(design.weights)))))
-    with contextlib.suppress(InputError), warnings.catch_warnings():
-        warnings.simplefilter("error")
-        parse_controller(spoilt, "here")

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs import LogWriteError, read_log
+from selfmodel.logs import LogWriteError
 from selfmodel.logs.files import create_file, make_folder, replace_file, write_new
-from selfmodel.logs.recordings.tables import export
 
 
 def refuse(monkeypatch: pytest.MonkeyPatch, owner: object, name: str, number: int) -> None:
@@ -67,15 +66,6 @@ def test_two_writers_of_one_result_do_not_mix(tmp_path: Path):
 
     assert path.read_bytes() in whole
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_an_export_is_not_blocked_by_the_remainder_of_a_killed_one(log: Path, tmp_path: Path):
-    behaviour = read_log(log).trial.behaviour
-    (tmp_path / "t.csv.part").write_text("half")
-    (tmp_path / ".selfmodel-0123.part").write_text("half")
-    export(tmp_path / "t.csv", behaviour)
-
-    assert len((tmp_path / "t.csv").read_text().splitlines()) == behaviour.steps + 1
 
 
 @pytest.mark.parametrize("write", [replace_file, write_new])

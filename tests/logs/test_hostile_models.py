@@ -53,11 +53,10 @@ def stl(faces: int) -> bytes:
     return bytes(80) + struct.pack("<I", faces) + rows.tobytes()
 
 
-def png(width: int, height: int, pixels: bytes | None = None, texts: int = 0) -> bytes:
-    raw = bytes((3 * width + 1) * height) if pixels is None else pixels
+def png(width: int, height: int) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = [(b"IHDR", header), *[(b"zTXt", b"k\0\0" + zlib.compress(b"t"))] * texts]
-    chunks += [(b"IDAT", zlib.compress(raw)), (b"IEND", b"")]
+    pixels = zlib.compress(bytes((3 * width + 1) * height))
+    chunks = [(b"IHDR", header), (b"IDAT", pixels), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
         for kind, body in chunks
@@ -84,20 +83,15 @@ def test_what_is_attached_and_small_loads(trial: TrialLog, mjcf: str, files: dic
     assert set(robot.assets) <= {"m.stl", "m.STL", "m.obj", "t.png", "h.png"}
 
 
-FILES = ("/etc/passwd", "../m.stl", "sub/m.stl", "file:///m.stl", "%2e%2e/m.stl", "M.STL", " m.stl")
-
-
 @pytest.mark.parametrize(
-    "file", [*FILES, "m.stl\n", "m.stl&#10;", "~/m.stl", "C:\\m.stl", ".m.stl"]
+    "file", ["/etc/passwd", "../m.stl", "file:///m.stl", "M.STL", "m.stl&#10;"]
 )
 @pytest.mark.parametrize(
     "element",
     [
         '<mesh name="m" file="{}"/>',
-        '<texture name="t" type="2d" file="{}"/>',
         '<texture name="t" type="cube" fileright="{}"/>',
         '<hfield name="h" size="1 1 1 1" file="{}"/>',
-        '<skin name="s" file="{}"/>',
     ],
 )
 def test_no_file_is_read_but_those_attached(trial: TrialLog, element: str, file: str):
@@ -169,11 +163,6 @@ def test_what_a_model_in_a_log_may_not_ask_for_is_refused_by_name(
 def test_a_damaged_or_unknown_mesh_is_refused(trial: TrialLog, file: str, data: bytes, match: str):
     with pytest.raises(LogError, match=match):
         robot_of(attacked(trial, mesh(file), {file: data}))
-
-
-def test_a_model_that_takes_too_much_memory_is_refused_in_one_sentence(trial: TrialLog):
-    with pytest.raises(LogError, match=r"its model cannot be loaded: .*memory"):
-        robot_of(attacked(trial, top('<size memory="99999999K"/>')))
 
 
 def test_a_failure_of_the_child_process_is_not_blamed_on_the_log(

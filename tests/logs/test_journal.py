@@ -116,10 +116,6 @@ def test_the_folder_states_from_the_beginning_whether_the_self_model_is_calibrat
     assert is_calibrated(tmp_path / "run") is calibrated
 
 
-def test_the_folder_of_an_earlier_version_counts_as_calibrated(tmp_path: Path):
-    assert is_calibrated(tmp_path)
-
-
 @pytest.mark.parametrize(
     "data", [b"", b"[]", result_bytes({"calibrated": "no"}), b'{"calibrated": true, "sha256": "0"}']
 )
@@ -137,14 +133,6 @@ def test_a_folder_that_holds_something_is_refused(biped: Robot, tmp_path: Path, 
     with pytest.raises(InputError, match=f"holds another run or other files.*{held[:6]}"):
         create_journal(tmp_path, biped.anatomy, calibrated=True)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / held]
-
-
-def test_an_empty_folder_will_do_and_a_file_will_not(biped: Robot, tmp_path: Path):
-    (tmp_path / "empty").mkdir()
-    create_journal(tmp_path / "empty", biped.anatomy, calibrated=True)
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="is a file"):
-        create_journal(tmp_path / "file", biped.anatomy, calibrated=True)
 
 
 def test_a_run_of_another_robot_is_refused(

@@ -138,7 +138,7 @@ def test_genuine_recordings_are_read(path: Path, biped: Robot):
 # ---------------------------------------------------------------- damage
 
 
-@pytest.mark.parametrize("form", [*FORMS, *(f"ros1-{form}" for form in ROS1_FORMS)])
+@pytest.mark.parametrize("form", ["sqlite", "sqlite-message", "ros1-none", "ros1-bz2", "ros1-lz4"])
 def test_no_damage_crashes(form: str, tmp_path: Path):
     path = (
         write_ros1(tmp_path / "a.bag", recorded(0.1), form[5:])

@@ -22,7 +22,6 @@ from tests.logs.recordings.bags import (
     imu,
     joint_state,
     odometry,
-    pose_stamped,
     storage,
     trajectory,
     write_bag,
@@ -72,13 +71,6 @@ def test_a_frame_as_recorded_stays(bag: Path, biped: Robot):
     assert np.allclose(behaviour["base_position"][0], [0.02, 0.03, 0.005])
     assert np.allclose(behaviour["base_orientation"][0], [np.cos(0.5), 0, 0, np.sin(0.5)])
     assert np.allclose(np.linalg.norm(behaviour["base_linear_velocity"], axis=1), 0.005)
-
-
-def test_degrees_become_radians(bag: Path, biped: Robot):
-    degrees = imported(bag, biped, MAPPING.replace('"rad"', '"deg"')).behaviour
-    radians = imported(bag, biped).behaviour
-    for signal in ("joint_positions", "joint_velocities", "commands"):
-        assert np.allclose(np.rad2deg(degrees[signal]), radians[signal])
 
 
 def test_start_and_duration_choose_a_part(bag: Path, biped: Robot):
@@ -145,18 +137,6 @@ def test_commands_come_in_several_types(kind: str, biped: Robot, tmp_path: Path)
     truth = [[angle(j, t) for j in (0, 2, 3)] for t in recording.behaviour.time]
     assert np.allclose(recording.behaviour["commands"][:, [0, 2, 3]], truth)
     assert ("no time stamp" in " ".join(recording.notes)) == (kind == "JointTrajectory")
-
-
-def test_a_pose_without_velocities_gets_none(biped: Robot, tmp_path: Path):
-    items = without("/imu", without("/odom", recorded()))
-    for k in range(50):
-        stamp = T0 + k * 20_000_000
-        items.append(("/odom", stamp, pose_stamped(stamp, (k, 0, 0), (1, 0, 0, 0))))
-    text = MAPPING.replace('[imu]\ntopic = "/imu"\n', "")
-    behaviour = imported(write_bag(tmp_path / "bag", items), biped, text).behaviour
-    assert np.isfinite(behaviour["base_position"]).all()
-    assert np.isnan(behaviour["base_linear_velocity"]).all()
-    assert np.isnan(behaviour["base_angular_velocity"]).all()
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -272,29 +252,6 @@ def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(tmp_pat
     assert np.isfinite(behaviour["base_position"]).all()
     silent = f"/joint_states: silent for {periods.max() / 1e6:.0f} ms"
     assert any(note.startswith(silent) for note in recording.notes)
-
-
-def test_a_gap_of_the_odometry_leaves_the_rest_known(biped: Robot, tmp_path: Path):
-    items = [
-        item
-        for item in recorded()
-        if item[0] != "/odom" or not 0.4 < (item[1] - T0) / 1e9 - 0.015 < 0.6
-    ]
-    recording = imported(write_bag(tmp_path / "bag", items), biped)
-    lost = np.isnan(recording.behaviour["base_position"]).any(axis=1)
-    assert np.array_equal(
-        lost, (recording.behaviour.time > 0.401) & (recording.behaviour.time < 0.599)
-    )
-    assert np.isfinite(recording.behaviour["joint_positions"]).all()
-    assert any("/odom: silent for 200 ms at 0.400 s" in note for note in recording.notes)
-
-
-def test_a_command_stands_through_silence(biped: Robot, tmp_path: Path):
-    items = without("/commands", recorded())
-    items += [("/commands", T0, array([0.1] * 4)), ("/commands", T0 + 5 * 10**8, array([0.2] * 4))]
-    behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
-    assert behaviour.steps == 99  # the end of the commands is not that of the trial
-    assert np.array_equal(behaviour["commands"][:, 0], np.where(behaviour.time < 0.5, 0.1, 0.2))
 
 
 @pytest.mark.parametrize("limited", [True, False])

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from selfmodel.logs.recordings.resample import angles, hold, hold_forever, linear, reach, slerp
+from selfmodel.logs.recordings.resample import angles, hold, linear, reach, slerp
 
 periods = st.lists(st.integers(1, 50), min_size=1, max_size=30)
 numbers = st.integers(-1000, 1000)
@@ -75,15 +75,6 @@ def test_orientations_take_the_shortest_arc_whatever_their_signs(data: tuple, se
         expected = oracle.as_quat(scalar_first=True)
         # At half a turn between two, either way round is the shortest.
         assert np.allclose(np.abs(np.sum(result[~unknown] * expected, axis=1)), 1)
-
-
-@given(series())
-def test_a_command_stands_until_the_next(data: tuple):
-    times, values, at = data
-    result = hold_forever(times, values, at, 0.0)[:, 0]
-    for t, value in zip(at, result, strict=True):
-        before = values[times <= t, 0]
-        assert value == before[-1] if len(before) else np.isnan(value)
 
 
 def test_a_measurement_that_is_held_grows_too_old():

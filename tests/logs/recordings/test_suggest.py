@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from selfmodel.logs.recordings.mapping_file import parse_mapping
-from selfmodel.logs.recordings.names import classified, likeness, matched
+from selfmodel.logs.recordings.names import likeness, matched
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.robot.robot import Robot
-from tests.logs.recordings.bags import T0, array, joint_state, write_bag
+from tests.logs.recordings.bags import T0, joint_state, write_bag
 from tests.logs.recordings.conftest import imported, recorded
 from tests.logs.recordings.table_files import HINGES, write_csv, write_npz
 
@@ -49,15 +49,6 @@ def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
     assert "# No topic is similar to right_touch" in text
     assert 'left_hip_x = "LHX"\n' in text
     assert imported(bag, biped, text).behaviour.steps == 99
-
-
-def test_states_and_commands_of_one_type_are_told_apart_by_name(biped: Robot, tmp_path: Path):
-    items = [item for item in recorded() if item[0] == "/joint_states"]
-    items += [("/joint_cmd", time, message) for _, time, message in items]
-    items += [("/arm/joints", T0, joint_state(T0, ["elbow"], [0.0])), ("/lamp_cmd", T0, array([0]))]
-    bag = write_bag(tmp_path / "bag", items)
-    mapping = parse_mapping(suggest(bag, biped, "b.xml", with_timestep=True), "m").trial
-    assert (mapping.joints.topic, mapping.commands.topic) == ("/joint_states", "/joint_cmd")
 
 
 def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
@@ -134,19 +125,6 @@ def test_the_unit_of_time_is_guessed_from_the_rows(
     path = write_npz(tmp_path / "t.npz", {"time": np.arange(5) * period, "q": np.zeros(5)})
 
     assert f'unit = "{unit}"  # CHECK' in suggestion(path, biped)
-
-
-def test_vectors_are_of_the_base_or_of_the_imu():
-    names = [f"base_quat.{axis}" for axis in "xyzw"] + [f"odom_pos_{axis}" for axis in "xyz"]
-    names += [f"gyro[{axis}]" for axis in "xyz"] + [f"imu_quat_{axis}" for axis in "wxyz"]
-
-    found = classified(names)
-
-    base, imu = found.vectors["base"], found.vectors["imu"]
-    assert base["orientation"] == tuple(f"base_quat.{axis}" for axis in "wxyz")
-    assert base["position"] == tuple(f"odom_pos_{axis}" for axis in "xyz")
-    assert imu["angular_velocity"] == tuple(f"gyro[{axis}]" for axis in "xyz")
-    assert imu["orientation"] == tuple(f"imu_quat_{axis}" for axis in "wxyz")
 
 
 def test_missing_columns_are_to_be_filled_in(biped: Robot, tmp_path: Path):

@@ -2,7 +2,6 @@
 
 import datetime as dt
 import math
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,6 @@ from selfmodel.logs.recordings.tables import export, read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
-from tests.logs.recordings.bags import spoilt
 from tests.logs.recordings.table_files import MAPPING, WRITERS, columns, write_csv, write_npz
 
 START = 1_700_000_000_123_456_789
@@ -120,19 +118,6 @@ def test_numbers_of_every_type_of_parquet_are_columns_and_missing_ones_are_nan(t
     assert table(path, time="t").logged.tolist() == [round(when.timestamp()) * 10**9]
     for name, first in (("f", 1.5), ("i", 1.0), ("b", 1.0)):
         np.testing.assert_array_equal(column(path, name), [first, np.nan])
-
-
-@pytest.mark.parametrize("form", ["npz", "parquet"])
-def test_damage_is_refused_or_harmless(form: str, tmp_path: Path):
-    path = WRITERS[form](tmp_path / f"t.{form}", columns())
-    data = path.read_bytes()
-    right = table(path, *columns()).columns
-    rng = np.random.default_rng(0)
-    for k in range(60):
-        path.write_bytes(spoilt(data, ("flip", "cut", "garbage")[k % 3], rng))
-        with suppress(InputError):
-            for name, found in table(path, *columns()).columns.items():
-                np.testing.assert_array_equal(found.values, right[name].values)
 
 
 # ---------------------------------------------------------------- import
