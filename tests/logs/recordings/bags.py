@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -91,14 +92,27 @@ def spoilt(data: bytes, damage: str, rng: np.random.Generator) -> bytes:
     return bytes(found)
 
 
-def made(kind: str, **fields: object) -> object:
-    """A message of a type, such as ``std_msgs/msg/Bool``."""
+def made(kind: str, **values: object) -> object:
+    """A message of a type, such as ``std_msgs/msg/Bool``.
+
+    A dict is a message within it; what is not given is zero or empty.
+    """
+    fields = {}
+    for name, (node, about) in ROS.fielddefs[kind][1]:
+        value = values.get(name)
+        if node == Nodetype.NAME:
+            fields[name] = made(about, **(value or {}))
+        elif node == Nodetype.BASE:
+            fields[name] = value or ("" if about[0] == "string" else 0)
+        elif about[0][1] == ("float64", 0):
+            fields[name] = np.zeros(about[1]) if value is None else np.array(value, np.float64)
+        else:
+            fields[name] = list(value or [])
     return ROS.types[kind](**fields)
 
 
-def header(stamp: int, frame: str = "") -> object:
-    time = made("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
-    return made("std_msgs/msg/Header", stamp=time, frame_id=frame)
+def header(stamp: int, frame: str = "") -> dict[str, object]:
+    return {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": frame}
 
 
 def joint_state(
@@ -108,54 +122,30 @@ def joint_state(
     velocity: Sequence[float] = (),
     effort: Sequence[float] = (),
 ) -> object:
-    return made(
-        "sensor_msgs/msg/JointState",
-        header=header(stamp),
-        name=list(names),
-        position=np.array(position, dtype=np.float64),
-        velocity=np.array(velocity, dtype=np.float64),
-        effort=np.array(effort, dtype=np.float64),
-    )
+    numbers = {"position": position, "velocity": velocity, "effort": effort}
+    return made("sensor_msgs/msg/JointState", header=header(stamp), name=names, **numbers)
 
 
 def array(values: Sequence[float]) -> object:
-    layout = made("std_msgs/msg/MultiArrayLayout", dim=[], data_offset=0)
-    return made(
-        "std_msgs/msg/Float64MultiArray", layout=layout, data=np.array(values, dtype=np.float64)
-    )
+    return made("std_msgs/msg/Float64MultiArray", data=values)
 
 
 def trajectory(stamp: int, names: Sequence[str], positions: Sequence[float]) -> object:
-    none = np.zeros(0)
-    point = made(
-        "trajectory_msgs/msg/JointTrajectoryPoint",
-        positions=np.array(positions, dtype=np.float64),
-        velocities=none,
-        accelerations=none,
-        effort=none,
-        time_from_start=made("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
-    )
+    point = made("trajectory_msgs/msg/JointTrajectoryPoint", positions=positions)
     return made(
         "trajectory_msgs/msg/JointTrajectory",
         header=header(stamp),
-        joint_names=list(names),
+        joint_names=names,
         points=[point],
     )
 
 
-def vector(xyz: Sequence[float], kind: str = "Vector3") -> object:
-    return made(f"geometry_msgs/msg/{kind}", x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2]))
+def vector(values: Sequence[float], names: str = "xyz") -> dict[str, float]:
+    return dict(zip(names, map(float, values), strict=True))
 
 
-def quaternion(wxyz: Sequence[float]) -> object:
-    w, x, y, z = map(float, wxyz)
-    return made("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-
-
-def pose(xyz: Sequence[float], wxyz: Sequence[float]) -> object:
-    return made(
-        "geometry_msgs/msg/Pose", position=vector(xyz, "Point"), orientation=quaternion(wxyz)
-    )
+def pose(xyz: Sequence[float], wxyz: Sequence[float]) -> dict[str, object]:
+    return {"position": vector(xyz), "orientation": vector(wxyz, "wxyz")}
 
 
 def odometry(
@@ -165,38 +155,28 @@ def odometry(
     linear: Sequence[float] = (0, 0, 0),
     angular: Sequence[float] = (0, 0, 0),
 ) -> object:
-    unknown = np.zeros(36)
-    twist = made("geometry_msgs/msg/Twist", linear=vector(linear), angular=vector(angular))
     return made(
         "nav_msgs/msg/Odometry",
         header=header(stamp, "odom"),
         child_frame_id="base",
-        pose=made("geometry_msgs/msg/PoseWithCovariance", pose=pose(xyz, wxyz), covariance=unknown),
-        twist=made("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
+        pose={"pose": pose(xyz, wxyz)},
+        twist={"twist": {"linear": vector(linear), "angular": vector(angular)}},
     )
-
-
-def pose_stamped(stamp: int, xyz: Sequence[float], wxyz: Sequence[float]) -> object:
-    return made("geometry_msgs/msg/PoseStamped", header=header(stamp), pose=pose(xyz, wxyz))
 
 
 def imu(
     stamp: int, wxyz: Sequence[float], angular: Sequence[float], *, known: bool = True
 ) -> object:
-    nothing = np.zeros(9)
-    covariance = nothing if known else np.array([-1.0, *[0.0] * 8])
     return made(
         "sensor_msgs/msg/Imu",
         header=header(stamp),
-        orientation=quaternion(wxyz),
-        orientation_covariance=covariance,
+        orientation=vector(wxyz, "wxyz"),
+        orientation_covariance=[0.0 if known else -1.0, *[0.0] * 8],
         angular_velocity=vector(angular),
-        angular_velocity_covariance=nothing,
-        linear_acceleration=vector((0, 0, 9.81)),
-        linear_acceleration_covariance=nothing,
     )
 
 
 def wrench(stamp: int, force: Sequence[float]) -> object:
-    told = made("geometry_msgs/msg/Wrench", force=vector(force), torque=vector((0, 0, 0)))
-    return made("geometry_msgs/msg/WrenchStamped", header=header(stamp), wrench=told)
+    return made(
+        "geometry_msgs/msg/WrenchStamped", header=header(stamp), wrench={"force": vector(force)}
+    )
