@@ -24,7 +24,6 @@ from selfmodel.physical.safety import (
     STOP_SIGNALS,
     HeldIterator,
     Terminated,
-    Watchdog,
     cleanup,
     handle_stop_signals,
     hold_stop_signals,
@@ -302,16 +301,6 @@ def test_a_driver_that_hangs_is_stopped_and_its_log_is_whole(bench: Hanging, tmp
     )
 
 
-def test_a_driver_that_hangs_in_its_reset_is_stopped_and_leaves_no_log(tmp_path: Path):
-    bench = Hanging(0)
-    with pytest.raises(TrialError, match="did not return from reset"):
-        logged(bench, tmp_path, watchdog=LIMIT)
-    bench.go.set()
-
-    assert bench.executed[-1] == "stop"
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_driver_that_returns_late_is_stopped_again_since_it_may_have_sent_targets(
     bench: Hanging, tmp_path: Path
 ):
@@ -362,13 +351,6 @@ def test_a_watchdog_changes_nothing_where_the_driver_is_in_time():
 
     for name in SIGNALS:
         assert with_one[name].tobytes() == without[name].tobytes()
-
-
-def test_the_thread_of_a_driver_ends_with_the_trial():
-    with Watchdog(10.0, lambda: None) as watchdog:
-        assert watchdog.call("a function", lambda: 5) == 5
-
-    assert not watchdog.hangs
     assert "selfmodel driver" not in {thread.name for thread in threading.enumerate()}
 
 

@@ -105,6 +105,7 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
 
 
 def test_a_replay_is_serialisable_and_a_table(trial: Trial, different: Replay):
+    assert repr(different).startswith("<Replay of 60 steps: first divergence at step 0\n  rms ")
     values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
     rows = different.to_pandas()
 
@@ -114,23 +115,3 @@ def test_a_replay_is_serialisable_and_a_table(trial: Trial, different: Replay):
     assert rows[7]["commands"] == different.errors["commands"][7]
     blind = selfmodel.replay(without_base(trial), "intact", "quadruped")
     assert blind.to_dict()["rms"]["base_position"] is None
-
-
-def test_the_repr_of_a_replay_has_the_errors_only_of_a_different_one(different: Replay):
-    same = dataclasses.replace(different, identical=True, first_divergence_step=None)
-
-    assert repr(same) == "<Replay of 60 steps: identical>"
-    assert repr(different).startswith("<Replay of 60 steps: first divergence at step 0\n  rms ")
-    assert len(repr(different).splitlines()) == 1 + len(SIGNALS)
-
-
-def test_the_repr_of_a_robot_a_trial_and_a_controller_is_short(trial: Trial, quadruped: Robot):
-    assert repr(quadruped) == (
-        "<Robot quadruped: 8 joints, 8 motors, 8 sensors, control time step 0.01 s>"
-    )
-    assert repr(trial.plan.controller) == "<Controller: a network of 5 hidden neurons>"
-    assert repr(trial).splitlines() == [
-        "<Trial 00-before of quadruped: stage before, 60 of 60 steps",
-        "  its controller, a network of 5 hidden neurons",
-        f"  {trial.path}>",
-    ]
