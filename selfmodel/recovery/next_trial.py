@@ -68,12 +68,7 @@ def discriminating_controller(
 ) -> Controller:
     """Returns the controller with the largest disagreement of the hypotheses to separate.
 
-    Args:
-        diagnosis: Last diagnosis.
-        known: Controllers of earlier trials, newest first; none is tried again.
-        simulator: Self-model.
-        settings: The paper's numbers.
-        rng: Random number generator of all random choices.
+    Known controllers, of earlier trials and newest first, are not tried again.
     """
     disagreement = Disagreement(candidates_to_separate(diagnosis), simulator, settings.steps)
     same_design = [controller for controller in known if controller.design == known[0].design]

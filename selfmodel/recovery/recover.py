@@ -242,14 +242,7 @@ def untried_mutants(
     settings: Settings,
     rng: np.random.Generator,
 ) -> list[Controller]:
-    """Returns one population of distinct mutants that were not tried, or a random controller.
-
-    Args:
-        parents: At least one controller, all of one design.
-        tried: Controllers of earlier trials.
-        settings: Numbers of the EA.
-        rng: Random number generator of all random choices.
-    """
+    """Returns one population of distinct mutants that were not tried, or a random controller."""
     distinct = dict.fromkeys(mutants(parents, settings.population, settings, rng))
     untried = [controller for controller in distinct if controller not in tried]
     # Every mutant may equal its parent, as without mutation.

@@ -198,11 +198,7 @@ class RepairSearch:
 class RobustFitness:
     """Scores of controllers under random conditions, common to all controllers of a call.
 
-    Attributes:
-        simulator: Self-model.
-        score: Score of a rollout.
-        hypotheses: Indistinguishable hypotheses, at least one.
-        uncertainty: Distribution of the rollouts.
+    The conditions have indistinguishable hypotheses in turn, and an uncertain model.
     """
 
     simulator: Simulator
@@ -213,14 +209,7 @@ class RobustFitness:
     def __call__(
         self, controllers: Sequence[Controller], count: int, steps: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Returns scores, ``(controllers, count)``; negative infinity for a diverged rollout.
-
-        Args:
-            controllers: At least one controller.
-            count: Number of conditions.
-            steps: Control steps of a rollout.
-            rng: Random number generator of the conditions.
-        """
+        """Returns scores, ``(controllers, count)``; negative infinity for a diverged rollout."""
         conditions = draw_samples(self.hypotheses, self.uncertainty, count, rng)
         outcome = self.simulator.run_under(
             conditions, self.uncertainty, controllers, steps, self.score.record
@@ -380,12 +369,7 @@ def robust(scores: FloatArray) -> FloatArray:
 
 
 def rollouts_of(settings: Settings, *, known: bool) -> int:
-    """Returns the number of whole rollouts that a robust repair may cost.
-
-    Args:
-        settings: The paper's numbers.
-        known: Whether there is a known controller to begin from.
-    """
+    """Returns the whole rollouts that a robust repair may cost, with a known controller or not."""
     most = FIRST_COST * settings.evaluations
     return round(min(most, max(COST * settings.evaluations, ENOUGH)) if known else most)
 
@@ -402,14 +386,7 @@ def _comparisons(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
 def mutants(
     parents: Sequence[Controller], count: int, settings: Settings, rng: np.random.Generator
 ) -> list[Controller]:
-    """Returns children of controllers by the mutation and the crossover of the paper's EA.
-
-    Args:
-        parents: At least one controller, all of one design, used in turn.
-        count: Number of children.
-        settings: Numbers of the EA.
-        rng: Random number generator of all random choices.
-    """
+    """Returns children by the mutation and the crossover of the paper's EA, of parents in turn."""
     design = parents[0].design
     genomes = np.resize([parent.genome for parent in parents], (count, design.weights))
     return [Controller(design, child) for child in reproduce(genomes, draw_genomes, settings, rng)]

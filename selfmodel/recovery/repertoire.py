@@ -129,15 +129,7 @@ class Repertoire:
 
 @dataclass(frozen=True)
 class Filling:
-    """Progress of the search for a repertoire.
-
-    Attributes:
-        evaluations: Gaits evaluated so far.
-        total: Gaits that the whole search evaluates.
-        gaits: Filled cells.
-        best: Best score so far; negative infinity without a gait.
-        seconds: Wall time since the start, s.
-    """
+    """Progress of the search for a repertoire: gaits evaluated, of all, filled cells, best score."""
 
     evaluations: int
     total: int
@@ -263,9 +255,6 @@ def duty_factors(anatomy: Anatomy, readings: FloatArray) -> FloatArray:
     Args:
         anatomy: Parts of the robot.
         readings: Readings of all sensors, ``(..., steps, sensors)``; touch is 0 or 1.
-
-    Returns:
-        ``(..., feet)``, each 0 to 1.
     """
     touch = [k for k, sensor in enumerate(anatomy.sensors) if sensor.kind == "touch"]
     return np.asarray(readings[..., touch].mean(axis=-2))
@@ -275,11 +264,6 @@ def simulated_evaluation(simulator: Simulator, hypothesis: Hypothesis, steps: in
     """Returns the evaluation of gaits by their forward displacement in simulation, m.
 
     The score is negative infinity for a gait that falls, diverges, or does not move forward.
-
-    Args:
-        simulator: Self-model.
-        hypothesis: Faults of the simulated robot.
-        steps: Control steps of a rollout.
 
     Raises:
         InputError: The robot has no touch sensors.

@@ -74,13 +74,7 @@ class Score:
     needs_free_base: bool = False
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
-        """Returns the score of a physical trial; NaN where its signals were not observed.
-
-        Args:
-            robot: The healthy robot.
-            hypothesis: Faults of the physical robot.
-            trial: The trial.
-        """
+        """Returns the score of a trial of a robot with faults; NaN if it was not observed."""
         logged = trial.behaviour
         signals = {signal: logged[signal][np.newaxis] for signal in self.record}
         batch = Behaviour(logged.names, logged.time, signals)
@@ -155,11 +149,6 @@ def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
 
     A fixed base cannot fall, and a base that was not observed is not known to have fallen. A trial
     that ended early may have ended by a fall: its last pose counts as if it remained.
-
-    Args:
-        robot: The healthy robot.
-        hypothesis: Faults of the physical robot.
-        trial: The trial.
     """
     if robot.has_fixed_base:
         return None
@@ -173,9 +162,6 @@ def held_at_the_end(behaviour: Behaviour) -> Behaviour:
     """Returns the signals of a run that ended early as if the last ones remained.
 
     A robot that is stopped as it falls has few measurements of the fall.
-
-    Args:
-        behaviour: One run, ``(steps, width)`` each.
     """
     more, time = _steps_in(FALLEN_TIME, behaviour), behaviour.time
     step = time[-1] - time[-2] if behaviour.steps > 1 else FALLEN_TIME
@@ -371,11 +357,7 @@ def _held(values: FloatArray) -> FloatArray:
 
 
 def checked(score: Score, name: str) -> Score:
-    """Returns a score whose signals and values are checked.
-
-    Args:
-        score: Score from a plug-in.
-        name: Name of the plug-in, for the messages.
+    """Returns the score of a plug-in, named in the messages, with checks of signals and values.
 
     Raises:
         InputError: ``record`` is no tuple of known signals. A call of the new score raises it if

@@ -227,18 +227,13 @@ def _base64(values: NDArray[Any]) -> str:
 def simplified(
     vertices: FloatArray, faces: IndexArray, most_faces: int
 ) -> tuple[FloatArray, IndexArray]:
-    """Returns the vertices and the faces of a mesh with at most that many triangles.
+    """Returns the vertices and the faces of a mesh with at most that many triangles, 200 or more.
 
     Vertices in one cell of a grid become one, at their mean; the grid is coarsened until the rest
     is small enough. A mesh that is small enough is returned as it is.
 
     Source: Rossignac & Borrel, "Multi-resolution 3D approximations for rendering complex scenes"
     (1993).
-
-    Args:
-        vertices: Positions, ``(vertices, 3)``, m.
-        faces: Indices of the corners of each triangle, ``(faces, 3)``.
-        most_faces: Largest number of triangles, at least 200.
     """
     mesh, cells = (vertices, faces), FINEST_GRID
     while len(mesh[1]) > most_faces and cells >= 1:

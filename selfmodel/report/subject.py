@@ -310,10 +310,7 @@ class DiagnosisFile(Generic[Result]):
         return InputError(f"{self.path}: expected {self._what}: {cause}; {self._remedy}")
 
     def diagnosis(self, space: HypothesisSpace) -> Diagnosis:
-        """Returns the diagnosis.
-
-        Args:
-            space: Hypotheses that it may name.
+        """Returns the diagnosis, of hypotheses of a space.
 
         Raises:
             InputError: A value is missing, or of another type.
