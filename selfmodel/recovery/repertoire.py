@@ -129,7 +129,7 @@ class Repertoire:
 
 @dataclass(frozen=True)
 class Filling:
-    """Progress of the search for a repertoire: gaits evaluated, of all, filled cells, best score."""
+    """Progress of a search: gaits evaluated, of all of them, filled cells, best score, seconds."""
 
     evaluations: int
     total: int
