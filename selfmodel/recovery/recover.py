@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, Protocol
 
@@ -171,7 +171,7 @@ class RecoveryLoop:
         self._predicted.append(predicted)
         plan = TrialPlan(name, stage, controller, self.settings.steps, self.seed)
         trial = self.run_trial(robot, plan)
-        self.known = self.known.with_trial(trial)
+        self.known = replace(self.known, trials=(*self.known.trials, trial))
         self.on_event(trial)
 
     def _fit_self_model(self) -> None:
@@ -208,7 +208,7 @@ class RecoveryLoop:
         rng = random_stream(self.seed, "diagnosis", number)
         diagnosis = self._search(known.evidence, known.hypotheses, rng, self.on_event)
         self.journal.add(diagnosis)
-        self.known = known.with_diagnosis(diagnosis)
+        self.known = replace(known, diagnoses=(*known.diagnoses, diagnosis))
         self.rng = random_stream(self.seed, "choice", number)
         self.on_event(diagnosis)
 

@@ -1,6 +1,5 @@
 """Events of a recovery, what is known in it so far, and its result."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -75,14 +74,6 @@ class Database:
         """Hypotheses of the newest diagnosis, best first; empty before the first diagnosis."""
         ranked = self.diagnoses[-1].ranked if self.diagnoses else ()
         return tuple(candidate.hypothesis for candidate in ranked)
-
-    def with_trial(self, trial: Trial) -> "Database":
-        """Returns a copy with one trial more."""
-        return dataclasses.replace(self, trials=(*self.trials, trial))
-
-    def with_diagnosis(self, diagnosis: Diagnosis) -> "Database":
-        """Returns a copy with one diagnosis more."""
-        return dataclasses.replace(self, diagnoses=(*self.diagnoses, diagnosis))
 
 
 @dataclass(frozen=True)

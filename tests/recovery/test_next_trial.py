@@ -40,7 +40,7 @@ from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 
 SIDES = ("left", "right")
-SMALL = dataclasses.replace(Settings().scaled(12), steps=150)
+SMALL = dataclasses.replace(Settings().scaled(8), steps=120)
 
 
 def diagnosis(*texts: str, robot: Robot, indistinguishable: int = 0, verdict: Verdict) -> Diagnosis:
@@ -190,8 +190,15 @@ def test_a_repair_that_was_tried_is_followed_by_the_next_best_and_the_last_by_a_
     ],
 )
 def test_hypotheses_are_told_apart_until_one_explains_all_or_asking_is_in_vain(
-    quadruped: Robot, verdict: Verdict, unseen: list[int], trials_left: int, *, asks: bool
+    quadruped: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    verdict: Verdict,
+    unseen: list[int],
+    trials_left: int,
+    *,
+    asks: bool,
 ):
+    monkeypatch.setattr(disagreement, "GENERATIONS", 1)
     # How much is unseen after each trial.
     gait, compensating = random_controllers(quadruped, 2)
     besides = [parse(f"jam:{joint.name}", quadruped.anatomy) for joint in quadruped.anatomy.joints]
