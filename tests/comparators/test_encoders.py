@@ -142,3 +142,10 @@ def test_a_hinge_that_the_hypothesis_detaches_has_no_loss():
     lost = np.array([[False, True, False, False]])
 
     assert np.isnan(losses(predicted(detached=lost))).all(axis=(0, 1)).tolist() == lost[0].tolist()
+
+
+def test_unknown_angles_are_no_evidence():
+    logged = with_hinge(swinging(0.4), np.nan)
+
+    assert mean_loss(with_hinge(swinging(0.4), STAND), logged) == 0
+    assert mean_loss(swinging(0.4), np.full_like(logged, np.nan)) == 0

@@ -103,3 +103,16 @@ def test_what_was_not_observed_is_not_compared():
     distances = distances_of(GAIT_PATTERN.prepare(trial), runs)
     assert distances[1] == 0
     assert distances[2] > 0
+
+
+def test_a_window_that_was_not_observed_does_not_dilute_the_others():
+    walking, trot = gait(), gait(TROT)
+    half = {
+        signal: np.where(np.arange(1000)[:, np.newaxis] < 500, walking[signal], np.nan)
+        for signal in ("sensors", "joint_positions")
+    }
+
+    whole = distances_of(GAIT_PATTERN.prepare(logged(walking)), batch(trot))
+    part = distances_of(GAIT_PATTERN.prepare(logged(changed(walking, **half))), batch(trot))
+
+    np.testing.assert_allclose(part, whole, rtol=0.1)

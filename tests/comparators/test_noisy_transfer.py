@@ -110,3 +110,14 @@ def test_trials_of_any_length_keep_the_contract(steps: int):
     }
 
     check_comparator(NOISY_TRANSFER, trial, Behaviour(trial.behaviour.names, perfect.time, signals))
+
+
+def test_a_window_of_which_nothing_was_observed_is_no_piece():
+    walking = gait(steps=200)
+    signals = {signal: values.copy() for signal, values in walking.signals.items()}
+    for values in signals.values():
+        values[30:110] = np.nan
+    trial = logged(changed(walking, **signals))
+
+    # Of steps 25 to 49 and 100 to 124 something was seen, of the two windows between nothing.
+    assert NOISY_TRANSFER.prepare(trial).losses(ensembles([walking] * MEMBERS)).shape == (1, 6)

@@ -241,3 +241,15 @@ def test_what_was_not_received_does_not_count():
 
     assert loss(moving(0.1), holes) == pytest.approx(loss(moving(0.1), whole), rel=0.1)
     assert loss(moving(0.1), never) == 0
+
+
+@pytest.mark.parametrize("level", [0.05, 0.2])
+def test_noise_that_all_instruments_have_is_no_fault(level: float):
+    assert loss(moving(0.1), noisy(moving(0.1), level, level, level, level)) == 0
+
+
+def test_sensors_of_yes_and_no_have_no_noise():
+    logged = noisy(moving(0.1), 0, 0, 0.5, 0)
+
+    assert loss(moving(0.1), logged) > 0
+    assert loss(moving(0.1), logged, np.array([[True, True, False, True]])) == 0

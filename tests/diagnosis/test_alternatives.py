@@ -289,3 +289,11 @@ def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int)
     physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
     plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
     return in_memory(robot)(physical, plan)
+
+
+def test_parts_with_a_fault_are_left_out():
+    faulty = Hypothesis((Fault(WEAK_MOTOR, KNEE, 0.5),))
+    parts = [one.part for one in limits(shows(KNEE, 0.25, 1.0), WEAK_MOTOR, best=faulty)]
+
+    assert len(parts) == 7
+    assert KNEE not in parts

@@ -174,3 +174,22 @@ def test_the_surrogate_selects_and_the_comparator_itself_decides():
 
     assert best_split([INTACT], [JAM, BREAK], coarse, recorded) == Split(INTACT, JAM, 30)
     assert asked == {INTACT, JAM, BREAK}
+
+
+def test_without_a_difference_before_the_time_there_is_no_change():
+    after = np.arange(PIECES) >= 30
+    swing = np.resize([0.1, -0.1], PIECES)
+    rows = {INTACT: 0.2 + (1 + swing) * after, JAM: np.full(PIECES, 0.2), BREAK: 2.0 + swing}
+
+    assert not is_change(Split(INTACT, JAM, 30), BREAK, of(rows))
+
+
+def test_a_hypothesis_that_diverged_is_on_neither_side_of_a_change():
+    rows = dict(zip([INTACT, JAM, BREAK], losses_of(30)([INTACT, JAM, BREAK]), strict=True))
+    rows[JAM][3] = np.inf
+    split = split_of(of(rows))
+    assert split is not None
+    assert split.after == BREAK
+
+    rows[INTACT][40] = np.inf
+    assert split_of(of(rows)) is None

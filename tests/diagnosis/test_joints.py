@@ -259,3 +259,30 @@ def test_the_loss_of_a_joint_of_several_hinges_is_their_mean():
 
     problem = Synthetic(HypothesisSpace(anatomy, ()), losses, hinges=losses)
     assert np.all(problem.of_joint(joint.name, [INTACT]) == 1 / len(joint.hinges))
+
+
+def test_the_second_joint_is_searched_where_no_fault_explains_the_first():
+    """The largest excess is that of a joint that no searched fault explains."""
+    steep = bowl(said(f"jam:{SHOULDER}+encoder-offset:{SHOULDER}=0.7"), steepness=4.0)
+    shallow = bowl(said(f"damping:{KNEE}=8.0"))
+    column = ANATOMY.hinges.index(ANATOMY.joint(SHOULDER).hinges[0])
+
+    def damaged(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = shallow(hypotheses)
+        rows[:, :, column] = steep(hypotheses)[:, :, column]
+        return rows
+
+    healthy = bowl(INTACT, seed=1)
+    found = of_hinges("intact", damaged, healthy=healthy)
+    problem = Synthetic(SPACE, total(), hinges=damaged, hinges_before=healthy)
+
+    assert next(iter(excesses(INTACT, problem))) == SHOULDER
+    assert terms(found) == pytest.approx({f"damping {KNEE}": 8.0}, rel=0.05)
+
+
+def test_a_diverged_hypothesis_is_worse_and_never_better():
+    finite, diverged = np.ones(PIECES), np.full(PIECES, np.inf)
+
+    assert joint_is_better(finite, diverged)
+    assert not joint_is_better(diverged, finite)
+    assert not joint_is_better(diverged, diverged)

@@ -424,3 +424,24 @@ def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is()
 
     assert mean not in (wind, INTACT)
     assert LocalSearch(Synthetic(winds, losses, most=1)).refined([wind]) == wind
+
+
+def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
+    """Losses of frictions with several minima and noise per severity."""
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        rows = []
+        for hypothesis in hypotheses:
+            severity = degree_of(hypothesis)
+            ripple = np.random.default_rng(round(severity * 1e4)).normal(size=pieces)
+            depth = min(abs(severity - bottom) for bottom in bottoms)
+            rows.append(2 + depth + noise * (ripple - ripple.mean()))
+        return np.array(rows)
+
+    return losses
+
+
+def test_a_mean_is_not_taken_across_what_predicts_worse():
+    mean = with_mean_severities(friction(0.2), valleys(0.2, 1.2, noise=0.2), SPACE)
+
+    assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
