@@ -7,7 +7,7 @@ the ranking are the search's.)
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -378,27 +378,6 @@ def _largest_gains(
     return by_total_loss(few, problem.losses)
 
 
-@dataclass
-class _Side:
-    """Severities of a fault on one side of the nominal one, nearest first, and a bisection.
-
-    All severities from index ``high`` on show; those before ``low`` do not.
-    """
-
-    fault: Fault
-    severities: Sequence[float]
-    low: int
-    high: int
-
-    @property
-    def middle(self) -> int:
-        return (self.low + self.high) // 2
-
-    @property
-    def smallest(self) -> float | None:
-        return self.severities[self.high] if self.high < len(self.severities) else None
-
-
 def detectable_severities(
     best: Hypothesis, space: HypothesisSpace, losses: LossFunction
 ) -> list[DetectableSeverity]:
@@ -427,33 +406,33 @@ def detectable_severities(
         for part in kind.parts(space.anatomy)
         if part not in faulty
     ]
-    pairs = []
+    sides: list[tuple[Fault, list[float]]] = []
     for fault in faults:
         nominal = _nominal(fault, best, space, losses)
         if nominal is not None:
             levels = sorted(space.levels(fault))
             below = [level for level in reversed(levels) if level < nominal]
             above = [level for level in levels if level > nominal]
-            pairs.append((_side(fault, nominal, below), _side(fault, nominal, above)))
-    while undecided := [side for pair in pairs for side in pair if side.low < side.high]:
-        tried = [replace(one.fault, severity=one.severities[one.middle]) for one in undecided]
+            # The nearest level is preceded by half of it.
+            sides += [
+                (fault, [(nominal + side[0]) / 2, *side] if side else []) for side in (below, above)
+            ]
+    low, high = [0 for _ in sides], [len(severities) for _, severities in sides]
+    while undecided := [i for i in range(len(sides)) if low[i] < high[i]]:
+        middles = {i: (low[i] + high[i]) // 2 for i in undecided}
+        tried = [replace(sides[i][0], severity=sides[i][1][k]) for i, k in middles.items()]
         candidates = [space.canonical([*best.faults, fault]) for fault in tried]
         best_losses, *rows = losses([best, *candidates])
-        for side, row in zip(undecided, rows, strict=True):
+        for (i, middle), row in zip(middles.items(), rows, strict=True):
             if is_better(best_losses, row, MIN_Z_ACROSS_TRIALS):
-                side.high = side.middle
+                high[i] = middle
             else:
-                side.low = side.middle + 1
+                low[i] = middle + 1
+    smallest = [(*severities, None)[i] for (_, severities), i in zip(sides, high, strict=True)]
     return [
-        DetectableSeverity(below.fault.kind.name, below.fault.part, below.smallest, above.smallest)
-        for below, above in pairs
+        DetectableSeverity(fault.kind.name, fault.part, below, above)
+        for (fault, _), below, above in zip(sides[::2], smallest[::2], smallest[1::2], strict=True)
     ]
-
-
-def _side(fault: Fault, nominal: float, levels: Sequence[float]) -> _Side:
-    """Returns the levels on one side, after half of the nearest one."""
-    severities = [(nominal + levels[0]) / 2, *levels] if levels else []
-    return _Side(fault, severities, 0, len(severities))
 
 
 def _nominal(
