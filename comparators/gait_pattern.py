@@ -1,7 +1,8 @@
 """Difference of gait patterns: rhythm, phase and footfall sequence, whatever the time shift."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -87,16 +88,11 @@ class GaitPattern:
         in_windows = observed[: windows * length].reshape(windows, length, -1).any(axis=1)
         known = _observed_features(in_windows, readings)
         share = np.stack([known[group].any(axis=-1) for group in LARGE_DIFFERENCES], axis=-1).mean()
-        return PreparedGait(
-            request=ClosedLoop(record=signals),
-            observed=observed,
-            readings=readings,
-            timestep=timestep,
-            windows=windows,
-            gait=Gait(logged[np.newaxis], observed, readings, timestep, windows),
-            known=known,
-            share=float(share),
+        gait_of = partial(
+            Gait, observed=observed, readings=readings, timestep=timestep, windows=windows
         )
+        gait = gait_of(logged[np.newaxis])
+        return PreparedGait(ClosedLoop(record=signals), gait_of, gait, known, float(share))
 
 
 class Gait:
@@ -154,20 +150,14 @@ class PreparedGait:
 
     Attributes:
         request: A closed-loop rollout that records the observed signals.
-        observed: Mask of the observed values, ``(steps, columns)``.
-        readings: Number of columns that are readings of the controller; they are the first.
-        timestep: Control time step, s.
-        windows: Number of windows.
+        gait_of: Gait of the values of many runs, as ``Gait`` takes them.
         gait: The gait of the trial.
         known: Mask of the features with an observation, by group, ``(windows, features)`` each.
         share: Share of the groups and windows with an observation.
     """
 
     request: ClosedLoop
-    observed: BoolArray
-    readings: int
-    timestep: float
-    windows: int
+    gait_of: Callable[[FloatArray], Gait]
     gait: Gait
     known: Mapping[str, BoolArray]
     share: float
@@ -175,16 +165,12 @@ class PreparedGait:
     def losses(self, simulated: Behaviour) -> FloatArray:
         """Returns the loss of each group of features in each window, ``(n, windows * groups)``."""
         values = np.concatenate([simulated[signal] for signal in self.request.record], axis=-1)
-        gaits = Gait(values, self.observed, self.readings, self.timestep, self.windows)
-        differences = _differences(gaits, self.gait)
-        losses = np.stack(
-            [
-                _masked_mean(geman_mcclure(differences[group] / large), self.known[group])
-                for group, large in LARGE_DIFFERENCES.items()
-            ],
-            axis=-1,
-        )
-        return np.asarray((losses / self.share).reshape(len(values), -1))
+        differences = _differences(self.gait_of(values), self.gait)
+        losses = [
+            _masked_mean(geman_mcclure(differences[group] / large), self.known[group])
+            for group, large in LARGE_DIFFERENCES.items()
+        ]
+        return np.asarray((np.stack(losses, axis=-1) / self.share).reshape(len(values), -1))
 
 
 def _differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
