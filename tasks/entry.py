@@ -11,7 +11,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.registry import cases_of
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.scores import Score
-from selfmodel.robot.legs import reaches_ground
+from selfmodel.robot.contacts import reaches_ground
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 

@@ -18,17 +18,21 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores import Score
-from selfmodel.robot.control_delay import added_steps
+from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.robot.mjcf.document import read_document
-from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.load import adapt_text, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
-from selfmodel.robot.mjcf.untrusted import parse_xml
+from selfmodel.robot.mjcf.untrusted import InMemory, parse_xml
+from selfmodel.robot.mjcf.work import read_mjcf
 from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state import current_value, observed_fields, signal_fields, state_writer
+from selfmodel.robot.state import (
+    SensorReader,
+    current_value,
+    observed_fields,
+    signal_fields,
+    state_writer,
+)
 from selfmodel.simulation.prediction import activations
 from selfmodel.tasks.entry import Entry
 from selfmodel.trials.behaviour import Behaviour, Sample
@@ -120,9 +124,9 @@ def specification(domain: str, task: str) -> mujoco.MjSpec:
         task: One of its tasks.
     """
     mjcf, assets = _model(domain, task)
-    document = read_document(parse_xml(mjcf), InMemory(assets))
+    work = read_mjcf(parse_xml(mjcf), InMemory(assets))
     with loading_a_model():
-        return mujoco.MjSpec.from_string(document.text, assets=dict(document.assets))
+        return mujoco.MjSpec.from_string(work.text, assets=dict(work.assets))
 
 
 def control_timestep(domain: str) -> float | None:

@@ -14,9 +14,8 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.sensors import SILENT_NEURON
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy, added_steps
 from selfmodel.robot.anatomy_reader import read_anatomy
-from selfmodel.robot.control_delay import added_steps
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.simulation.domain import randomize_joint_angles, start_spread

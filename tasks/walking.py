@@ -22,11 +22,10 @@ from selfmodel.physical.simulated import (
     physical_embodiment,
     place_debris,
 )
-from selfmodel.robot.control_delay import CONTROL_DELAY, added_steps, split_delay
+from selfmodel.robot.anatomy import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state import current_value, observed_fields
+from selfmodel.robot.state import SensorReader, current_value, observed_fields
 from selfmodel.simulation.domain import randomize_initial_pose, start_spread
 from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.tasks.arguments import (

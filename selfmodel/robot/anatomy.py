@@ -1,9 +1,16 @@
-"""Anatomy of a robot: its joints, sensors, motors and hinges by name."""
+"""What a robot has: its joints, sensors, motors and hinges by name, and its control delay.
 
+This module needs no MuJoCo, as little as notation and comparators, which import it.
+"""
+
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from selfmodel.trials.signals import Names
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 @dataclass(frozen=True)
@@ -81,22 +88,86 @@ class Anatomy:
     floating_base: str
 
     def joint(self, name: str) -> Joint:
-        """Returns the joint of that name.
-
-        Raises:
-            KeyError: The robot has no joint of that name.
-        """
+        """Returns the joint of that name, or raises ``KeyError``."""
         return {joint.name: joint for joint in self.joints}[name]
 
     def sensor(self, name: str) -> Sensor:
-        """Returns the sensor of that name.
-
-        Raises:
-            KeyError: The robot has no sensor of that name.
-        """
+        """Returns the sensor of that name, or raises ``KeyError``."""
         return {sensor.name: sensor for sensor in self.sensors}[name]
 
     @property
     def names(self) -> Names:
         """Column names of this robot's behaviours."""
         return Names(tuple(sensor.name for sensor in self.sensors), self.motors, self.hinges)
+
+
+CONTROL_DELAY = "selfmodel_control_delay"
+"""Name of the custom numeric, which a calibration writes into the MJCF, with the control delay: the
+time from a command to its effect, in control steps; 0 by default. It may be a part of a control
+step, as long as it is a whole number of physics steps."""
+
+FITTED_CONTACTS = "selfmodel_fitted_contacts"
+"""Name of the custom numeric of a model with contacts that a calibration changed. Logs of version
+0.1 may have a third, ``selfmodel_hidden_neurons``, which is ignored: their controllers have it."""
+
+MAX_CONTROL_DELAY = 5
+"""Largest control delay, in control steps: segments contain that many commands before their
+start."""
+
+_DELAY_TOLERANCE = 1e-4
+"""Rounding error of a control delay in an MJCF of six digits, in physics steps."""
+
+
+def control_delay(model: "MjModel", substeps: int) -> float:
+    """Returns the control delay of a model, in control steps; see ``as_delay``.
+
+    Args:
+        model: A compiled model.
+        substeps: Physics steps per control step.
+
+    Raises:
+        ValueError: The custom numeric is not from 0 to ``MAX_CONTROL_DELAY``, not a whole number of
+            physics steps, or not a whole number of control steps in a model with activations.
+    """
+    delay = custom_numeric(model, CONTROL_DELAY) or 0.0
+    allowed = 1 if model.na else substeps
+    error = abs(delay * allowed - round(delay * allowed))
+    if not 0 <= delay <= MAX_CONTROL_DELAY or error > _DELAY_TOLERANCE:
+        parts = "a whole number" if allowed == 1 else f"a multiple of 1/{allowed}"
+        raise ValueError(
+            f"{CONTROL_DELAY} must be {parts} from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"
+        )
+    return as_delay(round(delay * allowed), allowed)
+
+
+def as_delay(parts: int, substeps: int) -> float:
+    """Returns a control delay in control steps; an ``int`` if it is a whole number of them.
+
+    Args:
+        parts: The control delay in physics steps.
+        substeps: Physics steps per control step.
+    """
+    return parts // substeps if parts % substeps == 0 else parts / substeps
+
+
+def split_delay(delay: float, substeps: int) -> tuple[int, int]:
+    """Returns a control delay as whole control steps and the physics steps beyond them."""
+    return divmod(round(delay * substeps), substeps)
+
+
+def added_steps(delay: float, added: float) -> int:
+    """Returns the whole control steps by which a control delay grows under a fault.
+
+    Args:
+        delay: Control delay of the healthy robot, in control steps.
+        added: Severity of the fault, in control steps; rounded, and limited so that the sum is at
+            most ``MAX_CONTROL_DELAY``.
+    """
+    return min(round(added), math.floor(MAX_CONTROL_DELAY - delay))
+
+
+def custom_numeric(model: "MjModel", name: str) -> float | None:
+    """Returns the first value of a custom numeric; None if the model does not contain it."""
+    if name not in (model.numeric(i).name for i in range(model.nnumeric)):
+        return None
+    return float(model.numeric(name).data[0])

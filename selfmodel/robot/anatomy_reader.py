@@ -1,25 +1,58 @@
 """Reads the anatomy of a robot, and its root body, from its compiled model."""
 
 import math
+from itertools import takewhile
 
 import mujoco
 import numpy as np
 
-from selfmodel.robot.actuators import (
-    descends,
-    has_feedback,
-    motor_bodies,
-    motor_joints,
-)
+from selfmodel.arrays import FloatArray
+from selfmodel.robot.actuators import ancestors, has_feedback, motor_bodies, motor_joints
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
+from selfmodel.trials.rotation import product, rotated
 
-_TOUCH = int(mujoco.mjtSensor.mjSENS_TOUCH)
-_ANGLE = int(mujoco.mjtSensor.mjSENS_JOINTPOS)
+_FREE, _SLIDE, _HINGE = (
+    int(mujoco.mjtJoint.mjJNT_FREE),
+    int(mujoco.mjtJoint.mjJNT_SLIDE),
+    int(mujoco.mjtJoint.mjJNT_HINGE),
+)
 
 
 def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
     """Returns the ids of the joints that motors move."""
     return frozenset[int]().union(*(motor_joints(model, m) for m in range(model.nu)))
+
+
+def joints_of_body(model: mujoco.MjModel, body: int) -> list[int]:
+    """Returns the ids of the joints between a body and its parent."""
+    first = int(model.body_jntadr[body])
+    return list(range(first, first + int(model.body_jntnum[body])))
+
+
+def joint_limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
+    """Returns the lower and upper angle of a hinge, rad; -pi and pi if it has no limits."""
+    if not model.jnt_limited[hinge]:
+        return -math.pi, math.pi
+    low, high = model.jnt_range[hinge]
+    return float(low), float(high)
+
+
+def reference_pose(model: mujoco.MjModel, body: int) -> tuple[FloatArray, FloatArray]:
+    """Returns position and orientation of a body of static bodies in the reference configuration.
+
+    Args:
+        model: A compiled MJCF.
+        body: Id of a body whose ancestors are static.
+
+    Returns:
+        Position, ``(3,)`` m, and orientation, ``(4,)``, w x y z, in the world.
+    """
+    position, orientation = model.body_pos[body].copy(), model.body_quat[body].copy()
+    for parent in ancestors(model, body)[1:]:
+        turn = model.body_quat[parent]
+        position = model.body_pos[parent] + rotated(position, turn)
+        orientation = product(turn, orientation)
+    return position, orientation
 
 
 def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
@@ -63,7 +96,7 @@ def _joint(
 ) -> Joint:
     """Returns the joint of a body, given the hinges and the joint name of each body."""
     group = groups[body]
-    subtree = frozenset(b for b in range(body, model.nbody) if descends(model, b, body))
+    subtree = frozenset(b for b in range(body, model.nbody) if body in ancestors(model, b))
     bodies = frozenset(model.body(b).name for b in subtree)
     moved = {m: motor_joints(model, m) for m in range(model.nu)}
     motors = [m for j in group for m in moved if j == min(moved[m], default=-1)]
@@ -87,24 +120,19 @@ def _joint(
     )
 
 
-def joint_limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
-    """Returns the lower and upper angle of a hinge, rad; -pi and pi if it has no limits."""
-    if not model.jnt_limited[hinge]:
-        return -math.pi, math.pi
-    low, high = model.jnt_range[hinge]
-    return float(low), float(high)
-
-
 def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[int, str]:
-    """Returns the joint name per body: the common prefix of its hinges, or the body's name."""
+    """Returns the joint name per body: the common prefix of its hinges, or the body's name.
+
+    The prefix of ``front_left_hip_swing`` and ``front_left_hip_lift`` is ``front_left_hip``.
+    """
+    own = {body: str(model.body(body).name) for body in groups}
     prefixes = {
-        body: _common_prefix([model.joint(j).name for j in group]) or str(model.body(body).name)
+        body: _common_prefix([model.joint(j).name for j in group]) or own[body]
         for body, group in groups.items()
     }
-    all_prefixes = list(prefixes.values())
+    shared = list(prefixes.values())
     names = {
-        body: name if all_prefixes.count(name) == 1 else str(model.body(body).name)
-        for body, name in prefixes.items()
+        body: name if shared.count(name) == 1 else own[body] for body, name in prefixes.items()
     }
     repeated = {name for name in names.values() if list(names.values()).count(name) > 1}
     if repeated:
@@ -116,40 +144,24 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
     return names
 
 
-def _common_prefix(hinges: list[str]) -> str:
-    """Returns the common prefix: ``front_left_hip`` for ``_swing`` and ``_lift`` of one body."""
-    prefix = hinges[0]
-    while not all(name.startswith(prefix) for name in hinges):
-        prefix = prefix[:-1]
-    return prefix.rstrip("_")
+def _common_prefix(names: list[str]) -> str:
+    same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    return "".join(letters[0] for letters in same).rstrip("_")
 
 
 def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:
     touch, angle = [], []
     for s in range(model.nsensor):
         name, target = model.sensor(s).name, int(model.sensor_objid[s])
-        if model.sensor_type[s] == _TOUCH:
+        if model.sensor_type[s] == mujoco.mjtSensor.mjSENS_TOUCH:
             body = model.body(model.site_bodyid[target]).name
             touch.append(Sensor(name, "touch", body, "", 1.0, 0.0))
-        elif model.sensor_type[s] == _ANGLE and target in hinges:
+        elif model.sensor_type[s] == mujoco.mjtSensor.mjSENS_JOINTPOS and target in hinges:
             low, high = joint_limits(model, target)
             body = model.body(model.jnt_bodyid[target]).name
             hinge = model.joint(target).name
             angle.append(Sensor(name, "angle", body, hinge, (high - low) / 2, (low + high) / 2))
     return tuple(touch + angle)
-
-
-_FREE, _SLIDE, _HINGE = (
-    int(mujoco.mjtJoint.mjJNT_FREE),
-    int(mujoco.mjtJoint.mjJNT_SLIDE),
-    int(mujoco.mjtJoint.mjJNT_HINGE),
-)
-
-
-def joints_of_body(model: mujoco.MjModel, body: int) -> list[int]:
-    """Returns the ids of the joints between a body and its parent."""
-    first = int(model.body_jntadr[body])
-    return list(range(first, first + int(model.body_jntnum[body])))
 
 
 def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
@@ -178,7 +190,15 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         return floating[0]
     if not driven:
         raise ValueError("the motors drive no joint: give the joints of the limbs motors")
-    _check_hinged(model)
+    for joint in np.flatnonzero(model.jnt_type != _HINGE):
+        body = model.body(model.jnt_bodyid[joint])
+        if not model.body_weldid[body.parentid[0]]:
+            raise ValueError(
+                f"the model needs a root body with a free joint, with slide joints and then at "
+                f"most one hinge that no motor moves, or without a joint (its base is fixed), and "
+                f"the body {body.name or 'without a name'} has other joints: give the root body a "
+                f"<freejoint/>, or only hinges to its parent"
+            )
     carrier = common_carrier(model, driven)
     if not carrier:
         raise ValueError(
@@ -191,16 +211,26 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
 def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
     """Returns the ids of the bodies that can be a floating base.
 
+    They have a free joint; or else they are bodies of the world with independent slide joints and
+    then at most one hinge, and no motor moves them.
+
     Args:
         model: A compiled MJCF.
         driven: Ids of the joints that motors move.
     """
-    free = [int(model.jnt_bodyid[j]) for j in np.flatnonzero(model.jnt_type == _FREE)]
-    return free or [
-        body
-        for body in np.flatnonzero(model.body_parentid == 0).tolist()
-        if body and _is_sliding_base(model, body, driven)
-    ]
+    free: list[int] = model.jnt_bodyid[model.jnt_type == _FREE].tolist()
+    if free:
+        return free
+    sliding = []
+    for body in np.flatnonzero(model.body_parentid == 0).tolist()[1:]:
+        joints = joints_of_body(model, body)
+        kinds = model.jnt_type[joints].tolist()
+        slides = kinds.count(_SLIDE)
+        in_order = kinds in ([_SLIDE] * slides, [_SLIDE] * slides + [_HINGE])
+        axes = model.jnt_axis[joints[:slides]]
+        if slides and in_order and np.linalg.matrix_rank(axes) == slides:
+            sliding += [] if driven.intersection(joints) else [body]
+    return sliding
 
 
 def common_carrier(model: mujoco.MjModel, joints: frozenset[int]) -> int:
@@ -213,38 +243,8 @@ def common_carrier(model: mujoco.MjModel, joints: frozenset[int]) -> int:
     Returns:
         The id of the body; 0, the world, if no other static body carries all the joints.
     """
-    chains = [_static_chain(model, int(model.jnt_bodyid[joint])) for joint in joints]
-    return max(set(chains[0]).intersection(*chains[1:]))
-
-
-def _static_chain(model: mujoco.MjModel, body: int) -> list[int]:
-    """Returns the ids of the static bodies that carry a body, with the world."""
-    chain = []
-    while body:
-        body = int(model.body_parentid[body])
-        if not model.body_weldid[body]:
-            chain.append(body)
-    return chain
-
-
-def _check_hinged(model: mujoco.MjModel) -> None:
-    """Refuses bodies of a world that have a slide or ball joint and are no floating base."""
-    for joint in range(model.njnt):
-        parent = int(model.body_parentid[model.jnt_bodyid[joint]])
-        if model.jnt_type[joint] != _HINGE and not model.body_weldid[parent]:
-            raise ValueError(
-                f"the model needs a root body with a free joint, with slide joints and then at "
-                f"most one hinge that no motor moves, or without a joint (its base is fixed), and "
-                f"the body {model.body(model.jnt_bodyid[joint]).name or 'without a name'} has "
-                f"other joints: give the root body a <freejoint/>, or only hinges to its parent"
-            )
-
-
-def _is_sliding_base(model: mujoco.MjModel, body: int, driven: frozenset[int]) -> bool:
-    joints = joints_of_body(model, body)
-    kinds = [int(model.jnt_type[j]) for j in joints]
-    slides = kinds.count(_SLIDE)
-    if not slides or kinds not in ([_SLIDE] * slides, [_SLIDE] * slides + [_HINGE]):
-        return False
-    independent = np.linalg.matrix_rank(model.jnt_axis[joints[:slides]]) == slides
-    return bool(independent) and not driven.intersection(joints)
+    chains = [
+        {0}.union(b for b in ancestors(model, int(body))[1:] if not model.body_weldid[b])
+        for body in model.jnt_bodyid[list(joints)]
+    ]
+    return max(set.intersection(*chains))

@@ -12,56 +12,10 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from types import MappingProxyType
 
 import mujoco
 
 from selfmodel.errors import InputError
-
-_TIME = re.compile(r" *Time = [^ ]*\.$")
-_NUMBER = re.compile(r"\d+(\.\d+)?")
-_counts: Counter[str] = Counter()
-
-
-def configure() -> None:
-    """Turns MuJoCo's log off, and counts its warnings, unless the program handles them itself."""
-    handler = mujoco.get_mju_user_warning()
-    if handler is not None and handler is not _handler_of_dm_control():
-        return
-    config = mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    mujoco.MjLogConfig.set(config)
-    mujoco.set_mju_user_warning(_count)
-
-
-def _handler_of_dm_control() -> object:
-    module = sys.modules.get("dm_control.mujoco.wrapper.core")
-    return getattr(module, "_warning_callback", None)
-
-
-def _count(message: str) -> None:
-    # An exception would end the process: MuJoCo calls this function from C, in any thread.
-    _counts[_NUMBER.sub("N", _TIME.sub("", message.strip()))] += 1
-
-
-def mujoco_warnings() -> Mapping[str, int]:
-    """Returns the number of each warning in this process; every number in the text is ``N``."""
-    return MappingProxyType(dict(_counts))
-
-
-@contextmanager
-def uncounted_warnings() -> Iterator[None]:
-    """Discards the warnings of a block that reports them by itself."""
-    configure()
-    before = Counter(_counts)
-    try:
-        yield
-    finally:
-        _counts.clear()
-        _counts.update(before)
-
-
-configure()
 
 MUJOCO_ERRORS = (
     ValueError,
@@ -75,6 +29,46 @@ MUJOCO_ERRORS = (
 
 _OUT_OF_MEMORY = ("ould not allocate", "unknown exception")
 """Parts of MuJoCo's messages when it is out of memory; the second is a C++ ``bad_alloc``."""
+
+_TIME, _NUMBER = re.compile(r" *Time = [^ ]*\.$"), re.compile(r"\d+(\.\d+)?")
+_counts: Counter[str] = Counter()
+
+
+def configure() -> None:
+    """Turns MuJoCo's log off, and counts its warnings, unless the program handles them itself."""
+    handler = mujoco.get_mju_user_warning()
+    dm_control = sys.modules.get("dm_control.mujoco.wrapper.core")
+    if handler is not None and handler is not getattr(dm_control, "_warning_callback", None):
+        return
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    mujoco.MjLogConfig.set(config)
+    mujoco.set_mju_user_warning(_count)
+
+
+def _count(message: str) -> None:
+    # An exception would end the process: MuJoCo calls this function from C, in any thread.
+    _counts[_NUMBER.sub("N", _TIME.sub("", message.strip()))] += 1
+
+
+configure()
+
+
+def mujoco_warnings() -> Mapping[str, int]:
+    """Returns the number of each warning in this process; every number in the text is ``N``."""
+    return dict(_counts)
+
+
+@contextmanager
+def uncounted_warnings() -> Iterator[None]:
+    """Discards the warnings of a block that reports them by itself."""
+    configure()
+    before = Counter(_counts)
+    try:
+        yield
+    finally:
+        _counts.clear()
+        _counts.update(before)
 
 
 @contextmanager
@@ -90,24 +84,19 @@ def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
     configure()
     try:
         yield
+    except InputError:
+        raise
     except MUJOCO_ERRORS as error:
-        if isinstance(error, InputError):
-            raise
         message = " ".join(str(error).split()).removeprefix("Error: ")
         if isinstance(error, MemoryError) or any(part in message for part in _OUT_OF_MEMORY):
-            raise InputError(
-                f"MuJoCo cannot {task}, for lack of memory: make the model smaller"
-            ) from error
+            message = "for lack of memory: make the model smaller"
+            raise InputError(f"MuJoCo cannot {task}, {message}") from error
         raise InputError(f"MuJoCo cannot {task}: {message}") from error
 
 
 @contextmanager
 def loading_a_model() -> Iterator[None]:
-    """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings.
-
-    Raises:
-        InputError: MuJoCo raised an exception.
-    """
+    """Converts MuJoCo's exceptions to ``InputError``, and suppresses its warnings."""
     with (
         mujoco_errors_as_input_errors("load the model"),
         uncounted_warnings(),

@@ -1,4 +1,4 @@
-"""Robot: an MJCF model, its parts by name, and its control time step."""
+"""Robot: an MJCF model, its parts by name, its control time step; models that can be none."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,19 +6,35 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.anatomy_reader import driven_joints, find_root_body, read_anatomy
-from selfmodel.robot.base import reference_pose
-from selfmodel.robot.control_delay import (
+from selfmodel.errors import InputError, listed
+from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS, motor_joints
+from selfmodel.robot.anatomy import (
     CONTROL_DELAY,
     FITTED_CONTACTS,
+    Anatomy,
     control_delay,
     custom_numeric,
 )
-from selfmodel.robot.model_checks import check_model
-from selfmodel.robot.mujoco_errors import configure
+from selfmodel.robot.anatomy_reader import (
+    driven_joints,
+    find_root_body,
+    joints_of_body,
+    read_anatomy,
+    reference_pose,
+)
+from selfmodel.robot.mujoco_errors import configure, loading_a_model
 
 configure()
+
+MAX_NUMBER = float(mujoco.mjMAXVAL)
+"""Largest number of a model: MuJoCo resets a simulation whose state or acceleration exceeds it."""
+
+MAX_NAME = 1000
+"""Longest name of a motor or a hinge, characters: every message of a log may have all names."""
+
+MAX_ITERATIONS = 10_000
+"""Largest number of iterations of a solver; MuJoCo's default is 100 or less. The number of a step
+depends on the contacts, so the first steps of a model do not bound it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +120,176 @@ class Robot:
     def specification(self) -> mujoco.MjSpec:
         """Returns the MJCF as an editable MjSpec."""
         return mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
+
+
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_UNSUPPORTED_JOINTS = {
+    int(mujoco.mjtJoint.mjJNT_SLIDE): "is a slide joint",
+    int(mujoco.mjtJoint.mjJNT_BALL): "is a ball joint",
+}
+_DYN, _GAIN, _BIAS = mujoco.mjtDyn, mujoco.mjtGain, mujoco.mjtBias
+_SUPPORTED = {
+    "actuator_dyntype": (
+        *(_DYN.mjDYN_NONE, _DYN.mjDYN_INTEGRATOR),
+        *(_DYN.mjDYN_FILTER, _DYN.mjDYN_FILTEREXACT),
+    ),
+    "actuator_gaintype": (_GAIN.mjGAIN_FIXED, _GAIN.mjGAIN_AFFINE),
+    "actuator_biastype": (_BIAS.mjBIAS_NONE, _BIAS.mjBIAS_AFFINE),
+}
+_OPTIONS = ("timestep", "gravity", "wind", "magnetic", "density", "viscosity")
+_NUMBERS = (
+    *("qpos0", "body_pos", "body_quat", "body_ipos", "body_mass", "body_inertia"),
+    *("geom_pos", "geom_size", "geom_friction", "geom_solref", "pair_solref"),
+    *("jnt_pos", "jnt_range", "jnt_stiffness"),
+    *("dof_armature", "dof_damping", "dof_frictionloss", "tendon_stiffness", "tendon_damping"),
+    *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_dynprm"),
+)
+"""Attributes of a model that determine its motion."""
+
+_ITERATIONS = (
+    *("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"),
+    *("sdf_iterations", "sdf_initpoints"),
+)
+
+
+def check_model(model: mujoco.MjModel, root: int) -> None:
+    """Checks that a robot of this model can be logged, damaged and predicted from its logs.
+
+    Args:
+        model: A compiled MJCF.
+        root: Id of the root body.
+
+    Raises:
+        ValueError: The model has an unsupported part, or a number that is not finite or absurdly
+            large; the message contains the name of the part.
+    """
+    numbers = [(f"option {name}", getattr(model.opt, name)) for name in _OPTIONS]
+    numbers += [(name.replace("_", " "), getattr(model, name)) for name in _NUMBERS]
+    for name, values in numbers:
+        wrong = np.ravel(values)[~(np.abs(np.ravel(values)) <= MAX_NUMBER)]
+        if len(wrong):
+            raise ValueError(
+                f"expected finite numbers of at most {MAX_NUMBER:g} in the model's {name}, got "
+                f"{wrong[0]:g}"
+            )
+    base_joints = joints_of_body(model, root)
+    for j in range(model.njnt):
+        kind = int(model.jnt_type[j])
+        if j not in base_joints and kind in _UNSUPPORTED_JOINTS:
+            raise ValueError(
+                f"the model's joint {_label(model.joint(j))} {_UNSUPPORTED_JOINTS[kind]}: expected "
+                f"hinges only, except between the world and the root body"
+            )
+    if model.nflex or model.nplugin:
+        raise ValueError(
+            "the model has soft bodies (flex) or plugins, whose state a log does not contain: "
+            "expected rigid bodies only"
+        )
+    for name in _ITERATIONS:
+        if getattr(model.opt, name) > MAX_ITERATIONS:
+            raise ValueError(
+                f"the model has {name}={getattr(model.opt, name)}, expected at most "
+                f"{MAX_ITERATIONS}: a step of its physics could take any time"
+            )
+    for m in range(model.nu):
+        _check_motor(model, m)
+    hinges = [model.joint(int(j)) for j in np.flatnonzero(model.jnt_type == _HINGE)]
+    _check_names("motor", [model.actuator(m) for m in range(model.nu)])
+    _check_names("hinge", hinges)
+
+
+def _check_motor(model: mujoco.MjModel, motor: int) -> None:
+    name = _label(model.actuator(motor))
+    kind, reference = int(model.actuator_trntype[motor]), model.actuator_trnid[motor, 1]
+    if kind not in SUPPORTED_TRANSMISSIONS or (
+        kind == int(mujoco.mjtTrn.mjTRN_SITE) and reference >= 0
+    ):
+        raise ValueError(
+            f"the model's motor {name} has a transmission that is not supported: expected a "
+            f"joint, a tendon, a body, or a site without a reference site"
+        )
+    supported = all(
+        int(getattr(model, field)[motor]) in map(int, kinds) for field, kinds in _SUPPORTED.items()
+    )
+    if not supported or model.actuator_actnum[motor] > 1 or model.actuator_delay[motor] > 0:
+        raise ValueError(
+            f"the model's motor {name} is a muscle, has a delay, or has dynamics of a kind that is "
+            f"not supported: expected none, integrator, filter or filterexact"
+        )
+
+
+def _check_names(kind: str, parts: list[mujoco.MjModel]) -> None:
+    for part in parts:
+        if not part.name:
+            raise ValueError(
+                f"the model's {kind} number {int(part.id)} has no name: give it one, because "
+                f"logs and faults identify parts by name"
+            )
+        if len(part.name) > MAX_NAME:
+            raise ValueError(
+                f"expected names of at most {MAX_NAME} characters, got {len(part.name)} in the "
+                f"name of the {kind} {part.name[:20]}...: shorten it"
+            )
+
+
+def _label(part: mujoco.MjModel) -> str:
+    return repr(part.name) if part.name else f"number {int(part.id)}"
+
+
+_PROBE_SECONDS, _MAX_PROBE_STEPS = 0.2, 200
+_UNSTABLE = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+
+
+def check_usable(model: mujoco.MjModel) -> None:
+    """Checks that a model can be simulated, driven, logged and diagnosed.
+
+    Raises:
+        InputError: The model cannot be a robot; the message has the reason and the part.
+    """
+    if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
+        raise InputError(
+            f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
+        )
+    if not model.nu:
+        raise InputError(
+            "the model has no actuators: give each joint that a motor is to drive an element in "
+            "<actuator>"
+        )
+    tops = sorted({int(model.body_rootid[body]) for body in model.jnt_bodyid})
+    if len(tops) > 1:  # a log contains the state of one robot
+        raise InputError(
+            f"expected one tree of moving bodies, got "
+            f"{listed([model.body(body).name for body in tops], 12)}: keep the robot, and remove "
+            f"the other bodies or fix them to the world"
+        )
+    driven = driven_joints(model)
+    if not driven:
+        raise InputError(
+            "the model's motors drive no joint, so no fault could be diagnosed: give the joints of "
+            "its limbs motors in <actuator>"
+        )
+    try:
+        root = find_root_body(model, driven)
+        check_model(model, root)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    for motor in range(model.nu):
+        for joint in motor_joints(model, motor).intersection(joints_of_body(model, root)):
+            raise InputError(
+                f"the motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
+                f"root body {model.body(root).name}, which only the limbs may move: remove the "
+                f"motor"
+            )
+    steps = min(_MAX_PROBE_STEPS, max(1, round(_PROBE_SECONDS / model.opt.timestep)))
+    with loading_a_model():
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, steps)
+    if any(data.warning[kind].number for kind in _UNSTABLE):
+        raise InputError(
+            f"the simulation diverges within {steps * model.opt.timestep:.2g} s, without "
+            f"commands: give the model a smaller <option timestep>, or realistic masses and joints"
+        )

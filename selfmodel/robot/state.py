@@ -1,31 +1,270 @@
-"""Reads and writes the signals of a trajectory in MuJoCo's state of a robot."""
+"""Reads and writes the signals of a trajectory in MuJoCo's state of a robot.
+
+The base of a robot moves freely, or along slide joints and about one hinge, such as the planar
+walkers of the dm_control suite; or it is fixed to the world, such as that of an arm.
+"""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, columns
-from selfmodel.robot.base import Bind, DerivedSignal, ShiftedField, StateField, read_base
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import joints_of_body, reference_pose
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import with_joint_velocities
+from selfmodel.trials.rotation import product, rotated
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 
-ObservedSignal = StateField | ShiftedField | DerivedSignal
-"""A signal as a robot logs it."""
+Bind = Callable[[str], FloatArray]
+"""Returns the array of a field of MuJoCo's state of many robots, ``(n, width)``, by name."""
+
+Reader = Callable[[], FloatArray]
+"""Returns the current value of a signal, ``(n, width)``; the value may be a view of the state."""
 
 StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
 """Writes signals, ``(n, width)`` each, into the state; absent signals, and joints whose value is
 NaN, keep their values."""
 
+BASE_SIGNALS: tuple[Signal, ...] = (
+    "base_position",
+    "base_orientation",
+    "base_linear_velocity",
+    "base_angular_velocity",
+)
+"""Signals of the base."""
 
-def signal_fields(
-    robot: Robot, *models: mujoco.MjModel
-) -> dict[Signal, StateField | DerivedSignal]:
+
+@dataclass(frozen=True, eq=False)
+class StateField:
+    """A signal that MuJoCo's state contains: columns of a field of MjData.
+
+    Attributes:
+        field: Name of the field, such as ``qpos``.
+        columns: Columns of the field.
+        shift: Signal minus field, ``(n, width)``; None for no difference.
+    """
+
+    field: str
+    columns: slice | list[int]
+    shift: FloatArray | None = None
+
+    def reader(self, bind: Bind) -> Reader:
+        """Returns a function that reads the signal from the bound state."""
+        values, chosen, shift = bind(self.field), self.columns, self.shift
+        if shift is None:
+            return lambda: values[:, chosen]
+        return lambda: values[:, chosen] + shift
+
+
+@dataclass(frozen=True)
+class DerivedSignal:
+    """A signal that is computed from positions and velocities.
+
+    Attributes:
+        compute: Function from ``qpos``, ``(n, nq)``, and ``qvel``, ``(n, nv)``, to the signal,
+            ``(n, width)``.
+    """
+
+    compute: Callable[[FloatArray, FloatArray], FloatArray]
+
+    def reader(self, bind: Bind) -> Reader:
+        """Returns a function that computes the signal from the bound state."""
+        qpos, qvel = bind("qpos"), bind("qvel")
+        return lambda: self.compute(qpos, qvel)
+
+
+SignalSource = StateField | DerivedSignal
+"""Where the value of a signal is in MuJoCo's state."""
+
+
+class FreeBase:
+    """A floating base with a free joint.
+
+    Args:
+        position: Index of the first component of the pose in ``qpos``.
+        velocity: Index of the first component of the velocity in ``qvel``.
+    """
+
+    def __init__(self, position: int, velocity: int) -> None:
+        self.fields: dict[Signal, SignalSource] = {
+            "base_position": StateField("qpos", slice(position, position + 3)),
+            "base_orientation": StateField("qpos", slice(position + 3, position + 7)),
+            "base_linear_velocity": StateField("qvel", slice(velocity, velocity + 3)),
+            "base_angular_velocity": StateField("qvel", slice(velocity + 3, velocity + 6)),
+        }
+
+    def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
+        """Writes signals of the base, ``(n, width)``, into the state; absent ones keep theirs."""
+        for signal, field in self.fields.items():
+            if signal in base and isinstance(field, StateField):
+                array = qpos if field.field == "qpos" else qvel
+                array[:, field.columns] = base[signal]
+
+
+class FixedBase:
+    """A base without degrees of freedom: its pose is a constant of the model.
+
+    Args:
+        models: One model for all rows of a state, or one per row; they share one layout. The pose
+            differs between them, as on slopes.
+        body: Id of the root body.
+    """
+
+    def __init__(self, models: Sequence[mujoco.MjModel], body: int) -> None:
+        # One model serves many rows of a batch of segments.
+        poses = {key: reference_pose(m, body) for key, m in {id(m): m for m in models}.items()}
+        positions, orientations = (
+            np.array(rows) for rows in zip(*(poses[id(model)] for model in models), strict=True)
+        )
+        self.fields: dict[Signal, SignalSource] = {
+            "base_position": _constant(positions),
+            "base_orientation": _constant(orientations),
+            "base_linear_velocity": _constant(np.zeros((1, 3))),
+            "base_angular_velocity": _constant(np.zeros((1, 3))),
+        }
+
+    def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
+        """Leaves the state unchanged: signals of a fixed base are not part of it."""
+
+
+def _constant(rows: FloatArray) -> DerivedSignal:
+    return DerivedSignal(lambda qpos, _qvel: np.broadcast_to(rows, (len(qpos), rows.shape[1])))
+
+
+class SlidingBase:
+    """A floating base with slide joints, then at most one hinge, between the world and the body.
+
+    Args:
+        models: One model for all rows of a state, or one per row; they share one layout. The frame
+            of the body differs between them, as on slopes.
+        body: Id of the root body.
+    """
+
+    def __init__(self, models: Sequence[mujoco.MjModel], body: int) -> None:
+        model, joints = models[0], joints_of_body(models[0], body)
+        turns = model.jnt_type[joints[-1]] == mujoco.mjtJoint.mjJNT_HINGE
+        slides = joints[:-1] if turns else joints
+        # Position and orientation of the body in the reference configuration, ``(n, ...)``.
+        self._position = np.array([each.body_pos[body] for each in models])
+        self._orientation = np.array([each.body_quat[body] for each in models])
+        self._inverse = self._orientation * (1.0, -1.0, -1.0, -1.0)
+        # Indices in ``qpos`` and ``qvel`` and the reference of each joint.
+        places = [(int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])) for j in joints]
+        scalars = [(q, v, float(model.qpos0[q])) for q, v in places]
+        self._slides = scalars[: len(slides)]
+        self._hinge = scalars[-1] if turns else None
+        self._axes = model.jnt_axis[slides]
+        self._axis = model.jnt_axis[joints[-1]].copy() if turns else np.array([0.0, 0.0, 1.0])
+        self._anchor = model.jnt_pos[joints[-1]].copy() if turns else np.zeros(3)
+        self.fields: dict[Signal, SignalSource] = {
+            "base_position": DerivedSignal(self._positions),
+            "base_orientation": DerivedSignal(self._orientations),
+            "base_linear_velocity": DerivedSignal(self._velocities),
+            "base_angular_velocity": DerivedSignal(self._rates),
+        }
+
+    def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
+        """Writes signals of the base, ``(n, width)``, into the state; absent ones keep theirs.
+
+        The part of a signal outside the degrees of freedom is dropped: a rotation about another
+        axis than the hinge's, and a translation across the slide axes.
+        """
+        # A hinge beside the origin moves the origin: read the position before the hinge turns.
+        position = base.get("base_position", self._positions(qpos, qvel))
+        velocity = base.get("base_linear_velocity", self._velocities(qpos, qvel))
+        if self._hinge is not None:
+            q, v, reference = self._hinge
+            if "base_orientation" in base:
+                rotation = product(self._inverse, base["base_orientation"])
+                half = np.arctan2((rotation[:, 1:] * self._axis).sum(axis=1), rotation[:, 0])
+                # A quaternion and its negative are the same rotation.
+                angle = np.remainder(2 * half + np.pi, 2 * np.pi) - np.pi
+                qpos[:, q] = reference + angle
+            if "base_angular_velocity" in base:
+                qvel[:, v] = (base["base_angular_velocity"] * self._axis).sum(axis=1)
+        shift, shift_rate = self._origin_shift(qpos, qvel)
+        translation = rotated(position - self._position, self._inverse) - shift
+        speed = rotated(velocity, self._inverse) - shift_rate
+        for (q, v, reference), along in zip(
+            self._slides, np.linalg.pinv(self._axes).T, strict=True
+        ):
+            qpos[:, q] = reference + (translation * along).sum(axis=1)
+            qvel[:, v] = (speed * along).sum(axis=1)
+
+    def _positions(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        translation = self._origin_shift(qpos, qvel)[0]
+        for (q, _, reference), axis in zip(self._slides, self._axes, strict=True):
+            translation = translation + (qpos[:, q, np.newaxis] - reference) * axis
+        return np.asarray(self._position + rotated(translation, self._orientation))
+
+    def _velocities(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        velocity = self._origin_shift(qpos, qvel)[1]
+        for (_, v, _), axis in zip(self._slides, self._axes, strict=True):
+            velocity = velocity + qvel[:, v, np.newaxis] * axis
+        return rotated(velocity, self._orientation)
+
+    def _orientations(self, qpos: FloatArray, _qvel: FloatArray) -> FloatArray:
+        half = self._angles(qpos) / 2
+        return product(self._orientation, np.hstack([np.cos(half), np.sin(half) * self._axis]))
+
+    def _rates(self, _qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        if self._hinge is None:
+            return np.zeros((len(qvel), 3))
+        return np.asarray(qvel[:, self._hinge[1], np.newaxis] * self._axis)
+
+    def _angles(self, qpos: FloatArray) -> FloatArray:
+        """Returns the angle of the hinge from its reference, ``(n, 1)`` rad."""
+        if self._hinge is None:
+            return np.zeros((len(qpos), 1))
+        q, _, reference = self._hinge
+        return np.asarray(qpos[:, q, np.newaxis] - reference)
+
+    def _origin_shift(self, qpos: FloatArray, qvel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns displacement and velocity of the body's origin due to the hinge.
+
+        Both are ``(n, 3)``, m and m/s, in the body's reference frame.
+        """
+        angle = self._angles(qpos)
+        if self._hinge is None or not self._anchor.any():
+            return np.zeros((len(angle), 3)), np.zeros((len(angle), 3))
+        outward = self._anchor - self._axis * (self._axis @ self._anchor)
+        across = np.cross(self._axis, self._anchor)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        rate = qvel[:, self._hinge[1], np.newaxis]
+        return (
+            outward * (1 - cosine) - across * sine,
+            rate * (outward * sine - across * cosine),
+        )
+
+
+Base = FreeBase | SlidingBase | FixedBase
+
+
+def read_base(models: Sequence[mujoco.MjModel], root: str) -> Base:
+    """Returns the base of a robot.
+
+    Args:
+        models: One model for all rows of a state, or one model per row; they share one layout.
+        root: Name of the root body; see ``find_root_body``.
+    """
+    model = models[0]
+    body = int(model.body(root).id)
+    joints = joints_of_body(model, body)
+    if not joints:
+        return FixedBase(models, body)
+    if model.jnt_type[joints[0]] == mujoco.mjtJoint.mjJNT_FREE:
+        return FreeBase(int(model.jnt_qposadr[joints[0]]), int(model.jnt_dofadr[joints[0]]))
+    return SlidingBase(models, body)
+
+
+def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalSource]:
     """Returns the state field of each signal that the physics determines.
 
     Commands are ``ctrl``. Sensor readings are not included: ``SensorReader`` computes them.
@@ -36,31 +275,26 @@ def signal_fields(
             state, of one layout. A model has all parts of the robot, and may have more.
     """
     models = models or (robot.model,)
-    model = models[0]
-    motors = columns([int(model.actuator(name).id) for name in robot.anatomy.motors])
+    motors = columns([int(models[0].actuator(name).id) for name in robot.anatomy.motors])
     return {
         "commands": StateField("ctrl", motors),
-        **_joint_fields(robot, model),
-        **read_base(models, robot.root).signal_fields(),
+        **_joint_fields(robot, models[0]),
+        **read_base(models, robot.root).fields,
     }
 
 
-def observed_fields(
-    robot: Robot, embodiments: Sequence[Embodiment]
-) -> dict[Signal, ObservedSignal]:
+def observed_fields(robot: Robot, embodiments: Sequence[Embodiment]) -> dict[Signal, SignalSource]:
     """Returns ``signal_fields`` as robots log them: joint positions with the encoders' offsets.
 
     Args:
         robot: The healthy robot.
         embodiments: An embodiment for all states, or one per state.
     """
-    fields: dict[Signal, ObservedSignal] = {
-        **signal_fields(robot, *(embodiment.model for embodiment in embodiments))
-    }
+    fields = signal_fields(robot, *(embodiment.model for embodiment in embodiments))
     offsets = np.array([embodiment.encoder_offset for embodiment in embodiments])
     if offsets.any():
         joints = _joint_fields(robot, embodiments[0].model)["joint_positions"]
-        fields["joint_positions"] = ShiftedField(joints, offsets)
+        fields["joint_positions"] = dataclasses.replace(joints, shift=offsets)
     return fields
 
 
@@ -74,37 +308,19 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
     """
     models = models or (robot.model,)
     qpos, qvel = bind("qpos"), bind("qvel")
-    arrays = {"qpos": qpos, "qvel": qvel}
     base, joints = read_base(models, robot.root), _joint_fields(robot, models[0])
 
     def write(state: Mapping[Signal, FloatArray]) -> None:
-        for signal in ("joint_positions", "joint_velocities"):
+        arrays: dict[Signal, FloatArray] = {"joint_positions": qpos, "joint_velocities": qvel}
+        for signal, array in arrays.items():
             if signal in state:
-                field, own = arrays[joints[signal].field], joints[signal].columns
-                unknown = np.isnan(state[signal])
-                field[:, own] = (
-                    np.where(unknown, field[:, own], state[signal])
-                    if unknown.any()
-                    else state[signal]
-                )
+                hinges, values = joints[signal].columns, state[signal]
+                unknown = np.isnan(values)
+                known = np.where(unknown, array[:, hinges], values) if unknown.any() else values
+                array[:, hinges] = known
         base.write(qpos, qvel, state)
 
     return write
-
-
-def bind_data(data: mujoco.MjData) -> Bind:
-    """Returns a function from the name of a field of MjData to the field as ``(1, width)``."""
-
-    def bind(field: str) -> FloatArray:
-        values: FloatArray = getattr(data, field)
-        return values[np.newaxis]
-
-    return bind
-
-
-def current_value(field: ObservedSignal, data: mujoco.MjData) -> FloatArray:
-    """Returns a copy of the current value of a signal of a single robot, ``(width,)``."""
-    return np.array(field.reader(bind_data(data))()[0])
 
 
 def _joint_fields(robot: Robot, model: mujoco.MjModel) -> dict[Signal, StateField]:
@@ -118,13 +334,19 @@ def _joint_fields(robot: Robot, model: mujoco.MjModel) -> dict[Signal, StateFiel
     }
 
 
-BASE_SIGNALS: tuple[Signal, ...] = (
-    "base_position",
-    "base_orientation",
-    "base_linear_velocity",
-    "base_angular_velocity",
-)
-"""Signals of the base."""
+def bind_data(data: mujoco.MjData) -> Bind:
+    """Returns a function from the name of a field of MjData to the field as ``(1, width)``."""
+
+    def bind(field: str) -> FloatArray:
+        values: FloatArray = getattr(data, field)
+        return values[np.newaxis]
+
+    return bind
+
+
+def current_value(field: SignalSource, data: mujoco.MjData) -> FloatArray:
+    """Returns a copy of the current value of a signal of a single robot, ``(width,)``."""
+    return np.array(field.reader(bind_data(data))()[0])
 
 
 def with_known_base(robot: Robot, behaviour: Behaviour) -> Behaviour:
@@ -153,10 +375,6 @@ def completed_trial(robot: Robot, trial: Trial) -> Trial:
     """Returns a trial whose state is complete if the base is fixed, as far as it was logged.
 
     The base is known, and joint velocities that were not logged are estimated.
-
-    Args:
-        robot: The robot of the trial.
-        trial: A trial.
     """
     behaviour = with_known_base(robot, trial.behaviour)
     if robot.has_fixed_base:
@@ -164,6 +382,87 @@ def completed_trial(robot: Robot, trial: Trial) -> Trial:
     return dataclasses.replace(trial, behaviour=behaviour)
 
 
-def trial_with_known_base(robot: Robot, trial: Trial) -> Trial:
-    """Returns a trial with a known base; see ``with_known_base``."""
-    return dataclasses.replace(trial, behaviour=with_known_base(robot, trial.behaviour))
+class SensorReader:
+    """Computes the readings of many robots: touch 0 or 1, angles from -1 to 1.
+
+    Angles are read from the joint positions: after a step, MuJoCo's sensors are one physics step
+    old, and updating them takes a fifth of the time of the physics.
+
+    Args:
+        model: Model of any of the robots; they share one layout.
+        anatomy: Parts of the robots.
+        embodiments: Embodiments with the faults of their sensors.
+        copies: Number of robots per embodiment, in adjacent rows.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        anatomy: Anatomy,
+        embodiments: Sequence[Embodiment],
+        copies: int = 1,
+    ) -> None:
+        touches = [sensor for sensor in anatomy.sensors if sensor.kind == "touch"]
+        angles = [sensor for sensor in anatomy.sensors if sensor.kind == "angle"]
+        self._touches = len(touches)
+        self._touch = columns([int(model.sensor(sensor.name).adr[0]) for sensor in touches])
+        self._angle = columns([int(model.joint(sensor.hinge).qposadr[0]) for sensor in angles])
+        self._centre = np.array([sensor.centre for sensor in angles])
+        self._scale = np.array([1 / sensor.half_range for sensor in angles])
+        gain = np.array([embodiment.gain for embodiment in embodiments])
+        offset = np.array([embodiment.offset + embodiment.bias for embodiment in embodiments])
+        self._faulty = bool(np.any(gain != 1) or np.any(offset != 0))
+        self._gain = np.repeat(gain, copies, axis=0)
+        self._offset = np.repeat(offset, copies, axis=0)
+        self._noise = SensorNoise(embodiments, copies)
+
+    def read(self, sensordata: FloatArray, qpos: FloatArray, readings: FloatArray) -> None:
+        """Writes the readings of the next control step.
+
+        Args:
+            sensordata: ``(n, nsensordata)``, which contains the touch forces, N.
+            qpos: ``(n, nq)``, which contains the joint angles, rad.
+            readings: ``(n, sensors)``, written.
+        """
+        np.greater(
+            sensordata[:, self._touch], 0, out=readings[:, : self._touches], casting="unsafe"
+        )
+        angles = readings[:, self._touches :]
+        np.subtract(qpos[:, self._angle], self._centre, out=angles)
+        np.multiply(angles, self._scale, out=angles)
+        if self._faulty:
+            readings *= self._gain
+            readings += self._offset
+        self._noise.add(readings)
+
+
+class SensorNoise:
+    """Adds white noise to the readings of many robots, step by step.
+
+    The noise sequence of a sensor depends on the seed of the embodiment and the column of the
+    sensor only. It is the same in any batch and for all hypotheses of one seed, so that hypotheses
+    do not differ by their noise.
+
+    Args:
+        embodiments: Embodiments with the standard deviations of their sensors.
+        copies: Number of robots per embodiment, in adjacent rows; each copy has its own sequence.
+    """
+
+    def __init__(self, embodiments: Sequence[Embodiment], copies: int = 1) -> None:
+        self._copies = copies
+        deviations = np.array([embodiment.noise for embodiment in embodiments])
+        noisy: dict[tuple[int, int], list[int]] = {}
+        for row, column in zip(*np.nonzero(deviations), strict=True):
+            noisy.setdefault((embodiments[row].seed, int(column)), []).append(int(row))
+        self._noisy = [
+            (np.random.default_rng(key), rows, key[1], deviations[rows, key[1]])
+            for key, rows in noisy.items()
+        ]
+
+    def add(self, readings: FloatArray) -> None:
+        """Adds the noise of the next step to the readings, ``(embodiments * copies, sensors)``."""
+        robots, sensors = readings.shape
+        by_copy = readings.reshape(robots // self._copies, self._copies, sensors)
+        for rng, rows, column, deviations in self._noisy:
+            drawn = rng.standard_normal(self._copies)
+            by_copy[rows, :, column] += np.outer(deviations, drawn)

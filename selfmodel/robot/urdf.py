@@ -1,31 +1,49 @@
-"""Reads a URDF: checks the tree, keeps the elements of links and joints, and reads the meshes.
+"""Converts a URDF to MJCF: checked, its bodies read by MuJoCo, with servos and a stance.
 
-The result has known elements and attributes only, and names no file outside its assets, so that
-MuJoCo's importer reads nothing else.
+Only known elements and attributes reach MuJoCo's importer, and no name of a file outside the
+assets, so that it reads nothing else.
 """
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
 from posixpath import join, normpath, splitext
-from types import MappingProxyType
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET  # of checked texts
 
-from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.document import Document, plain_name
-from selfmodel.robot.mjcf.files import Files
-from selfmodel.robot.mjcf.untrusted import MAX_DEPTH, MAX_FILE
-from selfmodel.robot.model_checks import MAX_NUMBER
+import mujoco
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.errors import InputError, listed
+from selfmodel.robot.contacts import ground_contact_geoms
+from selfmodel.robot.mjcf.pose import lowest_point
+from selfmodel.robot.mjcf.settings import JointValues, MjcfSettings, check_patterns, value_of
+from selfmodel.robot.mjcf.untrusted import MAX_DEPTH, Files
+from selfmodel.robot.mjcf.work import Work, add_asset, format_numbers
+from selfmodel.robot.mujoco_errors import loading_a_model
+from selfmodel.robot.robot import MAX_NUMBER
+from selfmodel.robot.urdf_bodies import is_rigid, mesh_elements, world_elements
 
 MAX_LINK_DEPTH = MAX_DEPTH - 10
 """Largest number of links from the root to an end; in MJCF, each link is nested in its parent."""
 
+FULL_EFFORT_ERROR = 0.5
+"""Position error at which a servo without the setting ``kp`` exerts its full effort, rad; half of
+the joint's range, if that is less."""
+
+DAMPING_TIMES = (0.02, 0.1)
+"""Least and greatest kd / kp of a servo without the setting ``kd``, s. In between, the damping
+equals the effort at the velocity limit."""
+
+UNLIMITED_RANGE = (-math.pi, math.pi)
+"""Command range of a continuous joint, rad."""
+
+PHYSICS_TIMESTEP = 0.002
+"""Physics time step of a robot from a URDF, s."""
+
 HINGE_TYPES = ("revolute", "continuous")
 JOINT_TYPES = (*HINGE_TYPES, "fixed")
-
-_MAX_QUOTED = 80
-
 _REMEDIES = {
     "prismatic": "a limb's posture is the angles of its hinges, so replace it by a revolute joint "
     'or fix it with type="fixed"',
@@ -34,101 +52,6 @@ _REMEDIES = {
     "planar": 'replace it by revolute joints, or fix it with type="fixed"',
 }
 
-
-def quoted(text: str | None) -> str:
-    """Returns a name of a URDF as part of an error message, at most 80 characters long."""
-    return repr((text or "")[:_MAX_QUOTED])
-
-
-def check_tree(root: ET.Element) -> str:
-    """Checks the links and joints of a URDF, and returns the name of the root link.
-
-    Args:
-        root: The ``<robot>`` element.
-
-    Raises:
-        InputError: The links and joints do not form one tree of hinges.
-    """
-    links = _names(root, "link")
-    _names(root, "joint")
-    parents: dict[str, str] = {}
-    for joint in root.findall("joint"):
-        name = joint.get("name", "")
-        parent, child = (_end(joint, end, links) for end in ("parent", "child"))
-        if child in parents:
-            raise InputError(
-                f"the link {quoted(child)} has two parents, {quoted(parents[child])} and "
-                f"{quoted(parent)}: expected a tree, so remove one of the joints "
-                f"(the second is {quoted(name)})"
-            )
-        parents[child] = parent
-    roots = [name for name in links if name not in parents]
-    if len(roots) != 1:
-        found = ", ".join(map(quoted, roots[:5])) or "none (the joints form a circle)"
-        raise InputError(
-            f"expected one link without a parent, the root of the robot, got {found}: keep the "
-            f"robot, and connect its links by joints"
-        )
-    _check_depths(links, parents)
-    return roots[0]
-
-
-def _names(root: ET.Element, tag: str) -> Counter[str]:
-    counts = Counter(element.get("name", "") for element in root.findall(tag))
-    if tag == "link" and not counts:
-        raise InputError("the URDF has no <link>: expected the links of a robot")
-    for name, count in counts.items():
-        if not name or count > 1:
-            raise InputError(
-                f"expected a different name for each <{tag}>, got {quoted(name)} {count} times"
-            )
-    return counts
-
-
-def check_types(root: ET.Element) -> None:
-    """Checks that all joints of a URDF are hinges, or fixed.
-
-    Raises:
-        InputError: A joint has another type; the message has the remedy.
-    """
-    for joint in root.findall("joint"):
-        kind, name = joint.get("type", ""), joint.get("name", "")
-        if kind not in JOINT_TYPES:
-            remedy = _REMEDIES.get(kind, f"expected one of {', '.join(JOINT_TYPES)}")
-            raise InputError(f"the joint {quoted(name)} has the type {quoted(kind)}: {remedy}")
-
-
-def _end(joint: ET.Element, end: str, links: Collection[str]) -> str:
-    element = joint.find(end)
-    link = "" if element is None else element.get("link", "")
-    if link not in links:
-        raise InputError(
-            f"the <{end}> of the joint {quoted(joint.get('name'))} is the link {quoted(link)}, "
-            f"which the URDF does not have"
-        )
-    return link
-
-
-def _check_depths(links: Collection[str], parents: dict[str, str]) -> None:
-    depths: dict[str, int] = {}
-    for link in links:
-        chain = []
-        at: str | None = link
-        while at is not None and at not in depths:
-            if at in chain:
-                raise InputError(f"the joints form a circle through the link {quoted(at)}")
-            chain.append(at)
-            if len(chain) > MAX_LINK_DEPTH:
-                raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")
-            at = parents.get(at)
-        depth = -1 if at is None else depths[at]
-        for name in reversed(chain):
-            depth += 1
-            depths[name] = depth
-    if max(depths.values()) >= MAX_LINK_DEPTH:
-        raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")
-
-
 READABLE = (".stl", ".obj")
 """Endings of the meshes of a URDF that MuJoCo reads."""
 
@@ -136,60 +59,314 @@ _PACKAGE_SCHEMES = ("package://", "model://")
 _ABOVE = ("", "..", "../..", "../../..")
 """Folders of a package, from the folder of its URDF: ``NAME/urdf/x.urdf``, and one level deeper."""
 
+_SHAPES = ("visual", "collision")
+_MAX_QUOTED, _MAX_LISTED = 80, 6
 
-@dataclass
-class Meshes:
-    """The meshes of a URDF, read into a document.
+_KEPT: Mapping[str, tuple[str, ...]] = {
+    "link": ("name",),
+    "inertial": (),
+    "origin": ("xyz", "rpy"),
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "visual": (),
+    "collision": (),
+    "geometry": (),
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "mesh": ("filename", "scale"),
+    "material": ("name",),
+    "color": ("rgba",),
+    "joint": ("name", "type"),
+    "parent": ("link",),
+    "child": ("link",),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "dynamics": ("damping", "friction"),
+    "mimic": ("joint", "multiplier", "offset"),
+}
+"""Elements that are kept, with the attributes that are kept."""
 
-    Attributes:
-        files: Source of the files, by their paths relative to the URDF.
-        limit: Largest sum of the files, bytes.
-        document: The URDF; the contents of the files are added to its assets.
+_TEXTS = ("name", "type", "link", "joint", "filename")
+"""Attributes with text; the others have numbers."""
+
+_COUNTS: Mapping[str, int] = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba": 4}
+"""Numbers of an attribute with more than one."""
+
+
+def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
+    """Returns the work on the MJCF of a URDF, with position servos and a keyframe.
+
+    Args:
+        root: The ``<robot>`` element.
+        files: Source of the files that the URDF names.
+        settings: Settings with the gains and the pose. With ``base="free"`` the root has a free
+            joint and there is a ground, with ``base="fixed"`` neither; without ``base`` the base is
+            fixed if the root link is named ``world``.
+
+    Raises:
+        InputError: The URDF cannot be a robot; the message has the reason and the remedy.
     """
-
-    files: Files
-    limit: int
-    document: Document
-    _names: dict[str, str] = field(default_factory=dict)
-
-    def find(self, uri: str) -> str | None:
-        """Returns the path of a mesh relative to the URDF, or None if no readable file exists.
-
-        A mesh in another format is replaced by the file of the same name that ends in ``.stl`` or
-        ``.obj``, if there is one.
-        """
-        for path in _candidates(uri):
-            stem, ending = splitext(path)
-            other = [stem + readable for readable in READABLE]
-            for name in [path] if ending.lower() in READABLE else other:
-                if self.files.has(name):
-                    return name
-        return None
-
-    def add(self, path: str, uri: str) -> str:
-        """Reads a mesh, and returns its name among the assets.
-
-        Args:
-            path: Path of the file, as returned by ``find``.
-            uri: The path in the URDF, for an error message.
-
-        Raises:
-            InputError: The files are too large.
-        """
-        if path not in self._names:
-            assets = self.document.assets
-            data = self.files.read(path, f"the file of a <mesh> ({quoted(uri)})", self.limit)
-            if sum(map(len, assets.values())) + len(data) > self.limit:
-                raise InputError(
-                    f"the meshes of the URDF have over {self.limit} bytes: simplify them"
-                )
-            self._names[path] = plain_name(path, assets)
-            assets[self._names[path]] = data
-        return self._names[path]
+    work = Work(ET.Element("mujoco", {"model": root.get("name") or "robot"}), settings)
+    urdf = _checked(root, work)
+    _read_meshes(urdf, work, files)
+    hinges = [j for j in urdf.findall("joint") if j.get("type") in HINGE_TYPES]
+    for values in (settings.kp, settings.kd, settings.effort, settings.pose):
+        check_patterns(values, [j.get("name", "") for j in hinges])
+    # Kept: the folders (none), links on fixed joints, such as feet, and the visuals.
+    flags = {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
+    extension = ET.Element("mujoco")
+    ET.SubElement(extension, "compiler", flags)
+    urdf.insert(0, extension)
+    with loading_a_model():
+        text = ET.tostring(urdf, encoding="unicode")
+        spec = mujoco.MjSpec.from_string(text, assets=work.assets)
+    replaced = [body.name for body in spec.bodies if body.mass and not is_rigid(body)]
+    if replaced:
+        work.notes.append(
+            f"the inertia of {listed(replaced, _MAX_LISTED)} is that of no rigid body (a moment is "
+            f"not above 0, or exceeds the sum of the others), and is replaced by the mean of its "
+            f"moments"
+        )
+    # Links without an <inertial> have no mass, as URDF defines.
+    work.section("compiler").attrib.update(angle="radian", inertiafromgeom="false")
+    work.section("option").attrib.update(timestep=repr(PHYSICS_TIMESTEP), integrator="implicitfast")
+    work.section("asset").extend(mesh_elements(spec))
+    work.section("worldbody").extend(world_elements(spec))
+    in_world = any(link.get("name") == "world" for link in urdf.findall("link"))
+    if settings.base == "free" or (settings.base is None and not in_world):
+        _free_base(work)
+    _add_couplings(work, hinges)
+    _add_servos(work, hinges)
+    _add_stance(work)
+    return work
 
 
-def _candidates(uri: str) -> Iterator[str]:
-    """Yields the possible paths of a file, relative to the URDF, the most specific first."""
+def quoted(text: str | None) -> str:
+    """Returns a name of a URDF as part of an error message, at most 80 characters long."""
+    return repr((text or "")[:_MAX_QUOTED])
+
+
+def _checked(root: ET.Element, work: Work) -> ET.Element:
+    """Returns a URDF with the known elements of a tree of hinges, and with notes on the rest.
+
+    Raises:
+        InputError: The URDF is a xacro, or its links form no tree of hinges.
+    """
+    for element in root.iter():
+        if "xacro" in element.tag or any("${" in value for value in element.attrib.values()):
+            raise InputError(
+                f"expected a URDF, got a xacro (<{element.tag.rpartition('}')[2][:40]}>): expand "
+                f"it first, with `xacro robot.urdf.xacro > robot.urdf`"
+            )
+    main = _check_tree(root)
+    urdf = ET.Element("robot", {"name": root.get("name") or "robot"})
+    urdf.extend([_kept(e) for e in root if e.tag in ("link", "joint", "material")])
+    left_out = Counter(e.tag for e in root if e.tag not in ("link", "joint", "material"))
+    if left_out:
+        counts = ", ".join(f"{count} <{tag[:40]}>" for tag, count in left_out.most_common(8))
+        work.notes.append(f"elements that no robot needs are left out: {counts}")
+    _drop_floating_joint(urdf, main, work)
+    for joint in urdf.findall("joint"):
+        kind, name = joint.get("type", ""), joint.get("name", "")
+        if kind not in JOINT_TYPES:
+            remedy = _REMEDIES.get(kind, f"expected one of {', '.join(JOINT_TYPES)}")
+            raise InputError(f"the joint {quoted(name)} has the type {quoted(kind)}: {remedy}")
+        if kind == "revolute":
+            _check_range(joint, work)
+    return urdf
+
+
+def _check_tree(root: ET.Element) -> str:
+    """Checks that the links and joints of a URDF form one tree, and returns the root link."""
+    children: dict[str, list[str]] = {name: [] for name in _names(root, "link")}
+    _names(root, "joint")
+    if not children:
+        raise InputError("the URDF has no <link>: expected the links of a robot")
+    parents: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        parent, child = _ends(joint, children)
+        if child in parents:
+            raise InputError(
+                f"the link {quoted(child)} has two parents, {quoted(parents[child])} and "
+                f"{quoted(parent)}: expected a tree, so remove one of the joints "
+                f"(the second is {quoted(joint.get('name'))})"
+            )
+        parents[child] = parent
+        children[parent].append(child)
+    roots = [name for name in children if name not in parents]
+    if len(roots) != 1:
+        names = ", ".join(map(quoted, roots[:5])) or "none (the joints form a circle)"
+        raise InputError(
+            f"expected one link without a parent, the root of the robot, got {names}: keep the "
+            f"robot, and connect its links by joints"
+        )
+    level, reached = roots, set(roots)
+    for _ in range(MAX_LINK_DEPTH):
+        level = [child for link in level for child in children[link]]
+        reached.update(level)
+    if level:
+        raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")
+    if lost := [name for name in children if name not in reached]:
+        raise InputError(f"the joints form a circle, which carries the link {quoted(lost[0])}")
+    return roots[0]
+
+
+def _names(root: ET.Element, tag: str) -> Counter[str]:
+    names = Counter(element.get("name", "") for element in root.findall(tag))
+    for name, count in names.items():
+        if not name or count > 1:
+            raise InputError(
+                f"expected a different name for each <{tag}>, got {quoted(name)} {count} times"
+            )
+    return names
+
+
+def _ends(joint: ET.Element, links: Collection[str]) -> tuple[str, str]:
+    """Returns the parent and the child of a joint, two links of the URDF."""
+    for end in ("parent", "child"):
+        if _link_of(joint, end) not in links:
+            raise InputError(
+                f"the <{end}> of the joint {quoted(joint.get('name'))} is the link "
+                f"{quoted(_link_of(joint, end))}, which the URDF does not have"
+            )
+    return _link_of(joint, "parent"), _link_of(joint, "child")
+
+
+def _link_of(joint: ET.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
+
+
+def _kept(element: ET.Element) -> ET.Element:
+    """Returns a copy of an element with the known attributes and children only.
+
+    Of children that URDF has once, the first counts.
+    """
+    known = {name: element.get(name, "") for name in _KEPT[element.tag] if name in element.attrib}
+    copy = ET.Element(element.tag, known)
+    for name, text in known.items():
+        if name not in _TEXTS:
+            _check_numbers(element.tag, name, text)
+    for child in element:
+        once = child.tag not in _SHAPES
+        if child.tag in _KEPT and not (once and copy.find(child.tag) is not None):
+            copy.append(_kept(child))
+    return copy
+
+
+def _check_numbers(tag: str, name: str, text: str) -> None:
+    """Checks that an attribute has its numbers, and that a mass is not negative."""
+    words, count = text.split(), _COUNTS.get(name, 1)
+    try:
+        valid = len(words) == count and all(abs(float(word)) <= MAX_NUMBER for word in words)
+    except ValueError:
+        valid = False
+    if not valid:
+        raise InputError(
+            f"expected {count} number{'s' if count > 1 else ''} in {name} of <{tag}>, at most "
+            f"{MAX_NUMBER:g}, got {quoted(text)}"
+        )
+    if tag == "mass" and float(text) < 0:
+        raise InputError(f"expected a mass of at least 0 kg, got {quoted(text)}")
+
+
+def _drop_floating_joint(urdf: ET.Element, main: str, work: Work) -> None:
+    """Removes a root link without a body that carries the robot by a floating joint."""
+    link = next(link for link in urdf.findall("link") if link.get("name") == main)
+    joints = [joint for joint in urdf.findall("joint") if _link_of(joint, "parent") == main]
+    has_body = any(element.tag in ("inertial", "collision") for element in link)
+    if not has_body and [joint.get("type") for joint in joints] == ["floating"]:
+        urdf.remove(link)
+        urdf.remove(joints[0])
+        work.notes.append(f"the link {main} and the joint {joints[0].get('name')} are left out")
+
+
+def _check_range(joint: ET.Element, work: Work) -> None:
+    """Checks the range of a revolute joint; a joint with a range of zero width is fixed."""
+    limit = joint.find("limit")
+    low, high = (1.0, 0.0) if limit is None else (_number(limit, e) for e in ("lower", "upper"))
+    if low > high:
+        raise InputError(
+            f"the revolute joint {quoted(joint.get('name'))} needs a <limit> with lower below "
+            f'upper, in rad: add it, or set type="continuous"'
+        )
+    if low == high:
+        joint.set("type", "fixed")
+        work.notes.append(
+            f"the joint {joint.get('name')} has a range of {low:g} to {high:g} rad, and is fixed"
+        )
+
+
+def _number(element: ET.Element, attribute: str, default: float = 0.0) -> float:
+    return float(element.get(attribute, default))
+
+
+def _read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
+    """Reads the meshes, and removes shapes of size 0 and visuals whose mesh cannot be read.
+
+    Raises:
+        InputError: The mesh of a collision cannot be read, or the files are too large.
+    """
+    parts = [(link, e) for link in urdf.findall("link") for e in link if e.tag in _SHAPES]
+    empty = [part for part in parts if _is_empty(part[1].find("geometry/*"))]
+    for link, part in empty:
+        link.remove(part)
+    if empty:
+        work.notes.append(f"{len(empty)} shapes of size 0 are left out")
+    names, left_out = dict[str, str](), Counter[str]()
+    for link, part in parts:
+        mesh = part.find("geometry/mesh")
+        if mesh is None:
+            continue
+        uri = mesh.get("filename", "")
+        path = next(filter(files.has, _mesh_paths(uri)), None)
+        if path is not None:
+            if path not in names:
+                names[path] = add_asset(work, files, path, f"<mesh> ({quoted(uri)})")
+            mesh.set("filename", names[path])
+        elif part.tag == "visual":
+            link.remove(part)
+            left_out[_why_unread(uri)] += 1
+        else:
+            raise InputError(
+                f"the collision of the link {quoted(link.get('name'))} needs the mesh "
+                f"{quoted(uri)}, which is missing, lies outside the folders of the model, or "
+                f"is no STL or OBJ: save the mesh as .stl, or name a folder that contains it, "
+                f"with --set assets=DIR"
+            )
+    for reason, count in left_out.items():
+        work.notes.append(f"{count} visual meshes are left out: {reason}")
+
+
+def _is_empty(shape: ET.Element | None) -> bool:
+    """Returns whether a shape is missing, or has a size of 0."""
+    if shape is None:
+        return True
+    sizes = (shape.get(name, "").split() for name in ("size", "radius", "length"))
+    return any(float(size) == 0 for words in sizes for size in words)
+
+
+def _why_unread(uri: str) -> str:
+    ending = "." + uri.rpartition(".")[2].lower()
+    if ending in READABLE:
+        return f"their files were not found, such as {quoted(uri)}"
+    return f"MuJoCo reads no {ending[:10]}, expected {' or '.join(READABLE)}"
+
+
+def _mesh_paths(uri: str) -> Iterator[str]:
+    """Yields the possible paths of a mesh, relative to the URDF, the most specific first.
+
+    In place of a mesh in another format, it is the file of the same name that ends in ``.stl`` or
+    ``.obj``.
+    """
+    for path in _paths(uri):
+        stem, ending = splitext(path)
+        yield from [path] if ending.lower() in READABLE else [stem + other for other in READABLE]
+
+
+def _paths(uri: str) -> Iterator[str]:
     text = uri.replace("\\", "/")
     if text.startswith("file://"):
         yield unquote(text.removeprefix("file://"))
@@ -199,222 +376,155 @@ def _candidates(uri: str) -> Iterator[str]:
         yield normpath(text)
         return
     whole = unquote(text.removeprefix(scheme))
-    _package, _, inside = whole.partition("/")
+    inside = whole.partition("/")[2]  # of the package
     for above in _ABOVE:
         yield normpath(join(above, inside))
         yield normpath(join(above, whole))
 
 
-_ORIGIN = ("xyz", "rpy")
-_KEPT: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "link": ("name",),
-        "inertial": (),
-        "origin": _ORIGIN,
-        "mass": ("value",),
-        "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-        "visual": (),
-        "collision": (),
-        "geometry": (),
-        "box": ("size",),
-        "sphere": ("radius",),
-        "cylinder": ("radius", "length"),
-        "capsule": ("radius", "length"),
-        "mesh": ("filename", "scale"),
-        "material": ("name",),
-        "color": ("rgba",),
-        "joint": ("name", "type"),
-        "parent": ("link",),
-        "child": ("link",),
-        "axis": ("xyz",),
-        "limit": ("lower", "upper", "effort", "velocity"),
-        "dynamics": ("damping", "friction"),
-        "mimic": ("joint", "multiplier", "offset"),
-    }
-)
-"""Elements that are kept, with the attributes that are kept."""
-
-_TEXTS = ("name", "type", "link", "joint", "filename")
-"""Attributes with text; the others have numbers."""
-
-_COUNTS: Mapping[str, int] = MappingProxyType(
-    {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba": 4}
-)
-"""Numbers of an attribute with more than one."""
-
-_XACRO = "xacro"
+def _free_base(work: Work) -> None:
+    """Adds a free joint to the root link, and a ground plane."""
+    if not any(geom.get("contype") != "0" for geom in work.root.iter("geom")):
+        raise InputError(
+            "no link has a <collision>, so the robot would fall through the ground: give the "
+            'links that meet the ground a <collision>, or fix the base with base = "fixed"'
+        )
+    world = work.section("worldbody")
+    roots = world.findall("body")
+    if len(roots) != 1:
+        raise InputError(
+            "expected one link on the link 'world', the root of the robot: keep the robot, and "
+            "remove the other links"
+        )
+    name = roots[0].get("name", "")
+    roots[0].insert(0, ET.Element("freejoint", {"name": f"{name}_root"}))
+    world.insert(0, ET.Element("geom", {"name": "ground", "type": "plane", "size": "0 0 1"}))
+    work.notes.append(f"the root link {name} moves freely, on a ground plane")
 
 
-def read_urdf(root: ET.Element, files: Files) -> Document:
-    """Returns the document of a URDF, with its meshes read.
+def _add_couplings(work: Work, hinges: list[ET.Element]) -> None:
+    """Adds an equality constraint for each joint that mimics another joint."""
+    known = {joint.get("name") for joint in hinges}
+    for joint in hinges:
+        mimic, name = joint.find("mimic"), joint.get("name", "")
+        if mimic is None:
+            continue
+        leader = mimic.get("joint", "")
+        if leader not in known:
+            raise InputError(
+                f"the joint {quoted(name)} mimics {quoted(leader)}, which is no revolute or "
+                f"continuous joint of the URDF"
+            )
+        factor, offset = _number(mimic, "multiplier", 1.0), _number(mimic, "offset")
+        coupling = {"joint1": name, "joint2": leader, "polycoef": f"{offset!r} {factor!r} 0 0 0"}
+        ET.SubElement(work.section("equality"), "joint", coupling)
+        work.notes.append(f"{name} mimics {leader}, and gets no motor")
 
-    Args:
-        root: The ``<robot>`` element.
-        files: Source of the files that the URDF names.
+
+def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
+    """Adds a position servo for each joint that mimics no other.
 
     Raises:
-        InputError: The URDF is a xacro, its links form no tree, or the mesh of a collision is
-            missing or has another format.
+        InputError: A joint has no effort limit, and the settings contain none.
     """
-    _refuse_xacro(root)
-    main = check_tree(root)
-    document = Document(ET.Element("robot", {"name": root.get("name") or "robot"}))
-    left_out: Counter[str] = Counter()
-    for element in root:
-        if element.tag in ("link", "joint", "material"):
-            document.root.append(_kept(element))
-        else:
-            left_out[element.tag] += 1
-    if left_out:
-        document.notes.append(f"elements that no robot needs are left out: {_counted(left_out)}")
-    _drop_floating_joint(document, main)
-    check_types(document.root)
-    _fix_rangeless(document)
-    _drop_empty_shapes(document)
-    _read_meshes(document, Meshes(files, MAX_FILE, document))
-    return document
-
-
-def _refuse_xacro(root: ET.Element) -> None:
-    for element in root.iter():
-        if _XACRO in element.tag or any("${" in value for value in element.attrib.values()):
+    settings, names = work.settings, dict[str, list[str]]()
+    actuators = work.section("actuator")
+    for joint in [hinge for hinge in hinges if hinge.find("mimic") is None]:
+        name, limit = joint.get("name", ""), joint.find("limit")
+        limit = ET.Element("limit") if limit is None else limit
+        effort = value_of(settings.effort, name)
+        effort = _number(limit, "effort") if effort is None else effort
+        if effort <= 0:
             raise InputError(
-                f"expected a URDF, got a xacro (<{element.tag.rpartition('}')[2][:40]}>): expand "
-                f"it first, with `xacro robot.urdf.xacro > robot.urdf`"
+                f"the joint {quoted(name)} has no effort limit above 0: add it to its <limit>, or "
+                f"set the torque of such joints, in N m, with effort = ..."
             )
+        low, high = UNLIMITED_RANGE
+        if joint.get("type") == "revolute":
+            low, high = _number(limit, "lower"), _number(limit, "upper")
+        kp, kd = value_of(settings.kp, name), value_of(settings.kd, name)
+        if kp is None:
+            kp = effort / min(FULL_EFFORT_ERROR, (high - low) / 2)
+        if kd is None:
+            velocity, (least, most) = _number(limit, "velocity"), (kp * t for t in DAMPING_TIMES)
+            kd = most if velocity <= 0 else min(max(effort / velocity, least), most)
+        servo = {
+            "name": name,
+            "joint": name,
+            "kp": repr(kp),
+            "kv": repr(kd),
+            "ctrlrange": f"{low!r} {high!r}",
+            "ctrllimited": "true",
+            "forcerange": f"{-effort!r} {effort!r}",
+            "forcelimited": "true",
+        }
+        ET.SubElement(actuators, "position", servo)
+        names.setdefault(f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m", []).append(name)
+    for gains, joints in names.items():
+        work.notes.append(f"position servos with {gains}: {listed(joints, _MAX_LISTED)}")
 
 
-def _kept(element: ET.Element) -> ET.Element:
-    """Returns a copy of an element with the known attributes and children only.
+def _add_stance(work: Work) -> None:
+    """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap.
 
-    Of children that URDF has once, the first counts.
+    The lowest colliding geom is at height 0 if the base is free.
+
+    Raises:
+        InputError: An angle is outside the range of its joint, or MuJoCo cannot compile the model,
+            such as a link that moves without mass.
     """
-    attributes = {
-        name: element.get(name, "") for name in _KEPT[element.tag] if name in element.attrib
-    }
-    copy = ET.Element(element.tag, attributes)
-    _check_numbers(copy)
-    for child in element:
-        once = child.tag not in ("visual", "collision")
-        if child.tag in _KEPT and not (once and copy.find(child.tag) is not None):
-            copy.append(_kept(child))
-    return copy
-
-
-def _drop_floating_joint(document: Document, main: str) -> None:
-    """Removes a root link without a body that carries the robot by a floating joint."""
-    link = next(link for link in document.root.findall("link") if link.get("name") == main)
-    joints = [j for j in document.root.findall("joint") if _link_of(j, "parent") == main]
-    has_body = any(element.tag in ("inertial", "collision") for element in link)
-    if has_body or [joint.get("type") for joint in joints] != ["floating"]:
-        return
-    document.root.remove(link)
-    document.root.remove(joints[0])
-    document.notes.append(f"the link {main} and the joint {joints[0].get('name')} are left out")
-
-
-def _fix_rangeless(document: Document) -> None:
-    """Fixes the revolute joints with a range of zero width, and checks the other ranges."""
-    for joint in document.root.findall("joint"):
-        if joint.get("type") != "revolute":
-            continue
-        limit = joint.find("limit")
-        ends = [] if limit is None else [number(limit, end, 0.0) for end in ("lower", "upper")]
-        if not ends or ends[0] > ends[1]:
-            raise InputError(
-                f"the revolute joint {quoted(joint.get('name'))} needs a <limit> with lower below "
-                f'upper, in rad: add it, or set type="continuous"'
-            )
-        if ends[0] == ends[1]:
-            joint.set("type", "fixed")
-            document.notes.append(
-                f"the joint {joint.get('name')} has a range of {ends[0]:g} to {ends[1]:g} rad, "
-                f"and is fixed"
-            )
-
-
-def number(element: ET.Element, attribute: str, default: float) -> float:
-    """Returns the number of an attribute that ``read_urdf`` has checked."""
-    return float(element.get(attribute, default))
-
-
-def _check_numbers(element: ET.Element) -> None:
-    """Checks that the attributes with numbers are numbers, and that masses are not negative."""
-    for attribute, text in element.attrib.items():
-        if attribute in _TEXTS:
-            continue
-        words = text.split()
-        count = _COUNTS.get(attribute, 1)
-        if len(words) != count or not all(map(_is_number, words)):
-            raise InputError(
-                f"expected {count} number{'s' if count > 1 else ''} in {attribute} of "
-                f"<{element.tag}>, at most {MAX_NUMBER:g}, got {quoted(text)}"
-            )
-    if element.tag == "mass" and float(element.get("value", "0")) < 0:
-        raise InputError(f"expected a mass of at least 0 kg, got {quoted(element.get('value'))}")
-
-
-def _is_number(word: str) -> bool:
     try:
-        return abs(float(word)) <= MAX_NUMBER
-    except ValueError:
-        return False
+        model = work.model
+    except InputError as error:
+        if "mjMINVAL" not in str(error):
+            raise
+        raise InputError(
+            f"{error}: give this link, or a link that is fixed to it, an <inertial> with a mass "
+            f'and moments above 0, or fix the base with base = "fixed" if it is the root'
+        ) from error
+    data = mujoco.MjData(model)
+    for j in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE):
+        data.qpos[model.jnt_qposadr[j]] = _angle(model, int(j), work.settings.pose)
+    _follow_couplings(model, data.qpos)
+    mujoco.mj_kinematics(model, data)
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    if len(free) and ground_contact_geoms(model):
+        data.qpos[model.jnt_qposadr[free[0]] + 2] -= lowest_point(model, data)
+        mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_collision(model, data)
+    pairs = np.sort(model.geom_bodyid[data.contact.geom[data.contact.dist < 0]], axis=1)
+    for first, second in np.unique(pairs[pairs[:, 0] > 0], axis=0):
+        bodies = {"body1": model.body(first).name, "body2": model.body(second).name}
+        ET.SubElement(work.section("contact"), "exclude", bodies)
+        one, other = bodies.values()
+        work.notes.append(f"{one} and {other} overlap in the initial pose, and never touch")
+    key = {"name": "stance", "qpos": format_numbers(data.qpos)}
+    ET.SubElement(work.section("keyframe"), "key", key)
 
 
-def _link_of(joint: ET.Element, end: str) -> str:
-    element = joint.find(end)
-    return "" if element is None else element.get("link", "")
+def _angle(model: mujoco.MjModel, joint: int, pose: JointValues) -> float:
+    """Returns the angle of a joint in a pose, or else the angle of its range nearest to 0."""
+    name = model.joint(joint).name
+    low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.inf, np.inf)
+    angle = value_of(pose, name)
+    if angle is None:
+        return float(np.clip(0.0, low, high))
+    if not low <= angle <= high:
+        raise InputError(
+            f"pose has {angle:g} rad for the joint {name}, outside its range of {low:.4g} to "
+            f"{high:.4g} rad"
+        )
+    return angle
 
 
-def _drop_empty_shapes(document: Document) -> None:
-    """Removes visuals and collisions without a shape, or with a shape of size 0."""
-    dropped = 0
-    for link in document.root.findall("link"):
-        for part in [e for e in link if e.tag in ("visual", "collision")]:
-            shape = part.find("geometry/*")
-            if shape is None or any(
-                float(size) == 0
-                for name in ("size", "radius", "length")
-                for size in shape.get(name, "").split()
-            ):
-                link.remove(part)
-                dropped += 1
-    if dropped:
-        document.notes.append(f"{dropped} shapes of size 0 are left out")
-
-
-def _read_meshes(document: Document, meshes: Meshes) -> None:
-    """Reads the meshes, and removes the visuals whose mesh is missing or has another format."""
-    left_out: Counter[str] = Counter()
-    for link in document.root.findall("link"):
-        for part in [e for e in link if e.tag in ("visual", "collision")]:
-            mesh = part.find("geometry/mesh")
-            if mesh is None:
-                continue
-            uri = mesh.get("filename", "")
-            path = meshes.find(uri)
-            if path is not None:
-                mesh.set("filename", meshes.add(path, uri))
-            elif part.tag == "visual":
-                link.remove(part)
-                left_out[_reason(uri)] += 1
-            else:
-                raise InputError(
-                    f"the collision of the link {quoted(link.get('name'))} needs the mesh "
-                    f"{quoted(uri)}, which is missing, lies outside the folders of the model, or "
-                    f"is no STL or OBJ: save the mesh as .stl, or name a folder that contains it, "
-                    f"with --set assets=DIR"
-                )
-    for reason, count in left_out.items():
-        document.notes.append(f"{count} visual meshes are left out: {reason}")
-
-
-def _reason(uri: str) -> str:
-    ending = "." + uri.rpartition(".")[2].lower()
-    if ending in READABLE:
-        return f"their files were not found, such as {quoted(uri)}"
-    return f"MuJoCo reads no {ending[:10]}, expected {' or '.join(READABLE)}"
-
-
-def _counted(counts: Counter[str]) -> str:
-    return ", ".join(f"{count} <{tag[:40]}>" for tag, count in counts.most_common(8))
+def _follow_couplings(model: mujoco.MjModel, qpos: FloatArray) -> None:
+    """Moves the joints that mimic another joint, whatever the order of the couplings."""
+    followers, leaders = (
+        model.jnt_qposadr[joints] for joints in (model.eq_obj1id, model.eq_obj2id)
+    )
+    for _ in range(model.neq):  # a chain of couplings has at most as many links
+        angles = model.eq_data[:, 0] + model.eq_data[:, 1] * qpos[leaders]
+        if np.array_equal(qpos[followers], angles):
+            return
+        qpos[followers] = angles

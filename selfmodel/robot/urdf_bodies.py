@@ -3,78 +3,149 @@
 ``MjSpec.to_xml`` writes numbers of six digits, which would move the feet of a robot.
 """
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.mjcf.document import format_numbers
+from selfmodel.robot.mjcf.work import format_numbers
 
+Frame = tuple[FloatArray, FloatArray]
+"""Position, ``(3,)`` m, and orientation, ``(4,)`` w x y z, in another frame."""
 
-@dataclass(frozen=True)
-class Frame:
-    """A frame in another frame.
-
-    Attributes:
-        position: ``(3,)``, m.
-        orientation: ``(4,)``, unit quaternion.
-    """
-
-    position: FloatArray
-    orientation: FloatArray
-
-    def then(self, inner: "Frame") -> "Frame":
-        """Returns a frame that is given in this frame, in the outer frame."""
-        position, orientation = np.empty(3), np.empty(4)
-        mujoco.mju_rotVecQuat(position, inner.position, self.orientation)
-        mujoco.mju_mulQuat(orientation, self.orientation, inner.orientation)
-        return Frame(self.position + position, orientation)
-
-    def inverse(self) -> "Frame":
-        """Returns the outer frame in this frame."""
-        position, orientation = np.empty(3), np.empty(4)
-        mujoco.mju_negQuat(orientation, self.orientation)
-        mujoco.mju_rotVecQuat(position, -self.position, orientation)
-        return Frame(position, orientation)
-
-    def direction(self, vector: FloatArray) -> FloatArray:
-        """Returns a vector that is given in this frame, in the outer frame."""
-        result = np.empty(3)
-        mujoco.mju_rotVecQuat(result, np.asarray(vector, float), self.orientation)
-        return result
-
-
-NO_FRAME = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+NO_FRAME: Frame = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 """The frame that is the outer frame."""
 
+_GEOMS = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
+    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
+    mujoco.mjtGeom.mjGEOM_MESH: ("mesh", 0),
+}
+"""Name and number of sizes of the geoms of a URDF."""
 
-def placed(frame: Frame) -> dict[str, str]:
-    """Returns the attributes of MJCF for the place of an element."""
-    return {"pos": format_numbers(frame.position), "quat": format_numbers(frame.orientation)}
+_VISUAL_GROUP, _HIDDEN_GROUP = "2", "3"
+"""Groups of visuals, and of collisions of a link with visuals, as in MuJoCo's Menagerie."""
 
 
-def inertial(body: mujoco.MjsBody) -> dict[str, str]:
+def mesh_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
+    """Returns the meshes of a specification as MJCF."""
+    # With the inertia of a shell, MuJoCo accepts flat and open meshes; masses are not from meshes.
+    return [
+        ET.Element(
+            "mesh",
+            {
+                "name": mesh.name,
+                "file": mesh.file,
+                "scale": format_numbers(mesh.scale),
+                "inertia": "shell",
+            },
+        )
+        for mesh in spec.meshes
+    ]
+
+
+def world_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
+    """Returns the geoms and the bodies of the world as MJCF, the bodies with their descendants.
+
+    A link without mass and geoms that moves and has one child becomes a further hinge of that
+    child, because MuJoCo moves no massless body. The geoms of a link that is fixed to a part in the
+    middle of a limb are given to that part, so that only the ends of limbs, such as feet, are
+    bodies with geoms and without children.
+    """
+    middle = {_main(body.parent).name for body in spec.bodies if body.joints and body.parent}
+    geoms = [_geom(geom, NO_FRAME, seen=False) for geom in spec.worldbody.geoms]
+    roots = [_written(body, NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
+    return [*geoms, *roots]
+
+
+def _main(body: mujoco.MjsBody) -> mujoco.MjsBody:
+    """Returns the body with joints, or the root, that a body is fixed to."""
+    while not body.joints and body.parent is not None and body.parent.parent is not None:
+        body = body.parent
+    return body
+
+
+def _written(
+    body: mujoco.MjsBody,
+    outer: Frame,
+    hinges: Sequence[tuple[mujoco.MjsJoint, Frame]],
+    main: tuple[ET.Element, Frame, bool] | None,
+    middle: Collection[str],
+) -> ET.Element:
+    """Returns a body with its descendants as MJCF.
+
+    Args:
+        body: The body.
+        outer: Frame of the body's parent in the parent element.
+        hinges: Hinges of the massless parents, and the frames of their bodies in the parent's.
+        main: The element of the body with hinges, or of the root, that the parent is fixed to; the
+            parent's frame in it; whether another body hangs on it. None for a root.
+        middle: Names of the bodies on which another body hangs by a hinge.
+    """
+    own = np.array(body.pos), np.array(body.quat)
+    frame, inner = _joined(outer, own), _inverse(own)
+    here = [(joint, _joined(inner, place)) for joint, place in hinges]
+    here += [(joint, NO_FRAME) for joint in body.joints]
+    if here and not body.mass and not len(body.geoms) and len(body.bodies) == 1:
+        return _written(body.bodies[0], frame, here, main, middle)
+    element = ET.Element("body", {"name": body.name} | _place(frame))
+    if body.mass:
+        ET.SubElement(element, "inertial", _inertial(body))
+    element.extend([_joint(*hinge) for hinge in here])
+    if here or main is None:
+        main = element, NO_FRAME, body.name in middle
+    else:
+        main = main[0], _joined(main[1], frame), main[2]
+    carrier, at = main[:2] if main[2] else (element, NO_FRAME)
+    seen = any(not geom.contype for geom in body.geoms)
+    carrier.extend([_geom(geom, at, seen=seen) for geom in body.geoms])
+    element.extend([_written(child, NO_FRAME, [], main, middle) for child in body.bodies])
+    return element
+
+
+def _joined(outer: Frame, inner: Frame) -> Frame:
+    """Returns a frame that is given in a frame, in the outer frame of that frame."""
+    orientation = np.empty(4)
+    mujoco.mju_mulQuat(orientation, outer[1], inner[1])
+    return outer[0] + _turned(inner[0], outer[1]), orientation
+
+
+def _inverse(frame: Frame) -> Frame:
+    orientation = np.empty(4)
+    mujoco.mju_negQuat(orientation, frame[1])
+    return _turned(-frame[0], orientation), orientation
+
+
+def _turned(vector: FloatArray, orientation: FloatArray) -> FloatArray:
+    turned = np.empty(3)
+    mujoco.mju_rotVecQuat(turned, np.asarray(vector, float), orientation)
+    return turned
+
+
+def _place(frame: Frame) -> dict[str, str]:
+    return {"pos": format_numbers(frame[0]), "quat": format_numbers(frame[1])}
+
+
+def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
     """Returns the attributes of an ``<inertial>``."""
+    place = np.array(body.ipos), np.array(body.iquat)
     mass = {"mass": repr(float(body.mass))}
-    full = _moments(body)
+    moments = _moments(body)
     if not is_rigid(body):
-        full = np.array([*np.full(3, max(0.0, float(full[:3].mean()))), 0.0, 0.0, 0.0])
-    if not np.any(full[3:]):
-        frame = Frame(np.array(body.ipos), np.array(body.iquat))
-        return placed(frame) | mass | {"diaginertia": format_numbers(full[:3])}
+        moments = np.array([*np.full(3, max(0.0, float(moments[:3].mean()))), 0.0, 0.0, 0.0])
+    if not np.any(moments[3:]):
+        return _place(place) | mass | {"diaginertia": format_numbers(moments[:3])}
     # MJCF has no orientation beside a full inertia.
     rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, np.array(body.iquat))
+    mujoco.mju_quat2Mat(rotation, place[1])
     turn = rotation.reshape(3, 3)
     matrix = turn @ _inertia_matrix(body) @ turn.T
-    elements = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return {
-        "pos": format_numbers(np.array(body.ipos)),
-        "fullinertia": format_numbers(elements),
-    } | mass
+    full = matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return {"pos": format_numbers(place[0]), "fullinertia": format_numbers(full)} | mass
 
 
 def is_rigid(body: mujoco.MjsBody) -> bool:
@@ -98,127 +169,12 @@ def _moments(body: mujoco.MjsBody) -> FloatArray:
     return moments
 
 
-_GEOMS = {
-    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
-    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
-    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
-    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
-    mujoco.mjtGeom.mjGEOM_MESH: ("mesh", 0),
-}
-"""Name and number of sizes of the geoms of a URDF."""
-
-_VISUAL_GROUP, _HIDDEN_GROUP = "2", "3"
-"""Groups of visuals, and of collisions of a link with visuals, as in MuJoCo's Menagerie."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Hinge:
-    """A hinge of a massless link, in the frame of the link that it is merged into."""
-
-    joint: mujoco.MjsJoint
-    frame: Frame
-
-
-@dataclass(frozen=True, eq=False)
-class _Main:
-    """The element of a body with hinges, or of the root, and what is fixed to it.
-
-    Attributes:
-        element: The ``<body>``.
-        frame: Frame of a body that is fixed to it, in its frame.
-        in_middle: Whether another body hangs on it by a hinge.
-    """
-
-    element: ET.Element
-    frame: Frame
-    in_middle: bool
-
-
-def world_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
-    """Returns the geoms and the bodies of the world as MJCF, the bodies with their descendants.
-
-    A link without mass and geoms that moves and has one child becomes a further hinge of that
-    child, because MuJoCo moves no massless body. The geoms of a link that is fixed to a part in the
-    middle of a limb are given to that part, so that only the ends of limbs, such as feet, are
-    bodies with geoms and without children.
-    """
-    middle: set[str] = set()
-    for body in spec.bodies:
-        if body.joints and body.parent is not None:
-            middle.add(_main(body.parent).name)
-    roots = [_written(body, NO_FRAME, [], None, middle) for body in spec.worldbody.bodies]
-    return [*(_geom(geom, NO_FRAME, seen=False) for geom in spec.worldbody.geoms), *roots]
-
-
-def _main(body: mujoco.MjsBody) -> mujoco.MjsBody:
-    """Returns the body with joints, or the root, that a body is fixed to."""
-    while not body.joints and body.parent is not None and body.parent.parent is not None:
-        body = body.parent
-    return body
-
-
-def meshes(spec: mujoco.MjSpec) -> list[ET.Element]:
-    """Returns the meshes of a specification as MJCF."""
-    # With the inertia of a shell, MuJoCo accepts flat and open meshes; masses are not from meshes.
-    return [
-        ET.Element(
-            "mesh",
-            {
-                "name": mesh.name,
-                "file": mesh.file,
-                "scale": format_numbers(mesh.scale),
-                "inertia": "shell",
-            },
-        )
-        for mesh in spec.meshes
-    ]
-
-
-def _written(
-    body: mujoco.MjsBody,
-    outer: Frame,
-    hinges: list[_Hinge],
-    main: _Main | None,
-    middle: Collection[str],
-) -> ET.Element:
-    """Returns a body with its descendants as MJCF.
-
-    Args:
-        body: The body.
-        outer: Frame of the body's parent in the parent element.
-        hinges: Hinges of the massless parents, in the frame of the body's parent.
-        main: The element that the body's parent is fixed to; None for a root.
-        middle: Names of the bodies in the middle of limbs.
-    """
-    own = Frame(np.array(body.pos), np.array(body.quat))
-    frame, inner = outer.then(own), own.inverse()
-    own_hinges = [_Hinge(joint, NO_FRAME) for joint in body.joints]
-    here = [_Hinge(hinge.joint, inner.then(hinge.frame)) for hinge in hinges] + own_hinges
-    if here and not body.mass and not len(body.geoms) and len(body.bodies) == 1:
-        return _written(body.bodies[0], frame, here, main, middle)
-    element = ET.Element("body", {"name": body.name} | placed(frame))
-    if body.mass:
-        ET.SubElement(element, "inertial", inertial(body))
-    element.extend([_joint(hinge) for hinge in here])
-    if here or main is None:
-        main = _Main(element, NO_FRAME, in_middle=body.name in middle)
-    else:
-        main = replace(main, frame=main.frame.then(frame))
-    seen = any(not geom.contype for geom in body.geoms)
-    at = main if main.in_middle else _Main(element, NO_FRAME, in_middle=False)
-    for geom in body.geoms:
-        at.element.append(_geom(geom, at.frame, seen=seen))
-    element.extend([_written(child, NO_FRAME, [], main, middle) for child in body.bodies])
-    return element
-
-
-def _joint(hinge: _Hinge) -> ET.Element:
-    joint, frame = hinge.joint, hinge.frame
+def _joint(joint: mujoco.MjsJoint, frame: Frame) -> ET.Element:
     attributes = {
         "name": joint.name,
         "type": "hinge",
-        "pos": format_numbers(frame.position),
-        "axis": format_numbers(frame.direction(joint.axis)),
+        "pos": format_numbers(frame[0]),
+        "axis": format_numbers(_turned(joint.axis, frame[1])),
     }
     if joint.range[0] < joint.range[1]:
         attributes |= {"range": format_numbers(joint.range), "limited": "true"}
@@ -237,7 +193,8 @@ def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
         seen: Whether the link has visuals, so that its collisions are not drawn.
     """
     kind, sizes = _GEOMS[geom.type]
-    attributes = {"type": kind} | placed(frame.then(Frame(np.array(geom.pos), np.array(geom.quat))))
+    place = _joined(frame, (np.array(geom.pos), np.array(geom.quat)))
+    attributes = {"type": kind} | _place(place)
     if sizes:
         attributes["size"] = format_numbers(geom.size[:sizes])
     else:

@@ -9,7 +9,7 @@ import numpy as np
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.mjcf.expand import MIN_ITERATIONS
+from selfmodel.robot.mjcf.structure import MIN_ITERATIONS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator

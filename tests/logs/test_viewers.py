@@ -6,12 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from selfmodel.logs.viewers import _roll_pitch_yaw, urdf
-from selfmodel.robot.mjcf.files import InMemory
 from selfmodel.robot.mjcf.settings import MjcfSettings
-from selfmodel.robot.mjcf.untrusted import parse_xml
+from selfmodel.robot.mjcf.untrusted import InMemory, parse_xml
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.urdf import read_urdf
-from selfmodel.robot.urdf_conversion import convert
 from selfmodel.tasks import ROBOTS
 
 
@@ -92,8 +90,8 @@ def from_root(model: mujoco.MjModel, data: mujoco.MjData, root: str) -> tuple[np
 )
 @given(seed=st.integers(0, 2**32 - 1))
 def test_read_back_it_is_a_robot_with_the_same_bodies_in_any_pose(drawn: Robot, seed: int):
-    document = read_urdf(parse_xml(urdf(drawn).encode()), InMemory({}))
-    text = convert(document, MjcfSettings(base="fixed")).text
+    root = parse_xml(urdf(drawn).encode())
+    text = read_urdf(root, InMemory({}), MjcfSettings(base="fixed")).text
     before, after = drawn.model, mujoco.MjModel.from_xml_string(text)
     first = before.body(drawn.root).id
     names = [before.body(body).name for body in range(first, before.nbody)]

@@ -1,9 +1,8 @@
 """Tests of command ranges: read from a motor's attributes, or required in an error message."""
 
-import numpy as np
 import pytest
 
-from selfmodel.controllers.controller import TARGET_RANGE, draw_genomes
+from selfmodel.controllers.controller import TARGET_RANGE
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.robot.actuators import command_ranges
@@ -92,51 +91,3 @@ def test_the_torque_limit_of_a_joint_bounds_a_motor_by_its_gear():
 def test_a_motor_without_a_range_is_refused_by_name(motor: str):
     with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
         command_ranges(made_with(motor).model)
-
-
-def test_a_servo_of_an_unlimited_joint_is_refused_by_name():
-    model = made_with('<position name="m" joint="hip" kp="10"/>').model
-    model.jnt_limited[:] = 0
-    with pytest.raises(InputError, match=r"got none for the motor m: give it a ctrlrange"):
-        command_ranges(model)
-
-
-def test_a_robot_without_a_range_is_valid_until_a_controller_needs_it():
-    made = made_with('<motor name="m" joint="hip"/>')
-
-    assert made.anatomy.motors == ("m",)
-    with pytest.raises(InputError, match="got none for the motor m"):
-        _ = network_for(made)
-    with pytest.raises(InputError, match="got none for the motor m"):
-        _ = cpg_for(made)
-
-
-def test_a_network_s_outputs_span_the_range_of_each_motor():
-    ranges = ((0.0, 2.0), (-1.0, 0.5), (3.0, 1.0))
-    narrow = Network(("a",), ("x", "y", "z"), 3)
-    wide = Network(("a",), ("x", "y", "z"), 3, ranges)
-    genome = draw_genomes(np.random.default_rng(0), (wide.weights,))
-    commands = np.empty((2, 1, 3))
-    for network, command in zip((narrow, wide), commands, strict=True):
-        network.batch(genome[np.newaxis], [frozenset()]).step(command)
-    outputs = commands[0] / TARGET_RANGE
-
-    np.testing.assert_allclose(
-        commands[1], outputs * [2.0, 0.5, 1.0] + [0.0, -1.0, 3.0], rtol=1e-12
-    )
-    assert narrow != wide
-
-
-@pytest.mark.parametrize(
-    ("ranges", "match"),
-    [
-        (((0.0, 1.0),), "2 motors need a command range each, got 1"),
-        (((0.0, 1.0), (0.0, 0.0)), "motor y needs a finite command range"),
-        (((0.0, 1.0), (0.0, -1.0)), "motor y needs a finite command range"),
-        (((np.inf, 1.0), (0.0, 1.0)), "motor x needs a finite command range"),
-        (((0.0, np.nan), (0.0, 1.0)), "motor x needs a finite command range"),
-    ],
-)
-def test_an_invalid_range_is_refused(ranges: tuple, match: str):
-    with pytest.raises(ValueError, match=match):
-        Network(("a",), ("x", "y"), 3, ranges)

@@ -1,12 +1,13 @@
-"""Poses from observations; a missing one is the last before it."""
+"""Tests of drawn motion: poses from observations, and the geoms that are seen."""
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as arrays
 
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.motion import POSE, Poses, poses_of
+from selfmodel.robot.motion import POSE, Poses, opacity, poses_of, stick_geoms, visible_geoms
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields
 from selfmodel.simulation.simulator import Simulator
@@ -99,21 +100,57 @@ def test_without_a_base_the_robot_stays_where_it_starts(robot: Robot, signal: st
     np.testing.assert_array_equal(told(robot, poses, signal), start)
 
 
-def test_a_robot_that_slides_and_turns_in_a_plane_stands_where_it_was_seen():
-    mjcf = """<mujoco><option timestep="0.01"/><worldbody><geom type="plane" size="0 0 1"/>
-      <body name="torso" pos="0 0 1.2">
-        <joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
-        <joint name="pitch" axis="0 1 0"/><geom size="0.1"/>
-        <body name="leg"><joint name="hip" axis="0 1 0" range="-1 1" limited="true"/>
-          <geom type="capsule" size="0.05" fromto="0 0 0 0 0 -0.5"/></body>
-      </body></worldbody>
-      <actuator><position name="hip" joint="hip" kp="5" ctrlrange="-1 1"/></actuator>
-      <sensor><jointpos name="angle" joint="hip"/></sensor></mujoco>"""
-    robot = Robot("walker", mjcf, 0.01)
-    behaviour = moved(robot)
-    poses = poses_of(robot, robot.model, behaviour)
+MESH = '<asset><mesh name="m" vertex="-.1 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>'
 
-    assert poses.missing == ()
-    assert np.ptp(poses.qpos, axis=0).min() > 0
-    for signal in POSE:
-        np.testing.assert_allclose(told(robot, poses, signal), behaviour[signal], atol=1e-12)
+
+def seen(geoms: str) -> list[bool]:
+    """Returns which geoms of a body are drawn."""
+    text = f"<mujoco>{MESH}<worldbody><body>{geoms}</body></worldbody></mujoco>"
+    return visible_geoms(mujoco.MjModel.from_xml_string(text)).tolist()
+
+
+VISUAL = '<geom type="mesh" mesh="m" contype="0" conaffinity="0" group="{}"/>'
+COLLISION = '<geom type="capsule" size=".05 .1" group="{}"/>'
+
+
+@pytest.mark.parametrize(
+    ("geoms", "expected"),
+    [
+        (VISUAL.format(2) + COLLISION.format(3), [True, False]),
+        (COLLISION.format(3), [True]),
+        (COLLISION.format(5) * 2, [True, True]),
+        (COLLISION.format(0) + VISUAL.format(1), [False, True]),
+        (COLLISION.format(0) + VISUAL.format(0), [True, True]),
+        (COLLISION.format(0) + COLLISION.format(3), [True, False]),
+        ('<geom size=".01" group="1"/>' + COLLISION.format(3), [True, True]),
+        ('<geom size=".1" rgba="1 1 1 0"/>', [True]),
+        ('<geom size=".1" rgba="1 1 1 0"/><geom size=".1"/>', [False, True]),
+    ],
+)
+def test_each_body_is_drawn_with_the_geoms_that_are_meant_to_be_seen(
+    geoms: str, expected: list[bool]
+):
+    assert seen(geoms) == expected
+
+
+def test_a_ground_in_a_group_that_is_hidden_is_drawn():
+    text = '<mujoco><worldbody><geom type="plane" size="0 0 1" group="4"/></worldbody></mujoco>'
+
+    assert visible_geoms(mujoco.MjModel.from_xml_string(text)).tolist() == [True]
+
+
+def test_a_stick_figure_has_the_box_of_a_mesh_only_where_a_body_has_nothing_else():
+    text = f"""<mujoco>{MESH}<worldbody><body>{VISUAL.format(2)}{COLLISION.format(3)}</body>
+    <body>{VISUAL.format(2)}</body></worldbody></mujoco>"""
+
+    assert stick_geoms(mujoco.MjModel.from_xml_string(text)).tolist() == [False, True, True]
+
+
+def test_the_opacity_of_a_geom_is_its_own_or_that_of_its_material():
+    text = """<mujoco><asset><material name="glass" rgba="1 1 1 0.25"/></asset><worldbody>
+    <geom size=".1" material="glass"/><geom size=".1" rgba="1 0 0 0.75"/><geom size=".1"/>
+    <geom size=".1" material="glass" rgba="1 0 0 1"/></worldbody></mujoco>"""
+
+    found = opacity(mujoco.MjModel.from_xml_string(text))
+
+    assert np.allclose(found, [0.25, 0.75, 1, 1])

@@ -59,20 +59,6 @@ def test_a_block_that_reports_its_warnings_by_itself_is_not_counted():
     assert mujoco_warnings() == before
 
 
-def test_a_handler_of_the_program_is_kept():
-    own = mujoco.get_mju_user_warning()
-    heard: list[str] = []
-    before = total()
-    mujoco.set_mju_user_warning(heard.append)
-    try:
-        configure()
-        warn()
-    finally:
-        mujoco.set_mju_user_warning(own)
-    assert len(heard) == 1
-    assert total() == before
-
-
 def test_the_handler_of_dm_control_is_replaced_whenever_it_was_imported(
     capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ):

@@ -107,19 +107,6 @@ def test_the_time_limit_truncates_and_the_end_of_a_task_terminates(env: gymnasiu
         assert done.step(np.zeros(1))[2:4] == (True, False)
 
 
-def test_steps_are_those_of_the_dm_control_environment():
-    plain = gymnasium.make(ID, hypothesis="break:front_left_knee")
-    plain.reset(seed=0)
-    own = tasks.load("quadruped", "walk", {"hypothesis": "break:front_left_knee"})
-    own.reset()
-    for _ in range(5):
-        action = plain.action_space.sample()
-        observation, reward, *_ = plain.step(action)
-        step = own.step(action)
-        assert reward == step.reward
-        assert same(observation, dict(step.observation))
-
-
 def test_a_spec_and_a_copy_make_the_same_environment(env: gymnasium.Env):
     spec = EnvSpec.from_json(env.spec.to_json())
     first = env.reset(seed=4)[0]

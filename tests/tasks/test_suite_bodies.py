@@ -9,10 +9,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.physical.interface import TimedRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.repair import RepairSearch
-from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.tasks import ROBOTS, entry, load, suite_bodies
+from selfmodel.tasks import entry, suite_bodies
 from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers
@@ -75,54 +73,6 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
     assert physical.returns == pytest.approx([worth[0]] * 2, rel=1e-9)
 
 
-def test_the_return_of_a_run_does_not_depend_on_the_others():
-    own = entry("suite-quadruped-walk")
-    robot, score = own.robot(), own.episode_return
-    assert score is not None
-    runs = [(INTACT, driver) for driver in random_controllers(robot, 3)]
-    every = Simulator(robot, 1).run(runs, STEPS, score.record).behaviour
-    alone = Simulator(robot, 1).run(runs[2:], STEPS, score.record).behaviour
-
-    returns = score.of(robot, INTACT, every)
-    assert len(set(returns)) == 3
-    assert returns[2:].tobytes() == score.of(robot, INTACT, alone).tobytes()
-
-
-def test_a_repair_for_the_return_finds_another_controller_than_one_for_the_way():
-    own = entry("suite-walker-stand")
-    robot, score = own.robot(), own.episode_return
-    assert score is not None
-    settings = Settings(steps=STEPS, generations=2).scaled(8)
-    simulator = Simulator(robot, 1)
-    stands = RepairSearch(simulator, settings, score=score)
-    goes = RepairSearch(simulator, settings)
-    found = [
-        repair((INTACT,), None, (), np.random.default_rng(0), lambda _: None)[0].controller
-        for repair in (stands, goes)
-    ]
-    shown = simulator.run([(INTACT, one) for one in found], STEPS, score.record).behaviour
-    returns = score.of(robot, INTACT, shown)
-    way = shown["base_position"][:, -1, 0] - shown["base_position"][:, 0, 0]
-
-    assert found[0] != found[1]
-    assert returns[0] > returns[1]
-    assert way[0] < way[1]
-
-
-def test_the_return_of_our_walking_task_is_the_sum_of_its_rewards():
-    own = ROBOTS["quadruped"]
-    robot, score = own.robot(), own.episode_return
-    assert score is not None
-    driver = random_controllers(robot, 1)[0]
-    record = (*score.record, "commands")
-    simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, record).behaviour
-    env = load("quadruped", "walk")
-    env.reset()
-    earned = sum(env.step(command).reward for command in simulated["commands"][0, :-1])
-
-    assert earned == pytest.approx(score.of(robot, INTACT, simulated)[0], rel=1e-9)
-
-
 @pytest.mark.parametrize(("domain", "task"), FIRST)
 def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
     robot = entry(suite_bodies.name(domain, task)).robot()
@@ -132,23 +82,6 @@ def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
     assert float(robot.model.opt.timestep) == env.physics.timestep()
     assert env.action_spec().shape == (len(robot.anatomy.motors),)
     assert round(env._step_limit) == 1000
-
-
-def test_hypotheses_of_a_body_take_little_memory():
-    walker, dog = (entry(name).robot() for name in ("suite-walker-walk", "suite-dog-walk"))
-    kept = Simulator(dog, 1)._embodiment.cache_parameters()["maxsize"]
-
-    assert walker.model.nbuffer < 2**18  # 12 MB of sky and floor textures in the suite
-    assert kept * dog.model.nbuffer <= 2**29
-
-
-def test_every_task_of_a_domain_is_known_but_those_with_more_than_the_body():
-    left_out = {("quadruped", "escape"), ("quadruped", "fetch"), ("dog", "fetch")}
-    known = {(domain, task) for domain, tasks in suite_bodies.DOMAINS.items() for task in tasks}
-
-    assert known | left_out == {
-        (domain, task) for domain, task in suite.ALL_TASKS if domain in suite_bodies.DOMAINS
-    }
 
 
 @pytest.mark.parametrize(

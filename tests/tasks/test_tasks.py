@@ -21,8 +21,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import Embodiment
-from selfmodel.tasks import ALL_TASKS, ROBOTS, SUITE, TASKS_BY_DOMAIN
-from tests.helpers.opengl import drawing, draws
+from selfmodel.tasks import ALL_TASKS, ROBOTS
 
 FASTEST = 50.0
 """Upper bound on the robots' speed, m/s."""
@@ -41,7 +40,14 @@ def damages(domain: str) -> Iterator[str]:
 
 
 OWN_TASKS = [(domain, task) for domain, task in ALL_TASKS if domain in ROBOTS]
-EVERY = [(domain, task, text) for domain, task in OWN_TASKS for text in damages(domain)]
+EVERY = [
+    (domain, task, text)
+    for first, (domain, task) in enumerate(OWN_TASKS)
+    for number, text in enumerate(damages(domain))
+    if (first + number) % 2 == 0
+]
+"""Each damage on one of the robots."""
+
 every_task = pytest.mark.parametrize(("domain", "task"), OWN_TASKS)
 every_body = pytest.mark.parametrize(("domain", "task", "hypothesis"), EVERY)
 
@@ -64,14 +70,6 @@ def episodes(
         while not step.last():
             step = environment.step(rng.uniform(spec.minimum, spec.maximum))
             yield step
-
-
-def test_the_suite_names_each_task_once_and_loads_it():
-    assert len(set(ALL_TASKS)) == len(ALL_TASKS) == sum(map(len, TASKS_BY_DOMAIN.values())) > 0
-    assert set(TASKS_BY_DOMAIN) == set(SUITE) > set(ROBOTS)
-    for domain, task in ALL_TASKS:
-        assert callable(SUITE[domain][task])
-        assert task in TASKS_BY_DOMAIN[domain]
 
 
 @every_body
@@ -126,16 +124,6 @@ def test_the_same_seed_and_actions_give_the_same_bits(domain: str, task: str, hy
             assert values.tobytes() == second.observation[name].tobytes(), name
 
 
-@every_body
-def test_every_episode_starts_in_the_same_place(domain: str, task: str, hypothesis: str):
-    firsts = [step for step in episodes(load(domain, task, hypothesis), 3) if step.first()]
-
-    assert len(firsts) == 3
-    for first in firsts[1:]:
-        for name, values in first.observation.items():
-            np.testing.assert_array_equal(values, firsts[0].observation[name], name)
-
-
 @every_task
 def test_actions_are_the_motors_targets_in_their_range(domain: str, task: str):
     robot = ROBOTS[domain].robot()
@@ -169,57 +157,6 @@ def test_the_time_limit_ends_an_episode_and_none_never_does(domain: str, task: s
 
 
 @every_task
-def test_observations_can_be_flat(domain: str, task: str):
-    flat, plain = load(domain, task, flat_observation=True), load(domain, task)
-    spec = flat.observation_spec()[control.FLAT_OBSERVATION_KEY]
-
-    assert list(flat.observation_spec()) == [control.FLAT_OBSERVATION_KEY]
-    for one, other in zip(episodes(flat, 1), episodes(plain, 1), strict=True):
-        values = one.observation[control.FLAT_OBSERVATION_KEY]
-        spec.validate(values)
-        np.testing.assert_array_equal(values, np.concatenate([*other.observation.values()]))
-
-
-@every_task
-def test_an_observation_stays_as_it_is_while_the_robot_goes_on(domain: str, task: str):
-    environment = load(domain, task)
-    first = environment.reset()
-    kept = {name: values.copy() for name, values in first.observation.items()}
-    second = environment.step(environment.action_spec().maximum)
-
-    for name, values in first.observation.items():
-        assert not np.may_share_memory(values, second.observation[name]), name
-        np.testing.assert_array_equal(values, kept[name])
-    data = environment.physics.data
-    for name, values in second.observation.items():
-        assert not np.may_share_memory(values, data.qpos), name
-        assert not np.may_share_memory(values, data.qvel), name
-
-
-@every_task
-def test_all_that_is_observed_of_a_whole_robot_changes(domain: str, task: str):
-    """Constant observations carry no information."""
-    seen: dict[str, list[np.ndarray]] = {}
-    for step in episodes(load(domain, task, limit=1.0), 2):
-        for name, values in step.observation.items():
-            seen.setdefault(name, []).append(values)
-    for name, rows in seen.items():
-        assert np.ptp(rows, axis=0).min() > 0, name
-
-
-@every_task
-def test_every_part_of_the_model_has_a_name(domain: str, task: str):
-    model = load(domain, task).physics.model
-    sizes = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "site": "nsite", "camera": "ncam"}
-    sizes |= {"light": "nlight", "texture": "ntex", "material": "nmat", "actuator": "nu"}
-    sizes |= {"sensor": "nsensor"}
-    for kind, size in sizes.items():
-        names = [model.id2name(k, kind) for k in range(getattr(model, size))]
-        assert all(names), kind
-        assert len(set(names)) == len(names), kind
-
-
-@every_task
 def test_the_suites_own_arguments_are_taken_by_place_and_by_name(domain: str, task: str):
     environment = tasks.load(domain, task, {"time_limit": 0.02}, None, False)
     by_name = tasks.load(domain_name=domain, task_name=task, visualize_reward=False)
@@ -248,51 +185,3 @@ def test_the_viewers_runtime_runs_episodes(domain: str, task: str, hypothesis: s
     viewed.single_step()
     assert viewed.state is runtime.State.RUNNING
     assert errors == []
-
-
-LAUNCHED = """
-import sys
-from functools import partial
-from unittest import mock
-
-import numpy as np
-from dm_control import viewer
-from dm_control.viewer import gui
-
-from selfmodel import tasks
-
-domain, task = sys.argv[1:]
-pictures = []
-
-class Window:
-    def __init__(self, width, height, title):
-        self.shape, self.mouse, self.keyboard = (320, 240), mock.MagicMock(), mock.MagicMock()
-    def event_loop(self, tick_func):
-        pictures.extend(tick_func().copy() for _ in range(3))
-    def close(self):
-        pass
-
-gui.RenderWindow = Window
-kwargs = {"hypothesis": tasks.ROBOTS[domain].cases[2]}
-viewer.launch(environment_loader=partial(tasks.load, domain, task, kwargs))
-assert [picture.shape for picture in pictures] == [(240, 320, 3)] * 3
-assert np.ptp(pictures[-1]) > 100
-environment = tasks.load(domain, task, kwargs)
-environment.reset()
-for camera in range(-1, environment.physics.model.ncam):
-    assert np.ptp(environment.physics.render(48, 64, camera_id=camera)) > 100
-print("seen")
-sys.stdout.flush()
-import os
-os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
-"""
-
-
-@pytest.mark.opengl
-@draws
-@every_task
-def test_the_viewer_shows_a_damaged_robot_in_a_window_of_ours(domain: str, task: str):
-    """Runs ``dm_control.viewer.launch`` with an off-screen window."""
-    done = drawing(LAUNCHED, domain, task)
-
-    assert done.stdout.endswith("seen\n"), done.stderr

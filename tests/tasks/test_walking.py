@@ -9,7 +9,7 @@ import pytest
 import selfmodel
 from selfmodel import tasks
 from selfmodel.errors import InputError
-from selfmodel.robot.control_delay import CONTROL_DELAY
+from selfmodel.robot.anatomy import CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.reality_gap import DEBRIS_PREFIX
 from selfmodel.tasks import walking

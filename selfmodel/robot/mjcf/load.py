@@ -18,36 +18,47 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.isolation import Message, run_isolated
-from selfmodel.robot.mjcf.document import Document, read_document
-from selfmodel.robot.mjcf.expand import (
+from selfmodel.robot.mjcf.equipment import (
+    add_command_ranges,
+    add_sensors,
+    add_servos,
+    limit_reach,
+)
+from selfmodel.robot.mjcf.meshes import drop_textures, reduce_meshes, replace_missing_meshes
+from selfmodel.robot.mjcf.pose import (
+    add_ground,
+    bake_keyframe,
+    carry_hinges,
+    fix_base,
+    free_base,
+    turn_forward,
+)
+from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, read_settings
+from selfmodel.robot.mjcf.structure import (
     drop_large_reservations,
     expand,
+    name_parts,
     remove_hidden_state,
 )
-from selfmodel.robot.mjcf.files import InMemory, robot_folder
-from selfmodel.robot.mjcf.meshes import drop_textures, reduce_meshes, replace_missing_meshes
-from selfmodel.robot.mjcf.motors import add_command_ranges, add_servos, limit_reach
-from selfmodel.robot.mjcf.names import name_parts
-from selfmodel.robot.mjcf.pose import bake_keyframe, turn_forward
-from selfmodel.robot.mjcf.sensors import add_sensors
-from selfmodel.robot.mjcf.settings import (
-    MAX_CONTROL_TIMESTEP,
-    MjcfSettings,
-    read_settings,
+from selfmodel.robot.mjcf.untrusted import (
+    MAX_TEXT,
+    InMemory,
+    named_files,
+    parse_xml,
+    robot_folder,
 )
-from selfmodel.robot.mjcf.untrusted import MAX_TEXT, named_files, parse_xml
-from selfmodel.robot.mjcf.world import add_ground, carry_hinges, fix_base, free_base
-from selfmodel.robot.model_checks import MAX_NUMBER, check_usable
-from selfmodel.robot.mujoco_errors import compile_model, mujoco_errors_as_input_errors
-from selfmodel.robot.robot import Robot
+from selfmodel.robot.mjcf.work import Work, read_mjcf
+from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
+from selfmodel.robot.robot import Robot, check_usable
 from selfmodel.robot.urdf import read_urdf
-from selfmodel.robot.urdf_conversion import convert
 
 MIN_CONTROL_TIMESTEP = 0.01
 """Lower bound of the default control time step, s."""
 
 MAX_SUBSTEPS = 1000
 """Largest number of physics steps per control step; the model of a log has the same limit."""
+
+_MODULE = "selfmodel.robot.mjcf.load"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,147 +78,6 @@ class AdaptedMjcf:
     control_timestep: float
     assets: Mapping[str, bytes]
     notes: tuple[str, ...]
-
-
-def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a file, which a child process reads and compiles.
-
-    Args:
-        path: The file, which may include and name files of its folder, of the folder above in a
-            usual layout (``root_around``), and of the folder ``assets`` of the settings.
-        settings: Properties that the file does not contain.
-
-    Raises:
-        InputError: The file cannot be a robot; the message has the reason and the remedy.
-    """
-    data = read_file(path, "an MJCF or URDF file", MAX_TEXT)
-    request = Message({"path": str(path), "settings": asdict(settings)}, {"file": data})
-    try:
-        answer = run_isolated(f"{__name__}:adapt_message", request, what="the model")
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    notes = tuple(answer.header["notes"])
-    return AdaptedMjcf(**{**answer.header, "notes": notes, "assets": answer.buffers})
-
-
-def adapt_message(request: Message) -> Message:
-    """Task of a child process: adapts the file in a message."""
-    path = Path(request.header["path"])
-    values: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in request.header["settings"].items()
-    }
-    settings = MjcfSettings(**values)
-    root = parse_xml(request.buffers["file"])
-    files = robot_folder(path.parent, settings.assets)
-    if root.tag == "robot":
-        document = convert(read_urdf(root, files), settings)
-        settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
-    elif settings.effort or settings.pose:
-        raise InputError(
-            "effort and pose are settings for a URDF: in an MJCF, motors have a forcerange, and a "
-            "<key> in <keyframe> has the pose"
-        )
-    else:
-        document = read_document(root, files, path.name)
-    adapted = _adapted(encodable(path.stem), document, settings)
-    header = {name: value for name, value in vars(adapted).items() if name != "assets"}
-    return Message(header, adapted.assets)
-
-
-def adapt_text(
-    name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
-) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a trusted text in memory, which this process compiles.
-
-    Args:
-        name: Name of the robot.
-        mjcf: The MJCF as text.
-        files: Contents of the files that the text includes and names, by the paths in the text.
-        settings: Properties that the text does not contain.
-
-    Raises:
-        InputError: The text cannot be a robot; the message has the reason and the remedy.
-    """
-    try:
-        return _adapted(name, read_document(parse_xml(mjcf), InMemory(files)), settings)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from error
-
-
-def _adapted(name: str, document: Document, settings: MjcfSettings) -> AdaptedMjcf:
-    _check_loggable(document)
-    drop_large_reservations(document)
-    expand(document)
-    name_parts(document)
-    for body in document.bodies():
-        if body.attrib.pop("mocap", "false") == "true":
-            document.notes.append(f"the mocap body {body.get('name')} is static")
-    if settings.base == "free":
-        free_base(document)
-    drop_textures(document)
-    carry_hinges(document)
-    replace_missing_meshes(document)
-    reduce_meshes(document)
-    check_usable(document.model)
-    timestep = _control_timestep(float(document.model.opt.timestep), settings.control_timestep)
-    remove_hidden_state(document)
-    bake_keyframe(document, settings)
-    turn_forward(document, settings)
-    if settings.base == "fixed":
-        fix_base(document, settings.base_height)
-    add_ground(document)
-    add_sensors(document, settings)
-    if settings.kp or settings.kd:
-        add_servos(document, settings)
-    if settings.reach:
-        limit_reach(document, settings.reach)
-    add_command_ranges(document, settings)
-    files = named_files(document.root, document.assets)
-    return AdaptedMjcf(name, document.text, timestep, files, tuple(document.notes))
-
-
-def _check_loggable(document: Document) -> None:
-    """Checks that a log can contain the model, before MuJoCo compiles the model."""
-    try:
-        named_files(document.root, document.assets)
-    except InputError as error:
-        raise InputError(
-            f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
-        ) from error
-
-
-def _control_timestep(physics: float, wanted: float | None) -> float:
-    """Returns the control time step, s.
-
-    Args:
-        physics: Physics time step, s.
-        wanted: Control time step in the settings, s; None for the smallest multiple of the physics
-            time step that is at least ``MIN_CONTROL_TIMESTEP``.
-
-    Raises:
-        InputError: The control time step has more than ``MAX_SUBSTEPS`` physics steps, or is not a
-            multiple of the physics time step; or the physics time step is too large.
-    """
-    control = MIN_CONTROL_TIMESTEP if wanted is None else wanted
-    if control / physics > MAX_SUBSTEPS:
-        raise InputError(
-            f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
-            f"{control / physics:.3g}: give the MJCF a larger <option timestep>"
-        )
-    if physics > MAX_CONTROL_TIMESTEP:
-        raise InputError(
-            f"expected a physics time step of at most {MAX_CONTROL_TIMESTEP:g} s, got "
-            f"{physics:.6g} s: give the MJCF a smaller <option timestep>"
-        )
-    if wanted is None:
-        return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics
-    if not math.isclose(max(1, round(wanted / physics)) * physics, wanted, rel_tol=1e-9):
-        raise InputError(
-            f"control_timestep must be a multiple of the physics time step {physics} s, got "
-            f"{wanted} s"
-        )
-    return wanted
 
 
 def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
@@ -242,7 +112,140 @@ def robot_from(adapted: AdaptedMjcf, source: str) -> Robot:
         raise InputError(f"{source}: {' '.join(str(error).split())}") from error
 
 
-_MODULE = "selfmodel.robot.mjcf.load"
+def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
+    """Returns the adapted MJCF of a file, which a child process reads and compiles.
+
+    Args:
+        path: The file, which may include and name files of its folder, of the folder above in a
+            usual layout (``root_around``), and of the folder ``assets`` of the settings.
+        settings: Properties that the file does not contain.
+
+    Raises:
+        InputError: The file cannot be a robot; the message has the reason and the remedy.
+    """
+    data = read_file(path, "an MJCF or URDF file", MAX_TEXT)
+    request = Message({"path": str(path), "settings": asdict(settings)}, {"file": data})
+    try:
+        answer = run_isolated(f"{_MODULE}:adapt_message", request, what="the model")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    notes = tuple(answer.header["notes"])
+    return AdaptedMjcf(**{**answer.header, "notes": notes, "assets": answer.buffers})
+
+
+def adapt_message(request: Message) -> Message:
+    """Task of a child process: adapts the file in a message."""
+    path = Path(request.header["path"])
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in request.header["settings"].items()
+    }
+    settings = MjcfSettings(**values)
+    root = parse_xml(request.buffers["file"])
+    files = robot_folder(path.parent, settings.assets)
+    if root.tag == "robot":
+        work = read_urdf(root, files, settings)
+        work.settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
+    elif settings.effort or settings.pose:
+        raise InputError(
+            "effort and pose are settings for a URDF: in an MJCF, motors have a forcerange, and a "
+            "<key> in <keyframe> has the pose"
+        )
+    else:
+        work = read_mjcf(root, files, settings, path.name)
+    adapted = _adapted(encodable(path.stem), work)
+    header = {name: value for name, value in vars(adapted).items() if name != "assets"}
+    return Message(header, adapted.assets)
+
+
+def adapt_text(
+    name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
+) -> AdaptedMjcf:
+    """Returns the adapted MJCF of a trusted text in memory, which this process compiles.
+
+    Args:
+        name: Name of the robot.
+        mjcf: The MJCF as text.
+        files: Contents of the files that the text includes and names, by the paths in the text.
+        settings: Properties that the text does not contain.
+
+    Raises:
+        InputError: The text cannot be a robot; the message has the reason and the remedy.
+    """
+    try:
+        return _adapted(name, read_mjcf(parse_xml(mjcf), InMemory(files), settings))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _adapted(name: str, work: Work) -> AdaptedMjcf:
+    """Returns the adapted MJCF; the steps are in an order in which each finds what it needs."""
+    try:
+        named_files(work.root, work.assets)  # before MuJoCo compiles the model
+    except InputError as error:
+        raise InputError(
+            f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
+        ) from error
+    drop_large_reservations(work)
+    expand(work)
+    name_parts(work)
+    for body in work.bodies():
+        if body.attrib.pop("mocap", "false") == "true":
+            work.notes.append(f"the mocap body {body.get('name')} is static")
+    if work.settings.base == "free":
+        free_base(work)
+    drop_textures(work)
+    carry_hinges(work)
+    replace_missing_meshes(work)
+    reduce_meshes(work)
+    check_usable(work.model)
+    timestep = _control_timestep(work)
+    remove_hidden_state(work)
+    bake_keyframe(work)
+    turn_forward(work)
+    if work.settings.base == "fixed":
+        fix_base(work)
+    add_ground(work)
+    add_sensors(work)
+    if work.settings.kp or work.settings.kd:
+        add_servos(work)
+    if work.settings.reach:
+        limit_reach(work)
+    add_command_ranges(work)
+    files = named_files(work.root, work.assets)
+    return AdaptedMjcf(name, work.text, timestep, files, tuple(work.notes))
+
+
+def _control_timestep(work: Work) -> float:
+    """Returns the control time step, s.
+
+    By default it is the smallest multiple of the physics time step that is at least
+    ``MIN_CONTROL_TIMESTEP``.
+
+    Raises:
+        InputError: The control time step has more than ``MAX_SUBSTEPS`` physics steps, or is not a
+            multiple of the physics time step; or the physics time step is too large.
+    """
+    physics, wanted = float(work.model.opt.timestep), work.settings.control_timestep
+    control = MIN_CONTROL_TIMESTEP if wanted is None else wanted
+    if control / physics > MAX_SUBSTEPS:
+        raise InputError(
+            f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
+            f"{control / physics:.3g}: give the MJCF a larger <option timestep>"
+        )
+    if physics > MAX_CONTROL_TIMESTEP:
+        raise InputError(
+            f"expected a physics time step of at most {MAX_CONTROL_TIMESTEP:g} s, got "
+            f"{physics:.6g} s: give the MJCF a smaller <option timestep>"
+        )
+    if wanted is None:
+        return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics
+    if not math.isclose(max(1, round(wanted / physics)) * physics, wanted, rel_tol=1e-9):
+        raise InputError(
+            f"control_timestep must be a multiple of the physics time step {physics} s, got "
+            f"{wanted} s"
+        )
+    return wanted
 
 
 def check_compiles(mjcf: str, assets: Mapping[str, bytes], control_timestep: float) -> None:
@@ -267,32 +270,10 @@ def _check(mjcf: str, assets: tuple[tuple[str, bytes], ...], control_timestep: f
 
 def build_and_step(request: Message) -> Message:
     """Task of a child process: builds a robot and takes a step of its physics."""
+    header = request.header
     with mujoco_errors_as_input_errors("use the model"):
-        robot = Robot(
-            "robot", request.header["mjcf"], request.header["control_timestep"], request.buffers
-        )
+        robot = Robot("robot", header["mjcf"], header["control_timestep"], request.buffers)
         data = mujoco.MjData(robot.model)
     with suppress(mujoco.FatalError):  # such as too many contacts: a simulation that diverges
         mujoco.mj_step(robot.model, data)
     return Message({})
-
-
-def physics_timestep(mjcf: str) -> float:
-    """Returns the physics time step of a model that names no files, s.
-
-    Args:
-        mjcf: The MJCF as one text.
-
-    Raises:
-        InputError: The model cannot be compiled, or the time step is not positive and finite.
-    """
-    answer = run_isolated(f"{_MODULE}:read_timestep", Message({"mjcf": mjcf}), what="the model")
-    timestep = float(answer.header["timestep"])
-    if not 0 < timestep <= MAX_NUMBER:
-        raise InputError(f"the physics time step must be above 0 s, got {timestep}")
-    return timestep
-
-
-def read_timestep(request: Message) -> Message:
-    """Task of a child process: compiles a model, as for ``physics_timestep``."""
-    return Message({"timestep": float(compile_model(request.header["mjcf"], {}).opt.timestep)})

@@ -1,26 +1,46 @@
-"""Initial pose of an MJCF: its keyframe becomes the reference pose, its forward direction x."""
+"""Pose of the robot of an MJCF: its base, its keyframe as the reference pose, the ground below."""
 
 import math
+from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.contacts import static_geoms, touching_geoms
-from selfmodel.robot.mjcf.document import BodyFrames, Document, format_numbers
-from selfmodel.robot.mjcf.settings import FORWARD_DIRECTIONS, NO_KEYFRAME, MjcfSettings
-from selfmodel.robot.model_edits import turned_by_hinge
+from selfmodel.robot.anatomy_reader import (
+    common_carrier,
+    driven_joints,
+    floating_bodies,
+    joints_of_body,
+)
+from selfmodel.robot.contacts import (
+    contacts_enabled,
+    ground_contact_geoms,
+    static_geoms,
+    touching_geoms,
+)
+from selfmodel.robot.embodiment import turned_by_hinge
+from selfmodel.robot.mjcf.settings import FORWARD_DIRECTIONS, NO_KEYFRAME
+from selfmodel.robot.mjcf.work import UniqueNames, Work, format_numbers
 from selfmodel.robot.mujoco_errors import loading_a_model
 
 STANDING_KEYFRAMES = ("home", "stand", "standing")
 """Usual names of the keyframe in which a robot stands, in the order in which they are tried."""
+
+STAND_CLEARANCE = 0.02
+"""Distance between the ground and the lowest point that a robot on a stand can reach, m."""
 
 _POSE_TOLERANCE = 1e-9
 """Largest difference of the new reference pose from the keyframe, m and unit quaternions."""
 
 _EQUALITY_TOLERANCE = 1e-6
 """Largest violation of an equality constraint in the keyframe, m or rad."""
+
+_LEVEL_TOLERANCE = 1e-9
+"""Largest deviation of the ground's unit normal from the vertical, per component."""
+
+_MAX_DISTANCE = 1e6
+"""Largest measured distance of a geom from the ground plane, m."""
 
 _COUPLINGS = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
 """Equality constraints with a polynomial of the distances from the reference pose."""
@@ -31,35 +51,83 @@ _OTHER_KEYFRAME = (
 )
 
 
-def bake_keyframe(document: Document, settings: MjcfSettings) -> None:
-    """Makes the initial keyframe the reference pose, and removes all keyframes.
+def free_base(work: Work) -> None:
+    """Gives the root body of a fixed robot a free joint; a floating base stays as it is.
 
-    Args:
-        document: The MJCF, edited in place.
-        settings: Settings with the name of the keyframe.
+    Raises:
+        InputError: No body of the world carries all driven joints, or that body has a joint.
+    """
+    model = work.model
+    driven = driven_joints(model)
+    if not driven or floating_bodies(model, driven):
+        return
+    tops = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in driven}
+    body = min(tops)
+    if len(tops) > 1 or joints_of_body(model, body):
+        raise InputError(
+            "base = 'free' needs one body of the world that carries all driven joints and has no "
+            "joint, and the model has none: put the joints into one <body>"
+        )
+    name = model.body(body).name
+    work.named_bodies()[name].insert(0, ET.Element("freejoint", {"name": f"{name}_root"}))
+    pose = format_numbers(np.concatenate([model.body_pos[body], model.body_quat[body]]))
+    for key in work.children("keyframe"):
+        if key.get("qpos"):
+            key.set("qpos", f"{pose} {key.get('qpos')}")
+    work.notes.append(f"the base {name} has a free joint")
+
+
+def carry_hinges(work: Work) -> None:
+    """Adds the root body of a fixed base if hinges are directly on bodies of the world."""
+    model = work.model
+    driven = driven_joints(model)
+    if not driven or floating_bodies(model, driven) or common_carrier(model, driven):
+        return
+    tops = {model.body(model.body_rootid[model.jnt_bodyid[joint]]).name for joint in driven}
+    name = UniqueNames(element.get("name") for element in work.bodies()).new("base")
+    base = ET.Element("body", {"name": name})
+    worlds = work.root.findall("worldbody")
+    for world in worlds:
+        for child in list(world):
+            if child.tag == "body" and child.get("name") in tops:
+                base.append(child)
+                world.remove(child)
+    worlds[0].append(base)
+    work.notes.append(f"the body {name} is added, which carries {', '.join(sorted(tops))}")
+
+
+def bake_keyframe(work: Work) -> None:
+    """Makes the initial keyframe the reference pose, and removes all keyframes.
 
     Raises:
         InputError: The keyframe does not exist, or an equality constraint would change.
     """
-    model = document.model
-    number = _keyframe(model, settings.keyframe)
-    for part in document.root.findall("keyframe"):
-        document.root.remove(part)
-    if number is None:
-        return
-    qpos = np.array(model.key_qpos[number])
+    model = work.model
+    number = _keyframe(model, work.settings.keyframe)
+    qpos = np.array(model.qpos0 if number is None else model.key_qpos[number])
+    before = None
     if not np.array_equal(qpos, model.qpos0):
         with loading_a_model():
             before = mujoco.MjData(model)
             before.qpos = qpos
             mujoco.mj_fwdPosition(model, before)
         _check_equalities(model, before)
-        _write_spring_lengths(document, model)
-        _write_couplings(document, model)
-        _frames_at(model, qpos).write(document, model)
-        _check_pose(before, document.model)
-    name = model.key(number).name or f"number {number}"
-    document.notes.append(f"the initial pose is the keyframe {name}")
+        _place_at(work, model, qpos)
+        for tendon, element in enumerate(work.children("tendon")):
+            if model.tendon_stiffness[tendon]:  # the default depends on the reference pose
+                element.set("springlength", format_numbers(model.tendon_lengthspring[tendon]))
+        for eq, element in enumerate(work.children("equality")):
+            # A linear coupling holds in the new reference pose without an offset.
+            if int(model.eq_type[eq]) in _COUPLINGS and model.eq_data[eq, 0]:
+                linear = np.array([0.0, model.eq_data[eq, 1], 0.0, 0.0, 0.0])
+                element.set("polycoef", format_numbers(linear))
+    for part in work.root.findall("keyframe"):
+        work.root.remove(part)
+    if before is not None:
+        _check_pose(before, work.model)
+    if number is not None:
+        name = model.key(number).name or f"number {number}"
+        work.notes.append(f"the initial pose is the keyframe {name}")
 
 
 def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
@@ -75,62 +143,40 @@ def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
     return names.index(wanted)
 
 
-def _frames_at(model: mujoco.MjModel, qpos: FloatArray) -> BodyFrames:
-    """Returns frames and references for which the reference pose is ``qpos``."""
-    frames = BodyFrames.of(model)
+def _place_at(work: Work, model: mujoco.MjModel, qpos: np.ndarray) -> None:
+    """Writes the frames and references for which the reference pose is ``qpos``."""
+    positions, orientations = model.body_pos.copy(), model.body_quat.copy()
+    references = []
     for joint in range(model.njnt):
         body, address = int(model.jnt_bodyid[joint]), int(model.jnt_qposadr[joint])
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-            frames.position[body] = qpos[address : address + 3]
-            frames.orientation[body] = qpos[address + 3 : address + 7]
+            positions[body] = qpos[address : address + 3]
+            orientations[body] = qpos[address + 3 : address + 7]
             continue
         shift = float(qpos[address] - model.qpos0[address])
-        frames.reference[joint] = float(qpos[address])
+        references.append((joint, float(qpos[address])))
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
             direction = np.empty(3)
-            mujoco.mju_rotVecQuat(direction, model.jnt_axis[joint], frames.orientation[body])
-            frames.position[body] += shift * direction
+            mujoco.mju_rotVecQuat(direction, model.jnt_axis[joint], orientations[body])
+            positions[body] += shift * direction
             continue
-        frames.position[body], frames.orientation[body] = turned_by_hinge(
-            frames.position[body],
-            frames.orientation[body],
-            model.jnt_axis[joint],
-            model.jnt_pos[joint],
-            shift,
+        axis, anchor = model.jnt_axis[joint], model.jnt_pos[joint]
+        positions[body], orientations[body] = turned_by_hinge(
+            positions[body], orientations[body], axis, anchor, shift
         )
-    return frames
+    work.place_bodies(positions, orientations, references)
 
 
 def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Checks that the new reference pose does not change the equality constraints."""
-    if not model.neq:
-        return
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    nonlinear = [
-        eq
-        for eq in range(model.neq)
-        if int(model.eq_type[eq]) in _COUPLINGS and np.any(model.eq_data[eq, 2:5])
-    ]
-    if nonlinear or np.any(np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE):
+    violated = np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE
+    nonlinear = np.isin(model.eq_type, _COUPLINGS) & model.eq_data[:, 2:5].any(axis=1)
+    if nonlinear.any() or violated.any():
         raise InputError(
             f"equality constraints are violated in the keyframe, or are nonlinear: "
             f"{_OTHER_KEYFRAME}"
         )
-
-
-def _write_spring_lengths(document: Document, model: mujoco.MjModel) -> None:
-    """Writes the rest lengths of sprung tendons, whose default depends on the reference pose."""
-    for tendon, element in enumerate(document.children("tendon")):
-        if model.tendon_stiffness[tendon]:
-            element.set("springlength", format_numbers(model.tendon_lengthspring[tendon]))
-
-
-def _write_couplings(document: Document, model: mujoco.MjModel) -> None:
-    """Removes the offsets of linear couplings, which hold in the new reference pose without one."""
-    for eq, element in enumerate(document.children("equality")):
-        if int(model.eq_type[eq]) in _COUPLINGS and model.eq_data[eq, 0]:
-            coefficients = np.array([0.0, model.eq_data[eq, 1], 0.0, 0.0, 0.0])
-            element.set("polycoef", format_numbers(coefficients))
 
 
 def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
@@ -145,51 +191,182 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
         raise InputError(f"the keyframe cannot be made the reference pose: {_OTHER_KEYFRAME}")
 
 
-_LEVEL_TOLERANCE = 1e-9
-"""Largest deviation of the ground's unit normal from the vertical, per component."""
-
-
-def turn_forward(document: Document, settings: MjcfSettings) -> None:
+def turn_forward(work: Work) -> None:
     """Rotates a floating robot until its forward direction is the world's x axis.
-
-    Args:
-        document: The MJCF, edited in place.
-        settings: Settings with the forward direction.
 
     Raises:
         InputError: The robot has no free joint, or the rotation would change its world.
     """
-    angle = -math.radians(FORWARD_DIRECTIONS[settings.forward])
+    forward = work.settings.forward
+    angle = -math.radians(FORWARD_DIRECTIONS[forward])
     if not angle:
         return
-    model, free = document.model, mujoco.mjtJoint.mjJNT_FREE
-    root = next((j for j in range(model.njnt) if model.jnt_type[j] == free), None)
-    if root is None:
+    model = work.model
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    if not len(free):
         raise InputError(
-            f"forward={settings.forward} needs a root body with a free joint, got none: rotate the "
+            f"forward={forward} needs a root body with a free joint, got none: rotate the "
             f"robot in its file, so that x is forward"
         )
     if np.any(model.opt.gravity[:2]) or np.any(model.opt.wind[:2]) or not _is_flat(model):
         raise InputError(
-            f"forward={settings.forward} rotates the robot, and its world is not the same from all "
+            f"forward={forward} rotates the robot, and its world is not the same from all "
             f"sides: rotate the robot in its file, so that x is forward"
         )
-    body = int(model.jnt_bodyid[root])
-    frames = BodyFrames.of(model)
-    rotation = np.array([math.cos(angle / 2), 0, 0, math.sin(angle / 2)])
-    orientation = np.empty(4)
-    mujoco.mju_mulQuat(orientation, rotation, frames.orientation[body])
-    frames.orientation[body] = orientation
-    frames.write(document, model)
-    document.notes.append(f"the initial pose is rotated, so that {settings.forward} is forward")
+    body = int(model.jnt_bodyid[free[0]])
+    orientations, turned = model.body_quat.copy(), np.empty(4)
+    turn = np.array([math.cos(angle / 2), 0, 0, math.sin(angle / 2)])
+    mujoco.mju_mulQuat(turned, turn, orientations[body])
+    orientations[body] = turned
+    work.place_bodies(model.body_pos, orientations)
+    work.notes.append(f"the initial pose is rotated, so that {forward} is forward")
 
 
 def _is_flat(model: mujoco.MjModel) -> bool:
     """Returns whether all static geoms that can be touched are level planes."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    for geom in np.flatnonzero(static_geoms(model) & touching_geoms(model)):
-        level = np.allclose(data.geom_xmat[geom, 2::3], (0, 0, 1), rtol=0, atol=_LEVEL_TOLERANCE)
-        if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE or not level:
-            return False
-    return True
+    ground = static_geoms(model) & touching_geoms(model)
+    planes = model.geom_type[ground] == mujoco.mjtGeom.mjGEOM_PLANE
+    normals = data.geom_xmat[ground][:, 2::3]
+    return bool(planes.all() and np.allclose(normals, (0, 0, 1), rtol=0, atol=_LEVEL_TOLERANCE))
+
+
+def fix_base(work: Work) -> None:
+    """Fixes a floating base to the world, above the ground; a fixed base stays as it is.
+
+    Its height is that of the settings, or else that in the initial pose, or the lowest height at
+    which the robot cannot touch the ground if that is larger.
+    """
+    model, height = work.model, work.settings.base_height
+    driven = driven_joints(model)
+    floating = floating_bodies(model, driven)
+    root = floating[0] if floating else common_carrier(model, driven)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    wanted = float(data.xpos[root, 2]) if height is None else height
+    if floating and height is None:
+        wanted = max(wanted, _ground_height(model, data) + STAND_CLEARANCE + _reach(model, root))
+    positions = model.body_pos.copy()
+    positions[model.body_rootid[root], 2] += wanted - data.xpos[root, 2]
+    work.place_bodies(positions, model.body_quat)
+    name = model.body(root).name
+    element = work.named_bodies()[name]
+    if floating:
+        for joint in [child for child in element if child.tag in ("joint", "freejoint")]:
+            element.remove(joint)
+        _keep_neighbours_apart(work, model, root)
+    work.notes.append(f"the base {name} is fixed at a height of {wanted:.3g} m")
+
+
+def _keep_neighbours_apart(work: Work, model: mujoco.MjModel, root: int) -> None:
+    """Excludes the contacts between a base and the bodies that joints connect to it.
+
+    MuJoCo ignores the contacts of a body with its parent only if the parent can move.
+    """
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        return
+    weld = model.body_weldid
+    base = weld[root]
+    neighbours = (weld != base) & (weld[model.body_parentid[weld]] == base)
+    shaped = model.body_geomnum > 0
+    contact = work.section("contact")
+    for fixed in np.flatnonzero(shaped & (weld == base)):
+        for other in np.flatnonzero(shaped & neighbours):
+            pair = {"body1": model.body(int(fixed)).name, "body2": model.body(int(other)).name}
+            if not any(pair.items() <= known.attrib.items() for known in contact):
+                ET.SubElement(contact, "exclude", pair)
+
+
+def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the height of the highest static geom that can be touched, m; minus infinity without.
+
+    A plane has the height of its centre.
+    """
+    heights = data.geom_xpos[:, 2].copy()
+    vertical = data.geom_xmat[:, 6:]
+    centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
+    tops = heights + (vertical * centre).sum(axis=1) + (np.abs(vertical) * half).sum(axis=1)
+    planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    ground = static_geoms(model) & touching_geoms(model)
+    return float(np.where(planes, heights, tops)[ground].max(initial=-np.inf))
+
+
+def _reach(model: mujoco.MjModel, root: int) -> float:
+    """Returns an upper bound of the distance of any point of a robot from its root body, m.
+
+    The bound holds at all joint angles: no hinge moves a point away from its own axis.
+    """
+    distance = np.zeros(model.nbody)
+    reach = 0.0
+    for body in range(root, model.nbody):
+        if model.body_rootid[body] != model.body_rootid[root]:
+            continue
+        if body != root:
+            anchors = model.jnt_pos[joints_of_body(model, body)]
+            distance[body] = (
+                distance[model.body_parentid[body]]
+                + np.linalg.norm(model.body_pos[body])
+                + 2 * np.linalg.norm(anchors, axis=1).sum()
+            )
+        geoms = model.geom_bodyid == body
+        outward = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
+        reach = max(reach, float(distance[body] + outward.max(initial=0.0)))
+    return reach
+
+
+def add_ground(work: Work) -> None:
+    """Adds a plane under the lowest point of a robot that could touch no static geom.
+
+    Models without contacts, models of swimmers and robots with a fixed base get no ground.
+
+    Raises:
+        InputError: No geom of the robot could touch a ground.
+    """
+    model = work.model
+    swims = model.opt.density or model.opt.viscosity
+    if swims or not contacts_enabled(model) or ground_contact_geoms(model):
+        return
+    if not floating_bodies(model, driven_joints(model)):
+        return
+    moving = ~static_geoms(model)
+    contype, conaffinity = (
+        int(np.bitwise_or.reduce(mask[moving], initial=0))
+        for mask in (model.geom_contype, model.geom_conaffinity)
+    )
+    if not contype | conaffinity:
+        raise InputError(
+            "no geom of the robot can touch anything: give the geoms of its limbs a contype of 1, "
+            "or <option> a density or viscosity if the robot swims or flies"
+        )
+    plane = {
+        "name": UniqueNames(model.geom(g).name for g in range(model.ngeom)).new("ground"),
+        "type": "plane",
+        "size": "0 0 1",
+        "contype": str(conaffinity or 1),
+        "conaffinity": str(contype),
+        "condim": "3",
+        "friction": "1 0.005 0.0001",
+        "pos": "0 0 0",
+        "quat": "1 0 0 0",
+    }
+    element = ET.Element("geom", plane)
+    work.section("worldbody").insert(0, element)
+    data = mujoco.MjData(work.model)
+    mujoco.mj_kinematics(work.model, data)
+    height = lowest_point(work.model, data)
+    element.set("pos", format_numbers(np.array([0.0, 0.0, height])))
+    work.notes.append(f"a ground plane is added at a height of {height:.3g} m")
+
+
+def lowest_point(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m.
+
+    Args:
+        model: A model with geoms that can touch the plane.
+        data: Positions of the geoms.
+    """
+    return min(
+        float(mujoco.mj_geomDistance(model, data, 0, geom, _MAX_DISTANCE, None))
+        for geom in ground_contact_geoms(model)
+    )

@@ -1,7 +1,7 @@
 """Settings of a user for the properties of a robot that its MJCF or URDF does not contain."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.robot.mjcf.files import is_around_home
+from selfmodel.robot.mjcf.untrusted import is_around_home
 
 JointValues = Mapping[str, float]
 """Values by name of a joint or pattern such as ``*_knee``; the last that fits counts."""
@@ -19,67 +19,6 @@ MAX_VALUE = 1e6
 
 MAX_PATTERN = 200
 """Largest name or pattern of joints, characters."""
-
-_EXAMPLES = {
-    "kp": "kp = 40 or kp = {knee = 40}",
-    "kd": "kd = 1 or kd = {knee = 1}",
-    "effort": "effort = 20 or effort = {knee = 20}",
-    "pose": "pose = {knee = -1.5}",
-    "reach": "reach = 0.5 or reach = {knee = 0.5}",
-}
-
-
-def value_of(values: JointValues, joint: str) -> float | None:
-    """Returns the value of a joint, or None."""
-    found = [value for pattern, value in values.items() if fnmatchcase(joint, pattern)]
-    return found[-1] if found else None
-
-
-def checked_joint_values(given: Mapping[str, object]) -> dict[str, JointValues]:
-    """Returns the validated settings with a value for each joint.
-
-    Args:
-        given: Values by setting; other settings are ignored.
-
-    Raises:
-        InputError: A setting is invalid; the message has its name and the valid values.
-    """
-    return {name: _by_joint(name, given[name]) for name in _EXAMPLES if name in given}
-
-
-def check_patterns(settings: Mapping[str, JointValues], joints: Sequence[str]) -> None:
-    """Checks that each name or pattern fits a joint.
-
-    Args:
-        settings: Values by joint, by name of the setting.
-        joints: Names of the joints.
-
-    Raises:
-        InputError: A name or pattern fits none.
-    """
-    for values in settings.values():
-        for pattern in values:
-            if not any(fnmatchcase(joint, pattern) for joint in joints):
-                raise unknown_name("joint", pattern, list(joints))
-
-
-def _by_joint(name: str, given: object) -> JointValues:
-    """Returns the values of a setting by joint; one number is for all joints."""
-    values = given if isinstance(given, Mapping) or name == "pose" else {"*": given}
-    if not isinstance(values, Mapping):
-        raise InputError(f"pose needs angles by joint, such as {_EXAMPLES['pose']}, got {given!r}")
-    least = -MAX_VALUE if name == "pose" else 0.0
-    for joint, value in values.items():
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        too_small = number and name in ("kp", "reach") and value == 0
-        if not number or not least <= value <= MAX_VALUE or too_small or len(joint) > MAX_PATTERN:
-            above = "above " if name in ("kp", "reach") else ""
-            raise InputError(
-                f"{name} needs a number from {above}{least:g} to {MAX_VALUE:g} for each joint, "
-                f"such as {_EXAMPLES[name]}, got {value!r} for {joint[:MAX_PATTERN]!r}"
-            )
-    return {joint: float(value) for joint, value in values.items()}
-
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -92,7 +31,6 @@ MAX_CONTROL_TIMESTEP = 10.0
 
 NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
-
 
 BASES = ("free", "fixed")
 """Values of ``base``."""
@@ -140,6 +78,23 @@ class MjcfSettings:
     base: str | None = None
     base_height: float | None = None
     assets: str = ""
+
+
+def value_of(values: JointValues, joint: str) -> float | None:
+    """Returns the value of a joint, or None."""
+    fitting = [value for pattern, value in values.items() if fnmatchcase(joint, pattern)]
+    return fitting[-1] if fitting else None
+
+
+def check_patterns(values: JointValues, joints: Sequence[str]) -> None:
+    """Checks that each name or pattern fits a joint.
+
+    Raises:
+        InputError: A name or pattern fits none.
+    """
+    for pattern in values:
+        if not any(fnmatchcase(joint, pattern) for joint in joints):
+            raise unknown_name("joint", pattern, list(joints))
 
 
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
@@ -200,84 +155,113 @@ def parse_setting(text: str) -> dict[str, Any]:
         return {key.strip(): value.strip()}  # an unquoted word
 
 
-def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
-    """Returns validated settings.
-
-    Args:
-        given: Values by setting.
-
-    Raises:
-        InputError: A setting is unknown or invalid; the message has its name and the valid values.
-    """
-    for key in given:
-        if key == "neurons":
-            raise InputError(
-                "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
-                "--neurons N to the command"
-            )
-        if key not in _KEYS:
-            raise unknown_name("setting", key, _KEYS)
-    step = given.get("control_timestep")
-    if step is not None and not (_is_number(step) and 0 < step <= MAX_CONTROL_TIMESTEP):
-        raise InputError(
-            f"control_timestep needs a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s, "
-            f"got {step!r}"
-        )
-    forward, keyframe = given.get("forward", "x"), given.get("keyframe", "")
-    assets = given.get("assets", "")
-    if not isinstance(forward, str) or forward not in FORWARD_DIRECTIONS:
-        raise InputError(f"forward needs one of {', '.join(FORWARD_DIRECTIONS)}, got {forward!r}")
-    if not isinstance(keyframe, str):
-        raise InputError(f"keyframe needs the name of a keyframe, or none, got {keyframe!r}")
-    base, height = given.get("base"), given.get("base_height")
-    if base is not None and base not in BASES:
-        raise InputError(f"base needs one of {', '.join(BASES)}, got {base!r}")
-    if height is not None and (base != "fixed" or not _is_number(height)):
-        raise InputError(
-            f'base_height needs a number of metres and base = "fixed", got {height!r} with base '
-            f"{base or 'of the file'}"
-        )
-    if not isinstance(assets, str):
-        raise InputError(f"assets needs the path of a folder, got {assets!r}")
-    return MjcfSettings(
-        forward=forward,
-        keyframe=keyframe,
-        control_timestep=None if step is None else float(step),
-        touch=_names(given, "touch"),
-        angle=_names(given, "angle"),
-        ctrlrange=_range(given),
-        base=base,
-        base_height=None if height is None else float(height),
-        assets=assets,
-        **checked_joint_values(given),
-    )
-
-
-_KEYS = [key.name for key in fields(MjcfSettings)]
-"""Names of the settings."""
-
-
 def _is_number(value: object) -> bool:
     if not isinstance(value, int | float) or isinstance(value, bool):
         return False
     return abs(value) <= sys.float_info.max  # a Python int may be larger than any float
 
 
-def _range(given: Mapping[str, Any]) -> tuple[float, float] | None:
-    ends = given.get("ctrlrange")
-    if ends is None:
-        return None
-    if not (isinstance(ends, list) and len(ends) == 2 and all(map(_is_number, ends))):
-        raise InputError(f"ctrlrange needs two numbers, such as [-1, 1], got {ends!r}")
-    if not ends[0] < ends[1]:
-        raise InputError(f"ctrlrange needs its lower end first, got {ends!r}")
-    return float(ends[0]), float(ends[1])
+def _is_timestep(value: Any) -> bool:  # noqa: ANN401  # any value of a user
+    return _is_number(value) and 0 < value <= MAX_CONTROL_TIMESTEP
 
 
-def _names(given: Mapping[str, Any], key: str) -> tuple[str, ...] | None:
-    if key not in given:
-        return None
-    names = given[key]
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(f'{key} needs a list of names, such as ["left_foot"], got {names!r}')
-    return tuple(dict.fromkeys(names))
+def _is_range(value: Any) -> bool:  # noqa: ANN401  # any value of a user
+    pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    return pair and value[0] < value[1]
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+_NAMES = 'a list of names, such as ["left_foot"]'
+_RULES: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "forward": (
+        lambda value: _is_text(value) and value in FORWARD_DIRECTIONS,
+        f"one of {', '.join(FORWARD_DIRECTIONS)}",
+    ),
+    "keyframe": (_is_text, "the name of a keyframe, or none"),
+    "control_timestep": (_is_timestep, f"a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s"),
+    "touch": (_are_names, _NAMES),
+    "angle": (_are_names, _NAMES),
+    "ctrlrange": (_is_range, "two numbers, such as [-1, 1], its lower end first"),
+    "base": (lambda value: value in BASES, f"one of {', '.join(BASES)}"),
+    "base_height": (_is_number, "a number of metres"),
+    "assets": (_is_text, "the path of a folder"),
+}
+"""Whether a value of a setting is valid, and what is."""
+
+_BY_JOINT = {
+    "kp": "kp = 40 or kp = {knee = 40}",
+    "kd": "kd = 1 or kd = {knee = 1}",
+    "effort": "effort = 20 or effort = {knee = 20}",
+    "pose": "pose = {knee = -1.5}",
+    "reach": "reach = 0.5 or reach = {knee = 0.5}",
+}
+"""Example of each setting with a value for each joint."""
+
+
+def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
+    """Returns validated settings.
+
+    Args:
+        given: Values by setting; None counts as absent.
+
+    Raises:
+        InputError: A setting is unknown or invalid; the message has its name and the valid values.
+    """
+    known = [key.name for key in fields(MjcfSettings)]
+    values: dict[str, Any] = {}
+    for key, value in given.items():
+        if key == "neurons":
+            raise InputError(
+                "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
+                "--neurons N to the command"
+            )
+        if key not in known:
+            raise unknown_name("setting", key, known)
+        if value is None:
+            continue
+        if key in _BY_JOINT:
+            values[key] = _by_joint(key, value)
+            continue
+        valid, needed = _RULES[key]
+        if not valid(value):
+            raise InputError(f"{key} needs {needed}, got {value!r}")
+        if isinstance(value, list):
+            values[key] = tuple(dict.fromkeys(value))
+        else:
+            values[key] = value if isinstance(value, str) else float(value)
+    if "ctrlrange" in values:
+        values["ctrlrange"] = tuple(map(float, values["ctrlrange"]))
+    if "base_height" in values and values.get("base") != "fixed":
+        raise InputError(
+            f'base_height needs base = "fixed", got {values["base_height"]!r} with base '
+            f"{values.get('base', 'of the file')}"
+        )
+    return MjcfSettings(**values)
+
+
+def _by_joint(name: str, given: object) -> JointValues:
+    """Returns the values of a setting by joint; one number is for all joints."""
+    values = given if isinstance(given, Mapping) or name == "pose" else {"*": given}
+    if not isinstance(values, Mapping):
+        raise InputError(f"pose needs angles by joint, such as {_BY_JOINT['pose']}, got {given!r}")
+    least, above = -MAX_VALUE if name == "pose" else 0.0, name in ("kp", "reach")
+    for joint, value in values.items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if (
+            not number
+            or not least <= value <= MAX_VALUE
+            or (above and value == 0)
+            or len(joint) > MAX_PATTERN
+        ):
+            raise InputError(
+                f"{name} needs a number from {'above ' * above}{least:g} to {MAX_VALUE:g} for each "
+                f"joint, such as {_BY_JOINT[name]}, got {value!r} for {joint[:MAX_PATTERN]!r}"
+            )
+    return {joint: float(value) for joint, value in values.items()}

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.mjcf.load import adapt, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
-from selfmodel.simulation.simulator import Simulator
-from tests.helpers.drivers import random_controllers
 from tests.helpers.exactness import remove_warm_start
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
 from tests.robot.mjcf.motion import moved, theirs, written
@@ -39,7 +36,7 @@ def test_a_robot_moves_as_its_file_says(name: str):
     }
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", list(SAMPLES)[::4])
 def test_an_adapted_mjcf_stays_the_same_when_adapted_again(name: str, tmp_path: Path):
     first = load_mjcf(SAMPLES[name])
     again = load_mjcf(written(tmp_path, first.mjcf))
@@ -56,11 +53,6 @@ def test_forward_is_the_direction_in_the_settings(forward: str, axis: int):
     robot = load_mjcf(path, MjcfSettings(forward=forward))
 
     assert moved(robot.model, robot.model.qpos0).qpos[0] == pytest.approx(went, abs=1e-4)
-
-
-def test_a_planar_robot_is_not_turned():
-    with pytest.raises(InputError, match="forward=y needs a root body with a free joint"):
-        load_mjcf(SAMPLES["gymnasium walker2d"], MjcfSettings(forward="y"))
 
 
 STEP = '<geom type="box" size="1 1 .1" pos="3 0 0"/>'
@@ -87,24 +79,6 @@ def test_ground_is_added_at_the_lowest_point_of_the_robot(tmp_path: Path):
     assert min(gaps) == pytest.approx(0, abs=1e-9)
 
 
-PAIRED = """<default><geom contype="0" conaffinity="0"/></default>
-<contact><pair geom1="floor" geom2="left_geom"/>
-<pair geom1="right_geom" geom2="floor"/></contact>"""
-
-
-def test_explicit_contact_pairs_with_the_ground_are_enough(tmp_path: Path):
-    path = written(tmp_path, mjcf(more=PAIRED))
-    robot = load_mjcf(path)
-
-    assert robot.model.ngeom == theirs(path).ngeom, "there is ground already"
-    touching = [sensor.name for sensor in robot.anatomy.sensors if sensor.kind == "touch"]
-    assert touching == ["left_touch", "right_touch"]
-
-    sloping = mjcf(more=PAIRED, world=GROUND.replace("/>", ' euler="0 3 0"/>'))
-    with pytest.raises(InputError, match="not the same from all sides"):
-        load_mjcf(written(tmp_path, sloping), MjcfSettings(forward="y"))
-
-
 @pytest.mark.parametrize("swims", ['<flag contact="disable"/>', ""])
 def test_a_swimmer_gets_no_ground(swims: str, tmp_path: Path):
     option = f'<option density="1000" viscosity=".1">{swims}</option>'
@@ -122,12 +96,12 @@ def bodies_in_contact(model: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", [name for name in SAMPLES if "humanoid" not in name])
+@pytest.mark.parametrize("name", ["gymnasium ant", "dm_control walker"])
 def test_a_touch_sensor_reads_1_while_its_limb_is_in_contact(name: str):
     robot = load_mjcf(SAMPLES[name])
     model, touched = robot.model, set()
     data = mujoco.MjData(model)
-    for step in range(400):
+    for step in range(250):
         data.ctrl = 0.5 * np.sin(0.2 * step + np.arange(model.nu))
         mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)
@@ -182,17 +156,6 @@ def test_the_settings_choose_the_sensors(tmp_path: Path):
         load_mjcf(path, MjcfSettings(touch=("lft",)))
 
 
-def test_sensors_of_joints_without_a_motor_are_removed(tmp_path: Path):
-    text = mjcf(
-        root='<joint name="x" type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>',
-        more='<sensor><jointpos joint="x"/><jointpos joint="left_hip" name="own"/></sensor>',
-    )
-
-    sensors = load_mjcf(written(tmp_path, text)).anatomy.sensors
-
-    assert [s.name for s in sensors if s.kind == "angle"] == ["own", "right_hip_angle"]
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -219,11 +182,6 @@ def test_an_invalid_setting_is_refused(text: str, said: str, tmp_path: Path):
         load_mjcf(path)
 
     assert said in str(refusal.value)
-
-
-def test_endless_brackets_are_no_list_of_names(tmp_path: Path):
-    with pytest.raises(InputError, match="needs a list of names"):
-        read_settings(written(tmp_path, mjcf()), parse_setting(f"touch={'[' * 3000}"))
 
 
 def test_the_settings_file_is_read_and_options_override_it(tmp_path: Path):
@@ -260,19 +218,6 @@ def test_a_control_step_is_a_multiple_of_the_physics_step(tmp_path: Path):
         load_mjcf(path, MjcfSettings(control_timestep=0.01))
 
 
-def test_copies_and_frames_are_expanded(tmp_path: Path):
-    legs = (
-        '<replicate count="3" euler="0 0 120" sep="-"><frame pos=".1 0 0"><body name="leg">'
-        '<joint name="hip" axis="0 1 0" range="-40 40"/><geom size=".03" pos="0 0 -.2"/>'
-        "</body></frame></replicate>"
-    )
-    motors = "".join(f'<motor joint="hip-{k}" ctrlrange="-1 1"/>' for k in range(3))
-    robot = load_mjcf(written(tmp_path, mjcf(legs=legs, motors=motors)))
-
-    assert robot.anatomy.hinges == ("hip-0", "hip-1", "hip-2")
-    assert "<replicate" not in robot.mjcf
-
-
 @pytest.mark.parametrize("inertia", ["true", "false", "auto"])
 def test_expanded_masses_are_those_of_the_model(inertia: str, tmp_path: Path):
     given = '<inertial pos="0 0 0" mass="2" diaginertia=".01 .01 .01"/>'
@@ -293,13 +238,3 @@ def test_expanded_masses_are_those_of_the_model(inertia: str, tmp_path: Path):
 
     assert robot.model.body_mass == pytest.approx(model.body_mass, rel=1e-9)
     assert robot.model.body_inertia == pytest.approx(model.body_inertia, rel=1e-9)
-
-
-def test_a_broken_limb_of_somebodys_robot_is_lost():
-    robot = load_mjcf(SAMPLES["gymnasium half_cheetah"])
-    (controller,) = random_controllers(robot, 1)
-    simulator = Simulator(robot, 1)
-
-    ran = simulator.run([(INTACT, controller)], 30, ("base_position",)).behaviour
-
-    assert np.isfinite(ran["base_position"]).all()

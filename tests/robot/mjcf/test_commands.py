@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.command import SMALL, selfmodel
-from tests.robot.mjcf.awkward import LEG, mjcf
+from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
 
@@ -35,29 +35,6 @@ def test_a_users_robot_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_p
     for found in (alone, with_file):
         assert json.loads(found.stdout)["diagnosis"] == told["diagnosis"]
     assert ant.read_bytes() == before
-
-
-@pytest.mark.process
-def test_the_file_of_a_logged_robot_is_adapted_as_for_the_log(tmp_path: Path):
-    key = '<keyframe><key qpos="0 0 .6 1 0 0 0 .3 -.3"/></keyframe>'
-    felt = "".join(
-        f'<touch name="{leg}_touch" site="{leg}"/><jointpos name="{leg}" joint="{leg}_hip"/>'
-        for leg in ("left", "right")
-    )
-    legs = "".join(
-        LEG.format(leg, place).replace("</body>", f'<site name="{leg}"/></body>')
-        for leg, place in (("left", ".1"), ("right", "-.1"))
-    )
-    text = mjcf(legs=legs, more=f"{key}<sensor>{felt}</sensor>")
-    (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
-    done = selfmodel("trial", "robot.xml", "--out", "t.mcap", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-
-    alone = selfmodel("replay", "t.mcap", "--json", cwd=tmp_path)
-    with_file = selfmodel("replay", "t.mcap", "--robot", "robot.xml", "--json", cwd=tmp_path)
-
-    assert alone.returncode == with_file.returncode == 0, alone.stderr + with_file.stderr
-    assert json.loads(with_file.stdout)["rms"] == json.loads(alone.stdout)["rms"]
 
 
 def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf import files
-from selfmodel.robot.mjcf.files import Folder, robot_folder, root_around
+from selfmodel.robot.mjcf import untrusted
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
+from selfmodel.robot.mjcf.untrusted import Folder, robot_folder, root_around
 from tests.helpers.robots.menagerie import menagerie
 from tests.robot.mjcf.awkward import CUBE, MESHED, mjcf
 
@@ -38,16 +38,6 @@ def test_a_folder_named_after_a_format_belongs_to_the_package_above_it(tmp_path:
     assert content(found, "../common.xml") == "common"
 
 
-@pytest.mark.parametrize("beside", ["meshes", "assets", "textures"])
-def test_a_folder_beside_a_folder_of_meshes_belongs_to_the_same_package(
-    tmp_path: Path, beside: str
-):
-    put(tmp_path / "robots" / beside / "trunk.stl")
-    put(tmp_path / "robots" / "go1" / "go1.xml")
-
-    assert content(robot_folder(tmp_path / "robots" / "go1"), f"../{beside}/trunk.stl") == "mesh"
-
-
 def test_the_folder_above_is_not_read_in_another_layout(tmp_path: Path):
     put(tmp_path / "private" / "key.stl")
     put(tmp_path / "downloads" / "robot.xml")
@@ -63,7 +53,7 @@ def test_the_home_folder_and_those_around_it_belong_to_no_package(
     home = tmp_path / "users" / "me"
     put(home / above / "meshes" / "trunk.stl")
     put(home / above / "mjcf" / "robot.xml")
-    monkeypatch.setattr(files.Path, "home", lambda: home)
+    monkeypatch.setattr(untrusted.Path, "home", lambda: home)
 
     folder = home / above / "mjcf"
 
@@ -87,7 +77,7 @@ def test_a_loop_of_links_is_no_file(tmp_path: Path):
     found = robot_folder(tmp_path)
 
     assert not found.has("mesh.stl")
-    with pytest.raises(InputError, match=r"mesh\.stl|a file"):
+    with pytest.raises(InputError, match="loop of links"):
         content(found, "mesh.stl")
 
 
@@ -130,39 +120,6 @@ def test_files_are_found_in_the_folder_that_the_user_gives(tmp_path: Path, given
     found = robot_folder(tmp_path / "wheel" / "xmls" / "go1", str(tmp_path / given))
 
     assert content(found, name) == "mesh"
-
-
-def test_a_file_at_its_own_path_comes_before_one_in_the_folder_of_the_user(tmp_path: Path):
-    put(tmp_path / "robot" / "trunk.stl", "own")
-    put(tmp_path / "assets" / "trunk.stl", "other")
-
-    found = robot_folder(tmp_path / "robot", str(tmp_path / "assets"))
-
-    assert content(found, "trunk.stl") == "own"
-
-
-def test_the_folder_of_the_user_is_a_root(tmp_path: Path):
-    put(tmp_path / "repo" / "parts" / "trunk.stl")
-    put(tmp_path / "repo" / "a" / "b" / "robot.xml")
-
-    found = robot_folder(tmp_path / "repo" / "a" / "b", str(tmp_path / "repo"))
-
-    assert content(found, "../../parts/trunk.stl") == "mesh"
-
-
-def test_a_folder_that_does_not_exist_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match="assets needs a folder"):
-        robot_folder(tmp_path, str(tmp_path / "no"))
-    with pytest.raises(InputError, match="assets needs a folder"):
-        robot_folder(tmp_path, "n" * 5000)
-
-
-def test_a_settings_file_names_a_folder_relative_to_itself(tmp_path: Path):
-    put(tmp_path / "repo" / "a" / "robot.toml", 'assets = "../parts"')
-
-    settings = read_settings(tmp_path / "repo" / "a" / "robot.xml")
-
-    assert Path(settings.assets).resolve() == tmp_path / "repo" / "parts"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Tests of meshes that are too large for a log: their convex hulls take their places."""
+"""Tests of meshes that are too large for a log or have no file: stand-ins in the same place."""
 
 import re
 from pathlib import Path
@@ -9,8 +9,8 @@ import pytest
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf import meshes
-from selfmodel.robot.mjcf.load import adapt_text, robot_from
-from selfmodel.robot.mjcf.meshes import DRAWN_POINTS, directions, mesh_points
+from selfmodel.robot.mjcf.load import adapt, adapt_text, load_mjcf, robot_from
+from selfmodel.robot.mjcf.meshes import DRAWN_POINTS, directions
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
@@ -139,16 +139,6 @@ def test_a_flat_visual_mesh_is_drawn_too(
     assert np.ptp(points(reduced.model, trunk), axis=0).max() == pytest.approx(0.2, rel=0.1)
 
 
-def test_the_points_of_a_mesh_are_those_of_its_file():
-    triangles = np.random.default_rng(1).uniform(-1, 1, (20, 3, 3))
-    text = '<mujoco><asset><mesh name="m" file="m.stl" scale="2 1 1"/></asset></mujoco>'
-    model = mujoco.MjModel.from_xml_string(text, {"m.stl": stl(triangles)})
-
-    found, file = mesh_points(model, 0), triangles.reshape(-1, 3) * [2, 1, 1]
-
-    assert np.allclose(np.sort(found, axis=0), np.sort(file, axis=0), atol=1e-6)
-
-
 def test_a_geom_that_is_fitted_to_a_mesh_stays_as_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -165,3 +155,35 @@ def test_a_geom_that_is_fitted_to_a_mesh_stays_as_it_is(
     for name in ("geom_size", "geom_pos", "geom_quat"):
         before, after = getattr(whole.model, name)[geom], getattr(reduced.model, name)[geom]
         assert np.allclose(before, after, atol=1e-12)
+
+
+def test_a_robot_without_the_files_of_its_visual_meshes_moves_the_same(tmp_path: Path):
+    file = menagerie(tmp_path) / "xml" / "scene.xml"
+    whole = load_mjcf(file)
+
+    for mesh in (tmp_path / "go" / "meshes").iterdir():
+        mesh.unlink()
+    bare = load_mjcf(file)
+
+    assert np.array_equal(motion(whole), motion(bare))
+    notes = adapt(file, MjcfSettings()).notes
+    assert any("3 visual meshes have no file" in note for note in notes)
+
+
+def test_each_body_is_drawn_as_the_box_of_its_inertia(tmp_path: Path):
+    file = menagerie(tmp_path) / "xml" / "scene.xml"
+    (tmp_path / "go" / "meshes" / "trunk.stl").unlink()
+
+    model = load_mjcf(file).model
+    trunk = model.body("trunk")
+    boxes = [
+        geom
+        for geom in range(int(trunk.geomadr[0]), int(trunk.geomadr[0] + trunk.geomnum[0]))
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX and model.geom_group[geom] == 2
+    ]
+
+    assert len(boxes) == 1
+    x, y, z = 2 * model.geom_size[boxes[0]]
+    inertia = trunk.mass[0] / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    assert np.allclose(inertia, trunk.inertia)
+    assert not model.geom_contype[boxes[0]]

@@ -1,12 +1,13 @@
-"""Tests of tendons and equality constraints under broken and jammed joints."""
+"""Tests of faults in models: couplings and feedback of broken, jammed and miscalibrated joints."""
 
 import mujoco
 import numpy as np
 import pytest
 
 from selfmodel.faults.build import build
-from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.robot import Robot
 
 MJCF = """
@@ -174,13 +175,6 @@ def test_the_coupling_of_joints_is_the_same_if_one_of_them_is_welded(
     assert ankle == pytest.approx(0.1 + 0.5 * hip + 0.3 * hip**2, abs=1e-3), other
 
 
-def test_the_length_of_a_tendon_is_the_same_if_one_of_its_joints_is_welded():
-    robot = floating(TENDONS)
-    data = settled(built(robot, "jam:knee=0.3"))
-
-    assert data.joint("ankle").qpos[0] == pytest.approx(-0.3, abs=1e-3)
-
-
 @pytest.mark.parametrize(
     ("text", "contacts"), [("intact", 1), ("break:tail", 1), ("break:knee", 0)]
 )
@@ -192,22 +186,78 @@ def test_a_detached_body_has_no_contacts_even_in_an_explicit_pair(text: str, con
     assert np.count_nonzero(data.contact.efc_address >= 0) == contacts
 
 
-def test_faults_of_motors_that_move_nothing_are_absorbed():
-    anatomy = made().anatomy
+OFFSET = 0.2
+KP = 30.0
 
-    def settled_text(text: str) -> Hypothesis:
-        return parse(text, anatomy)
+HINGED = """
+<mujoco>
+  <worldbody>
+    <body><joint name="hip" axis="0 1 0"/><geom size=".05"/>
+      <site name="knob" pos="0 0 -.1"/>
+      <body pos=".3 0 0"><joint name="knee" axis="0 1 0"/><geom size=".05"/>
+        <site name="cuff" pos="0 0 -.1"/></body></body>
+  </worldbody>
+  <tendon>
+    <fixed name="both"><joint joint="hip" coef="0.5"/><joint joint="knee" coef="-2"/></fixed>
+    <spatial name="string"><site site="knob"/><site site="cuff"/></spatial>
+  </tendon>
+  <actuator>{motor}</actuator>
+</mujoco>
+"""
 
-    # The hip has a motor of its own left, the knee has none.
-    assert str(settled_text("break:knee+motor:hip=0.5")) == "break:knee+motor:hip=0.5"
-    assert str(settled_text("jam:knee+motor:knee=0.5")) == "jam:knee"
-    assert str(settled_text("jam:hip+motor:hip=0.5")) == "jam:hip+motor:hip=0.5"
-    assert str(settled_text("break:tail+motor:tail=0.5")) == "break:tail"
+
+def force(model: mujoco.MjModel, hip: float, knee: float, command: float = 0.1) -> float:
+    """The force of the motor at some angles, rad."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = (hip, knee), (0.3, -0.4), command
+    mujoco.mj_forward(model, data)
+    return float(data.actuator_force[0])
 
 
-def test_a_joint_without_its_own_motor_has_no_motor_fault():
-    anatomy = made().anatomy
+def shifted(model: mujoco.MjModel, hinge: str) -> mujoco.MjModel:
+    embodiment = Embodiment.of(model, Anatomy((), (), (), (), ""))
+    embodiment.shift_feedback(hinge, OFFSET)
+    return embodiment.model
 
-    with pytest.raises(ValueError, match="ankle"):
-        parse("motor:ankle=0.5", anatomy)
-    assert np.isclose(built(made(), "motor:hip=0.5").actuator("whole").gainprm[0], 0.5)
+
+@pytest.mark.parametrize("hinge", ["hip", "knee"])
+@pytest.mark.parametrize(
+    "motor",
+    [
+        f'<position joint="hip" kp="{KP}" kv="2"/>',
+        f'<position joint="knee" kp="{KP}" gear="-3"/>',
+        f'<position jointinparent="knee" kp="{KP}" gear="2"/>',
+        f'<position tendon="both" kp="{KP}" gear="2"/>',
+        '<general joint="hip" biastype="affine" gainprm="5" biasprm="4 -7 -1" gear="2"/>',
+    ],
+)
+def test_a_servo_has_the_force_of_the_measured_angle_in_place_of_the_true_one(
+    motor: str, hinge: str
+):
+    model = mujoco.MjModel.from_xml_string(HINGED.format(motor=motor))
+    angles = {"hip": 0.15, "knee": -0.4}
+    measured = {**angles, hinge: angles[hinge] + OFFSET}
+    expected = force(model, **measured)
+    before = force(model, **angles)
+
+    model = shifted(model, hinge)
+
+    assert force(model, **angles) == pytest.approx(expected, abs=1e-12)
+    assert (expected != pytest.approx(before)) == ("both" in motor or hinge in motor)
+
+
+@pytest.mark.parametrize(
+    "motor",
+    [
+        '<motor joint="hip" gear="5"/>',
+        '<velocity joint="hip" kv="5"/>',
+        f'<position tendon="string" kp="{KP}"/>',
+    ],
+)
+def test_a_motor_that_does_not_measure_the_hinge_is_not_affected(motor: str):
+    model = mujoco.MjModel.from_xml_string(HINGED.format(motor=motor))
+    before = force(model, 0.15, -0.4)
+
+    model = shifted(model, "hip")
+
+    assert force(model, 0.15, -0.4) == before

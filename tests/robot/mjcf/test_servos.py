@@ -1,5 +1,6 @@
-"""Tests of position servos that replace the torque motors of a file."""
+"""Tests of the settings with a value for each joint: servos of torque motors, and their reach."""
 
+import math
 from pathlib import Path
 
 import mujoco
@@ -8,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.load import adapt, load_mjcf
-from selfmodel.robot.mjcf.settings import parse_setting, read_settings
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.settings import checked_settings, parse_setting, read_settings, value_of
 from tests.robot.mjcf.awkward import KEY, LEGS, mjcf
 from tests.robot.mjcf.test_adaptation import written
 
@@ -81,13 +82,6 @@ def test_attributes_of_a_class_do_not_change_a_servo(tmp_path: Path):
         assert np.array_equal(getattr(plain, name), getattr(of_class, name)), field
 
 
-def test_servos_of_the_file_stay(tmp_path: Path):
-    motors = TORQUE_MOTORS.replace('<motor name="left"', '<position kp="5" name="left"')
-    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
-
-    assert model.actuator_gainprm[:, 0].tolist() == [5, 30]
-
-
 def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
     text = mjcf(motors=TORQUE_MOTORS, legs=LEGS.replace('range="-40 40"', ""))
 
@@ -99,20 +93,6 @@ def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
     posed = text.replace("<mujoco>", f"<mujoco>{key}")
     model = loaded(tmp_path, posed, *GAINS, "reach=0.5")
     assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.9, -0.6, 0.4])
-
-
-def test_gains_are_for_the_joints_that_their_patterns_fit(tmp_path: Path):
-    text = mjcf(motors=TORQUE_MOTORS)
-    model = loaded(tmp_path, text, 'kp={"left_*" = 30, right_hip = 9}', "kd=2")
-
-    assert model.actuator_gainprm[:, 0].tolist() == [30, 9]
-
-
-def test_motors_without_gains_stay(tmp_path: Path):
-    text = mjcf(motors=TORQUE_MOTORS)
-    model = loaded(tmp_path, text, "kp={left_hip=30}", "kd={left_hip=2}")
-
-    assert model.actuator_gainprm[:, 0].tolist() == [30, 1]
 
 
 def test_one_gain_alone_is_refused(tmp_path: Path):
@@ -132,8 +112,81 @@ def test_a_model_without_torque_motors_is_refused(tmp_path: Path):
         loaded(tmp_path, mjcf(motors=motors), *GAINS)
 
 
-def test_the_conversion_is_noted(tmp_path: Path):
-    path = written(tmp_path, mjcf(motors=TORQUE_MOTORS))
-    found = adapt(path, read_settings(path, {"kp": 30, "kd": 2}))
+SERVOS = """<position name="left" joint="left_hip" kp="5" inheritrange="1"/>
+<position name="right" joint="right_hip" kp="5" ctrlrange="-.2 .6"/>"""
+END = math.radians(40)
 
-    assert any("2 torque motors are position servos with kp=30" in note for note in found.notes)
+
+def test_commands_are_within_reach_of_the_initial_pose_and_in_their_range(tmp_path: Path):
+    key = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
+    model = loaded(tmp_path, mjcf(motors=SERVOS, more=key), "reach=0.5")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, END, -0.2, 0.4])
+
+
+def test_a_range_that_a_class_inherits_from_the_joint_is_limited(tmp_path: Path):
+    text = mjcf(motors=SERVOS.replace('inheritrange="1"', "").replace('ctrlrange="-.2 .6"', ""))
+    text = text.replace("<mujoco>", f"<mujoco>{CLASS}")
+    model = loaded(tmp_path, text, "reach=0.5")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.5, 0.5, -0.5, 0.5])
+
+
+def test_only_joints_that_the_patterns_fit_are_limited(tmp_path: Path):
+    model = loaded(tmp_path, mjcf(motors=SERVOS), "reach={left_hip=0.1}")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
+
+
+def test_torques_have_no_reach(tmp_path: Path):
+    with pytest.raises(InputError, match="expected a position servo of a hinge for reach"):
+        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "reach=0.5")
+
+
+def test_a_servo_with_a_gear_has_no_reach_because_its_command_is_no_angle(tmp_path: Path):
+    motors = SERVOS.replace('name="right"', 'name="right" gear="2"')
+    model = loaded(tmp_path, mjcf(motors=motors), "reach=0.1")
+
+    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
+
+
+def test_one_number_is_for_all_joints_and_a_table_for_those_that_its_patterns_fit():
+    settings = checked_settings({"kp": 40, "kd": {"*_knee": 2, "left_knee": 3}})
+
+    assert value_of(settings.kp, "any") == 40.0
+    assert [value_of(settings.kd, joint) for joint in ("left_knee", "right_knee", "hip")] == [
+        3,
+        2,
+        None,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"kp": -1}, "kp needs a number from above 0"),
+        ({"kp": "stiff"}, "such as kp = 40"),
+        ({"kp": 0}, "kp needs a number from above 0"),
+        ({"reach": {"knee": 0}}, "reach needs a number from above 0"),
+        ({"kd": {"knee": True}}, "got True for 'knee'"),
+        ({"effort": float("inf")}, "effort needs a number"),
+        ({"pose": 0.5}, "pose needs angles by joint"),
+        ({"pose": {"knee": float("nan")}}, "pose needs a number"),
+        ({"pose": {"k" * 1000: 1}}, "pose needs a number"),
+        ({"kp": 10**400}, "kp needs a number"),
+    ],
+)
+def test_other_values_are_refused_with_an_example(given: dict, sentence: str):
+    with pytest.raises(InputError) as refusal:
+        checked_settings(given)
+
+    assert sentence in str(refusal.value)
+    assert len(str(refusal.value)) < 1000
+
+
+def test_the_effort_and_the_pose_are_refused_for_an_mjcf(tmp_path: Path):
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf())
+
+    with pytest.raises(InputError, match="settings for a URDF"):
+        load_mjcf(path, checked_settings({"effort": 10}))

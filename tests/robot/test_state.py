@@ -1,0 +1,307 @@
+"""Tests of the state: signals of sliding and fixed bases, known bases, control delays."""
+
+import dataclasses
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from scipy.spatial.transform import Rotation
+
+from selfmodel.controllers.controller import Controller
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.logs import read_log
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.robots import robot_of as robot_of_log
+from selfmodel.logs.writer import write_trial
+from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import (
+    BASE_SIGNALS,
+    SlidingBase,
+    bind_data,
+    current_value,
+    read_base,
+    signal_fields,
+    state_writer,
+    with_known_base,
+)
+from selfmodel.settings import Settings
+from selfmodel.simulation.model_factors import nominal, with_parameters
+from selfmodel.simulation.requests import cut_segments
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.simulation.trial_replay import replay
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.estimation import STATE
+from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_controllers, random_cpgs, random_of
+from tests.helpers.robots.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
+
+SLIDING = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <geom type="plane" size="0 0 1"/>
+    <body name="torso" pos="{pos}" quat="{quat}">
+      {joints}
+      <geom size=".1"/>
+      <body name="leg" pos="0 0 .3">
+        <joint name="hip" axis="0 1 0" range="-1 1"/>
+        <geom size=".1"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor name="hip" joint="hip" ctrlrange="-1 1"/></actuator>
+  <sensor><jointpos name="angle" joint="hip"/></sensor>
+</mujoco>
+"""
+BASE = ("base_position", "base_orientation", "base_linear_velocity", "base_angular_velocity")
+
+
+def text(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def made(seed: int, slides: int, *, turns: bool) -> Robot:
+    """Returns a robot whose base has random slide axes and a hinge beside its origin."""
+    rng = np.random.default_rng(seed)
+    joints = "".join(
+        f'<joint name="s{k}" type="slide" axis="{text(rng.normal(size=3))}" ref="{rng.normal()}"/>'
+        for k in range(slides)
+    )
+    if turns:
+        joints += (
+            f'<joint name="turn" axis="{text(rng.normal(size=3))}" '
+            f'pos="{text(rng.normal(size=3))}" ref="{rng.normal()}"/>'
+        )
+    mjcf = SLIDING.format(
+        pos=text(rng.normal(size=3)), quat=text(rng.normal(size=4)), joints=joints
+    )
+    return Robot("slider", mjcf, 0.002)
+
+
+def anywhere(robot: Robot, seed: int) -> mujoco.MjData:
+    rng = np.random.default_rng(seed + 1)
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = robot.model.qpos0 + rng.normal(size=robot.model.nq)
+    data.qvel[:] = rng.normal(size=robot.model.nv)
+    mujoco.mj_forward(robot.model, data)
+    return data
+
+
+SLIDERS = {"seed": st.integers(0, 2**32), "slides": st.integers(1, 3), "turns": st.booleans()}
+
+
+@given(**SLIDERS)
+def test_a_sliding_base_has_the_signals_of_its_body(seed: int, slides: int, turns: bool):  # noqa: FBT001 - drawn by hypothesis
+    robot = made(seed, slides, turns=turns)
+    data = anywhere(robot, seed)
+    told = {signal: current_value(signal_fields(robot)[signal], data) for signal in BASE}
+    body = data.body("torso")
+    velocity = np.empty(6)
+    of_body = mujoco.mjtObj.mjOBJ_XBODY
+    mujoco.mj_objectVelocity(robot.model, data, of_body, int(body.id), velocity, 1)
+
+    assert isinstance(read_base([robot.model], "torso"), SlidingBase)
+    np.testing.assert_allclose(told["base_position"], body.xpos, atol=1e-9)
+    turned = Rotation.from_quat(told["base_orientation"], scalar_first=True).as_matrix()
+    np.testing.assert_allclose(turned, body.xmat.reshape(3, 3), atol=1e-9)
+    np.testing.assert_allclose(told["base_angular_velocity"], velocity[:3], atol=1e-9)
+    np.testing.assert_allclose(told["base_linear_velocity"], turned @ velocity[3:], atol=1e-9)
+
+
+@given(**SLIDERS)
+def test_the_signals_of_a_sliding_base_restore_its_state(seed: int, slides: int, turns: bool):  # noqa: FBT001 - drawn by hypothesis
+    robot = made(seed, slides, turns=turns)
+    data, again = anywhere(robot, seed), mujoco.MjData(robot.model)
+    told = {
+        signal: current_value(signal_fields(robot)[signal], data)[np.newaxis] for signal in BASE
+    }
+    state_writer(robot, bind_data(again))(told)
+
+    for signal in ("base_position", "base_linear_velocity", "base_angular_velocity"):
+        np.testing.assert_allclose(
+            current_value(signal_fields(robot)[signal], again),
+            told[signal][0],
+            atol=1e-9,
+            err_msg=signal,
+        )
+    turns_of = [
+        current_value(signal_fields(robot)["base_orientation"], one) for one in (data, again)
+    ]
+    assert abs(turns_of[0] @ turns_of[1]) == pytest.approx(1, abs=1e-12)
+    assert again.qpos[-1] == again.qvel[-1] == 0  # the hip was not told of
+
+
+def test_motion_outside_the_degrees_of_freedom_is_dropped():
+    joints = '<joint name="x" type="slide" axis="1 0 0"/><joint name="turn" axis="0 1 0"/>'
+    robot = Robot("rail", SLIDING.format(pos="0 0 1", quat="1 0 0 0", joints=joints), 0.002)
+    data = mujoco.MjData(robot.model)
+    tilted = Rotation.from_rotvec([0.2, 0, 0.1]) * Rotation.from_rotvec([0, 0.4, 0])
+    told = {
+        "base_position": np.array([[3.0, 4.0, 5.0]]),
+        "base_orientation": tilted.as_quat(scalar_first=True)[np.newaxis],
+    }
+    state_writer(robot, bind_data(data))(told)
+
+    np.testing.assert_allclose(
+        current_value(signal_fields(robot)["base_position"], data), [3, 0, 1]
+    )
+    assert data.qpos[1] == pytest.approx(0.4, abs=0.01)
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5, 8, 17])
+def test_a_row_has_the_same_bits_in_any_batch(rows: int):
+    robot = made(7, 3, turns=True)
+    rng = np.random.default_rng(3)
+    state = {"qpos": rng.normal(size=(17, robot.model.nq))}
+    state["qvel"] = rng.normal(size=(17, robot.model.nv))
+    for signal in BASE:
+        place = signal_fields(robot)[signal]
+        whole = place.reader(state.__getitem__)()
+        part = place.reader({name: rows_[17 - rows :] for name, rows_ in state.items()}.__getitem__)
+        np.testing.assert_array_equal(part(), whole[17 - rows :])
+
+
+VELOCITY = ("base_linear_velocity", "base_angular_velocity")
+"""Names of the signals of a base."""
+
+
+def driver_of(robot: Robot) -> Controller:
+    (driver,) = random_cpgs(robot, 1)
+    return driver
+
+
+def nested() -> Robot:
+    """An arm on two static bodies, both displaced and turned."""
+    outer = '<body name="table" pos="1 2 .5" euler="0 0 1.5707963267948966">{}</body>'
+    inner = '<body name="foot" pos=".1 0 .2" euler="0.3 0 0">{arm}</body>'
+    return robot_of(arm_mjcf(outer.format(inner)))
+
+
+def test_the_root_is_the_static_body_nearest_to_the_driven_joints():
+    assert nested().root == "foot"
+    assert nested().has_fixed_base
+
+
+def test_the_pose_of_the_base_is_that_of_its_body_and_its_velocities_are_zero():
+    robot = nested()
+    data = mujoco.MjData(robot.model)
+    data.qpos[:], data.qvel[:] = 0.5, 1.0
+    mujoco.mj_forward(robot.model, data)
+    found = {name: current_value(field, data) for name, field in signal_fields(robot).items()}
+    np.testing.assert_allclose(found["base_position"], data.body("foot").xpos, atol=1e-12)
+    np.testing.assert_allclose(found["base_orientation"], data.body("foot").xquat, atol=1e-12)
+    assert not any(found[signal].any() for signal in VELOCITY)
+    assert robot.standing_height == pytest.approx(0.7)
+
+
+def test_a_physical_robot_without_a_gap_is_simulated_to_the_bit():
+    for robot in (arm(), quadruped_on_a_stand()):
+        driver = driver_of(robot)
+        hidden = parse(f"motor:{robot.anatomy.joints[1].name}=0.4", robot.anatomy)
+        logged = collect(robot.anatomy.names, SimulatedRobot(robot, hidden).run(driver, 60))
+        simulated = Simulator(robot, 1).run([(hidden, driver)], 60, SIGNALS).behaviour
+        for signal in SIGNALS:
+            assert np.array_equal(logged[signal], simulated[signal][0]), signal
+
+
+def test_a_slope_tilts_a_fixed_base():
+    robot = arm()
+    hypothesis = parse("slope=0.2", robot.anatomy)
+    runs = [(INTACT, driver_of(robot)), (hypothesis, driver_of(robot))]
+    behaviour = Simulator(robot, 1).run(runs, 5, SIGNALS).behaviour
+    level, tilted = behaviour["base_orientation"][:, -1]
+    assert 2 * np.arccos(level @ tilted) == pytest.approx(0.2)
+    assert not np.array_equal(*behaviour["joint_positions"])
+
+
+def trial_of(robot: Robot, steps: int = 200) -> Trial:
+    (driver,) = random_cpgs(robot, 1)
+    behaviour = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, steps))
+    plan = TrialPlan("one", "before", driver, steps, seed=0)
+    return Trial(plan, robot.name, behaviour, "one.mcap")
+
+
+def without_base(trial: Trial) -> Trial:
+    behaviour = trial.behaviour
+    unknown = {signal: np.full_like(behaviour[signal], np.nan) for signal in BASE_SIGNALS}
+    signals = {**behaviour.signals, **unknown}
+    blind = Behaviour(behaviour.names, behaviour.time, signals)
+    return Trial(trial.plan, trial.robot, blind, "blind.mcap")
+
+
+def test_the_unobserved_base_of_an_arm_is_that_of_its_model():
+    trial = trial_of(arm())
+    found = with_known_base(arm(), without_base(trial).behaviour)
+    for signal in BASE_SIGNALS:
+        assert np.array_equal(found[signal], trial.behaviour[signal]), signal
+
+
+def test_an_observed_base_and_a_floating_base_are_unchanged():
+    behaviour = trial_of(arm()).behaviour
+    moved = {**behaviour.signals, "base_position": behaviour["base_position"] + 0.01}
+    seen = Behaviour(behaviour.names, behaviour.time, moved)
+    assert np.array_equal(with_known_base(arm(), seen)["base_position"], seen["base_position"])
+    floating = without_base(trial_of(ROBOTS["quadruped"].robot(), 20)).behaviour
+    assert with_known_base(ROBOTS["quadruped"].robot(), floating) is floating
+
+
+def of_0_1(robot: Robot, hidden: str) -> Robot:
+    """Returns the robot with the custom numeric of version 0.1."""
+    numeric = f'<custom><numeric name="selfmodel_hidden_neurons" data="{hidden}"/></custom>'
+    return Robot(
+        robot.name,
+        robot.mjcf.replace("</mujoco>", f"{numeric}</mujoco>"),
+        robot.control_timestep,
+        robot.assets,
+    )
+
+
+def test_a_log_of_0_1_replays_with_the_neurons_of_its_controller(quadruped: Robot, tmp_path: Path):
+    old, path = of_0_1(quadruped, "5"), tmp_path / "old.mcap"
+    (controller,) = random_of(network_for(quadruped, 5), 1)
+    plan = TrialPlan("trial", "single", controller, 60, 0)
+    samples = SimulatedRobot(old, parse("neuron:4", old.anatomy)).run(controller, 60)
+    write_trial(path, old, plan, samples, TrialHeader(Settings()))
+    log = read_log(path)
+    robot = robot_of_log(log)
+
+    assert "selfmodel_hidden_neurons" in robot.mjcf
+    assert log.trial.plan.controller == controller
+    assert replay(log.trial, parse("neuron:4", robot.anatomy), Simulator(robot, 1)).identical
+    assert not replay(log.trial, INTACT, Simulator(robot, 1)).identical
+
+
+@pytest.mark.parametrize("delay", [0.5, 1.5, 4.5])
+def test_a_part_of_a_step_is_exact_in_all_simulations(quadruped: Robot, delay: float):
+    late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
+    (controller,) = random_controllers(late, 1)
+    physical = collect(late.anatomy.names, SimulatedRobot(late).run(controller, 60))
+    simulated = Simulator(late, 1).run([(INTACT, controller)], 60, SIGNALS).behaviour
+    states = {signal: physical[signal] for signal in STATE}
+    segments = cut_segments(physical, states, np.array([0, 20, 40]), 10, STATE)
+    predicted = Simulator(late, 1).predict([INTACT], segments).behaviour
+
+    assert late.control_delay == delay
+    assert all(physical[signal].tobytes() == simulated[signal][0].tobytes() for signal in SIGNALS)
+    for signal in STATE:
+        logged = physical[signal][[[0, 10], [20, 30], [40, 50]]]
+        np.testing.assert_allclose(predicted[signal][0][:, [0, 10]], logged, atol=1e-9)
+
+
+def test_a_delay_of_half_a_step_is_between_its_neighbours(quadruped: Robot):
+    (controller,) = random_controllers(quadruped, 1)
+
+    def moved(delay: float) -> np.ndarray:
+        late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
+        run = Simulator(late, 1).run([(INTACT, controller)], 8, ["joint_positions"])
+        return run.behaviour["joint_positions"][0, 2]
+
+    assert not np.array_equal(moved(0.5), moved(0))
+    assert not np.array_equal(moved(0.5), moved(1))
