@@ -148,11 +148,7 @@ def _anatomy(domain: str, task: str, model: mujoco.MjModel) -> Anatomy:
 
 
 def _check_effect(name: str, hypothesis: Hypothesis) -> None:
-    """Refuses faults of sensors and neurons, which change the controller's inputs only.
-
-    Raises:
-        InputError: The hypothesis has such a fault.
-    """
+    """Refuses faults of sensors and neurons, which change the controller's inputs only."""
     for fault in hypothesis.faults:
         if not fault.kind.affects_dynamics or fault.kind == SILENT_NEURON:
             raise InputError(
@@ -172,9 +168,6 @@ def _compiled(
         own: The suite's compiled model, which is returned without such faults.
         hypothesis: The hypothesis.
         seed: Seed of the random parts of the faults.
-
-    Raises:
-        InputError: The suite's specification is not available for the task.
     """
     edits = hypothesis.spec_part.faults
     if not edits:

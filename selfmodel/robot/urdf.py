@@ -149,11 +149,7 @@ def quoted(text: str | None) -> str:
 
 
 def _checked(root: ET.Element, work: Work) -> ET.Element:
-    """Returns a URDF with the known elements of a tree of hinges, and with notes on the rest.
-
-    Raises:
-        InputError: The URDF is a xacro, or its links form no tree of hinges.
-    """
+    """Returns a URDF with the known elements of a tree of hinges, and with notes on the rest."""
     for element in root.iter():
         if "xacro" in element.tag or any("${" in value for value in element.attrib.values()):
             raise InputError(
@@ -304,11 +300,7 @@ def _number(element: ET.Element, attribute: str, default: float = 0.0) -> float:
 
 
 def _read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
-    """Reads the meshes, and removes shapes of size 0 and visuals whose mesh cannot be read.
-
-    Raises:
-        InputError: The mesh of a collision cannot be read, or the files are too large.
-    """
+    """Reads the meshes, and removes shapes of size 0 and visuals whose mesh cannot be read."""
     parts = [(link, e) for link in urdf.findall("link") for e in link if e.tag in _SHAPES]
     empty = [part for part in parts if _is_empty(part[1].find("geometry/*"))]
     for link, part in empty:
@@ -422,11 +414,7 @@ def _add_couplings(work: Work, hinges: list[ET.Element]) -> None:
 
 
 def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
-    """Adds a position servo for each joint that mimics no other.
-
-    Raises:
-        InputError: A joint has no effort limit, and the settings contain none.
-    """
+    """Adds a position servo for each joint that mimics no other."""
     settings, names = work.settings, dict[str, list[str]]()
     actuators = work.section("actuator")
     for joint in [hinge for hinge in hinges if hinge.find("mimic") is None]:
@@ -468,10 +456,6 @@ def _add_stance(work: Work) -> None:
     """Adds the initial pose as a keyframe, and excludes the contacts of bodies that overlap.
 
     The lowest colliding geom is at height 0 if the base is free.
-
-    Raises:
-        InputError: An angle is outside the range of its joint, or MuJoCo cannot compile the model,
-            such as a link that moves without mass.
     """
     try:
         model = work.model

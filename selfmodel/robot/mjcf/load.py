@@ -221,10 +221,6 @@ def _control_timestep(work: Work) -> float:
 
     By default it is the smallest multiple of the physics time step that is at least
     ``MIN_CONTROL_TIMESTEP``.
-
-    Raises:
-        InputError: The control time step has more than ``MAX_SUBSTEPS`` physics steps, or is not a
-            multiple of the physics time step; or the physics time step is too large.
     """
     physics, wanted = float(work.model.opt.timestep), work.settings.control_timestep
     control = MIN_CONTROL_TIMESTEP if wanted is None else wanted

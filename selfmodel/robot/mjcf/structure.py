@@ -100,11 +100,7 @@ _POSES = ("body_pos", "body_quat", "geom_pos", "geom_quat", "site_pos", "jnt_pos
 
 
 def _dissolve_frames(work: Work) -> None:
-    """Replaces each frame by its children, in the place that they have in the model.
-
-    Raises:
-        InputError: MuJoCo cannot compile the MJCF, or a pose would change.
-    """
+    """Replaces each frame by its children, in the place that they have in the model."""
     model = work.model
     moved: set[ET.Element] = set()
     for world in work.root.findall("worldbody"):
