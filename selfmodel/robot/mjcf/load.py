@@ -11,8 +11,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import mujoco
 
 from selfmodel.errors import InputError
@@ -136,11 +136,7 @@ def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
 def adapt_message(request: Message) -> Message:
     """Task of a child process: adapts the file in a message."""
     path = Path(request.header["path"])
-    values: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in request.header["settings"].items()
-    }
-    settings = MjcfSettings(**values)
+    settings = msgspec.convert(request.header["settings"], MjcfSettings)
     root = parse_xml(request.buffers["file"])
     files = robot_folder(path.parent, settings.assets)
     if root.tag == "robot":

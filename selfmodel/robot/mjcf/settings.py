@@ -1,24 +1,21 @@
 """Settings of a user for the properties of a robot that its MJCF or URDF does not contain."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, get_type_hints
+
+import msgspec
+from msgspec import Meta
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.robot.mjcf.untrusted import is_around_home
 
-JointValues = Mapping[str, float]
-"""Values by name of a joint or pattern such as ``*_knee``; the last that fits counts."""
-
 MAX_VALUE = 1e6
 """Largest gain, torque or angle."""
-
-MAX_PATTERN = 200
-"""Largest name or pattern of joints, characters."""
 
 MAX_SETTINGS_BYTES = 2**16
 """Largest settings file, in bytes."""
@@ -32,8 +29,14 @@ MAX_CONTROL_TIMESTEP = 10.0
 NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
-BASES = ("free", "fixed")
-"""Values of ``base``."""
+JointValues = Mapping[str, float]
+"""Values by name of a joint or pattern such as ``*_knee``; the last that fits counts."""
+
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+Pattern = Annotated[str, Meta(max_length=200)]
+Positive = Mapping[Pattern, Annotated[float, Meta(gt=0, le=MAX_VALUE)]]
+NotNegative = Mapping[Pattern, Annotated[float, Meta(ge=0, le=MAX_VALUE)]]
+Angles = Mapping[Pattern, Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]]
 
 
 @dataclass(frozen=True)
@@ -64,19 +67,19 @@ class MjcfSettings:
         assets: Folder with files that the MJCF or URDF names, in addition to its own; "" for none.
     """
 
-    forward: str = "x"
+    forward: Literal["x", "y", "-x", "-y"] = "x"
     keyframe: str = ""
-    control_timestep: float | None = None
+    control_timestep: Annotated[float, Meta(gt=0, le=MAX_CONTROL_TIMESTEP)] | None = None
     touch: tuple[str, ...] | None = None
     angle: tuple[str, ...] | None = None
-    ctrlrange: tuple[float, float] | None = None
-    kp: JointValues = field(default_factory=dict)
-    kd: JointValues = field(default_factory=dict)
-    effort: JointValues = field(default_factory=dict)
-    pose: JointValues = field(default_factory=dict)
-    reach: JointValues = field(default_factory=dict)
-    base: str | None = None
-    base_height: float | None = None
+    ctrlrange: tuple[Finite, Finite] | None = None
+    kp: Positive = field(default_factory=dict)
+    kd: NotNegative = field(default_factory=dict)
+    effort: NotNegative = field(default_factory=dict)
+    pose: Angles = field(default_factory=dict)
+    reach: Positive = field(default_factory=dict)
+    base: Literal["free", "fixed"] | None = None
+    base_height: Finite | None = None
     assets: str = ""
 
 
@@ -155,54 +158,31 @@ def parse_setting(text: str) -> dict[str, Any]:
         return {key.strip(): value.strip()}  # an unquoted word
 
 
-def _is_number(value: object) -> bool:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return abs(value) <= sys.float_info.max  # a Python int may be larger than any float
-
-
-def _is_timestep(value: Any) -> bool:  # noqa: ANN401  # any value of a user
-    return _is_number(value) and 0 < value <= MAX_CONTROL_TIMESTEP
-
-
-def _is_range(value: Any) -> bool:  # noqa: ANN401  # any value of a user
-    pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
-    return pair and value[0] < value[1]
-
-
-def _are_names(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(name, str) for name in value)
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
 _NAMES = 'a list of names, such as ["left_foot"]'
-_RULES: Mapping[str, tuple[Callable[[Any], bool], str]] = {
-    "forward": (
-        lambda value: _is_text(value) and value in FORWARD_DIRECTIONS,
-        f"one of {', '.join(FORWARD_DIRECTIONS)}",
-    ),
-    "keyframe": (_is_text, "the name of a keyframe, or none"),
-    "control_timestep": (_is_timestep, f"a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s"),
-    "touch": (_are_names, _NAMES),
-    "angle": (_are_names, _NAMES),
-    "ctrlrange": (_is_range, "two numbers, such as [-1, 1], its lower end first"),
-    "base": (lambda value: value in BASES, f"one of {', '.join(BASES)}"),
-    "base_height": (_is_number, "a number of metres"),
-    "assets": (_is_text, "the path of a folder"),
+_GAIN = f"a number from above 0 to {MAX_VALUE:g} for each joint, such as "
+_LIMIT = f"a number from 0 to {MAX_VALUE:g} for each joint, such as "
+_NEEDED: Mapping[str, str] = {
+    "forward": f"one of {', '.join(FORWARD_DIRECTIONS)}",
+    "keyframe": "the name of a keyframe, or none",
+    "control_timestep": f"a number from above 0 to {MAX_CONTROL_TIMESTEP:g} s",
+    "touch": _NAMES,
+    "angle": _NAMES,
+    "ctrlrange": "two numbers, such as [-1, 1], its lower end first",
+    "kp": f"{_GAIN}kp = 40 or kp = {{knee = 40}}",
+    "kd": f"{_LIMIT}kd = 1 or kd = {{knee = 1}}",
+    "effort": f"{_LIMIT}effort = 20 or effort = {{knee = 20}}",
+    "pose": "an angle for each joint, a number, such as pose = {knee = -1.5}",
+    "reach": f"{_GAIN}reach = 0.5 or reach = {{knee = 0.5}}",
+    "base": "one of free, fixed",
+    "base_height": 'a number of metres and base = "fixed"',
+    "assets": "the path of a folder",
 }
-"""Whether a value of a setting is valid, and what is."""
+"""What a setting needs, for error messages."""
 
-_BY_JOINT = {
-    "kp": "kp = 40 or kp = {knee = 40}",
-    "kd": "kd = 1 or kd = {knee = 1}",
-    "effort": "effort = 20 or effort = {knee = 20}",
-    "pose": "pose = {knee = -1.5}",
-    "reach": "reach = 0.5 or reach = {knee = 0.5}",
-}
-"""Example of each setting with a value for each joint."""
+_BY_JOINT = ("kp", "kd", "effort", "reach")
+"""Settings for which one number is for all joints."""
+
+_MAX_QUOTED = 200
 
 
 def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
@@ -214,7 +194,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     Raises:
         InputError: A setting is unknown or invalid; the message has its name and the valid values.
     """
-    known = [key.name for key in fields(MjcfSettings)]
+    types = get_type_hints(MjcfSettings, include_extras=True)
     values: dict[str, Any] = {}
     for key, value in given.items():
         if key == "neurons":
@@ -222,46 +202,27 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
                 "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
                 "--neurons N to the command"
             )
-        if key not in known:
-            raise unknown_name("setting", key, known)
-        if value is None:
-            continue
-        if key in _BY_JOINT:
-            values[key] = _by_joint(key, value)
-            continue
-        valid, needed = _RULES[key]
-        if not valid(value):
-            raise InputError(f"{key} needs {needed}, got {value!r}")
-        if isinstance(value, list):
-            values[key] = tuple(dict.fromkeys(value))
-        else:
-            values[key] = value if isinstance(value, str) else float(value)
-    if "ctrlrange" in values:
-        values["ctrlrange"] = tuple(map(float, values["ctrlrange"]))
+        if key not in types:
+            raise unknown_name("setting", key, list(types))
+        one = key in _BY_JOINT and not isinstance(value, Mapping)
+        try:
+            if value is not None:
+                values[key] = msgspec.convert({"*": value} if one else value, types[key])
+        except (msgspec.ValidationError, OverflowError) as error:
+            raise _invalid(key, value) from error
+    low, high = values.get("ctrlrange", (0, 1))
+    if not low < high:
+        raise _invalid("ctrlrange", [low, high])
     if "base_height" in values and values.get("base") != "fixed":
-        raise InputError(
-            f'base_height needs base = "fixed", got {values["base_height"]!r} with base '
-            f"{values.get('base', 'of the file')}"
-        )
+        raise _invalid("base_height", values["base_height"])
+    for key in {"touch", "angle"}.intersection(values):
+        values[key] = tuple(dict.fromkeys(values[key]))
     return MjcfSettings(**values)
 
 
-def _by_joint(name: str, given: object) -> JointValues:
-    """Returns the values of a setting by joint; one number is for all joints."""
-    values = given if isinstance(given, Mapping) or name == "pose" else {"*": given}
-    if not isinstance(values, Mapping):
-        raise InputError(f"pose needs angles by joint, such as {_BY_JOINT['pose']}, got {given!r}")
-    least, above = -MAX_VALUE if name == "pose" else 0.0, name in ("kp", "reach")
-    for joint, value in values.items():
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if (
-            not number
-            or not least <= value <= MAX_VALUE
-            or (above and value == 0)
-            or len(joint) > MAX_PATTERN
-        ):
-            raise InputError(
-                f"{name} needs a number from {'above ' * above}{least:g} to {MAX_VALUE:g} for each "
-                f"joint, such as {_BY_JOINT[name]}, got {value!r} for {joint[:MAX_PATTERN]!r}"
-            )
-    return {joint: float(value) for joint, value in values.items()}
+def _invalid(key: str, value: object) -> InputError:
+    try:
+        text = repr(value)[:_MAX_QUOTED]
+    except ValueError:  # an integer of more digits than Python writes
+        text = "a number of too many digits"
+    return InputError(f"{key} needs {_NEEDED[key]}, got {text}")

@@ -208,7 +208,7 @@ def test_an_arm_that_turns_on_the_world_cannot_be_freed():
     [
         ({"base": "hanging"}, "one of free, fixed, got 'hanging'"),
         ({"base": "fixed", "base_height": "high"}, "got 'high'"),
-        ({"base_height": 1.0}, 'base = "fixed", got 1.0 with base of the file'),
+        ({"base_height": 1.0}, 'base = "fixed", got 1.0'),
     ],
 )
 def test_wrong_settings_of_the_base_are_refused(given: dict[str, object], sentence: str):
