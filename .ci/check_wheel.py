@@ -15,6 +15,7 @@ NEEDED = (
     *("selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml"),
     "selfmodel/cli/foxglove-layout.json",
     "selfmodel/studies/figures.mplstyle",
+    "selfmodel/studies/paper_page.md",
     "selfmodel/report/template.html",
 )
 

@@ -56,8 +56,7 @@ from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay
-from selfmodel.studies.experiment import draw_reality
-from selfmodel.studies.scores import check_motion
+from selfmodel.studies.experiment import check_motion, draw_reality
 from selfmodel.trials.behaviour import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 

@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
@@ -37,9 +38,9 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import draw_reality
-from selfmodel.studies.rows import AFTER, KINDS, ORACLE
+from selfmodel.studies.rows import AFTER, KINDS, ORACLE, frame_of, method_value, oracles
 from selfmodel.studies.study import Row, Study
-from selfmodel.studies.tables import markdown_table
+from selfmodel.studies.tables import markdown_of, table_of
 from selfmodel.tasks import ROBOTS
 
 FILE = "repertoire.npz"
@@ -243,23 +244,12 @@ def table(rows: Sequence[Row]) -> str:
 
     The best of the trials so far counts; of the oracle, the mean of its trials.
     """
-
-    def value(row: Row, trials: int) -> float:
-        if row["method"] == ORACLE:
-            return float(np.mean(row["upright"]))
-        return float(row["best"][min(trials, len(row["best"])) - 1])
-
-    def place(row: Row) -> tuple[Any, ...]:
-        return row["robot"], row["case"], row["gap"], row["seed"]
-
-    bounds = {place(row): value(row, 1) for row in rows if row["method"] == ORACLE}
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        groups.setdefault((*place(row)[:3], row["method"]), []).append(row)
-    lines = []
-    for (robot, case, gap, method), own in groups.items():
-        known = [row for row in own if bounds.get(place(row), 0.0) > 0]
-        ratios = {n: [value(row, n) / bounds[place(row)] for row in known] for n in AFTER if known}
+    frame = frame_of(rows)
+    bounds, lines = oracles(frame), []
+    for (robot, case, gap, method), own in frame.groupby(["robot", "case", "gap", "method"]):
+        after = {n: [method_value(row, n) for row in own.itertuples()] for n in AFTER}
+        bound = [bounds.get((robot, case, gap, seed), 0.0) for seed in own["seed"]]
+        ratios = {n: [v / b for v, b in zip(after[n], bound, strict=True) if b > 0] for n in AFTER}
         lines.append(
             {
                 "robot": robot,
@@ -267,14 +257,14 @@ def table(rows: Sequence[Row]) -> str:
                 "gap": f"{gap:g}",
                 "method": method,
                 "runs": str(len(own)),
-                **{f"m after {n}": f"{median(value(row, n) for row in own):.2f}" for n in AFTER},
-                **{f"÷ oracle after {n}": f"{median(ratios[n]):.2f}" for n in ratios},
-                "trials": f"{median(len(row['best']) for row in own):g}",
-                "simulated steps": f"{median(row['simulated_steps'] for row in own):.3g}",
-                "seconds": f"{median(row['seconds'] for row in own):.0f}",
+                **{f"m after {n}": f"{median(after[n]):.2f}" for n in AFTER},
+                **{f"÷ oracle after {n}": f"{median(ratios[n] or [math.nan]):.2f}" for n in AFTER},
+                "trials": f"{own['best'].map(len).median():g}",
+                "simulated steps": f"{own['simulated_steps'].median():.3g}",
+                "seconds": f"{own['seconds'].median():.0f}",
             }
         )
-    return markdown_table(lines, numbers=range(4, len(lines[0]))) if lines else ""
+    return markdown_of(table_of("rivals", lines, lines, texts=4)) if lines else ""
 
 
 if __name__ == "__main__":

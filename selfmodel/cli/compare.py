@@ -16,8 +16,8 @@ from selfmodel.studies.study import Row
 from selfmodel.studies.tables import (
     as_json as json_of,
     check_format,
-    frame_table,
     table_files,
+    table_of,
     write_files,
 )
 
@@ -35,9 +35,9 @@ def compare(options: Compare) -> None:
     found = load(options.study)
     pairs, means = found.comparisons(), found.marginal_means()
     tables = [
-        frame_table("rows", found.rows),
-        frame_table("marginal-means", means, list(map(_mean_texts, _records(means))), texts=2),
-        frame_table("comparisons", pairs, list(map(_pair_texts, _records(pairs))), texts=3),
+        table_of("rows", found.rows),
+        table_of("marginal-means", means, list(map(_mean_texts, _records(means))), texts=2),
+        table_of("comparisons", pairs, list(map(_pair_texts, _records(pairs))), texts=3),
     ]
     content = table_files(tables, options.table) | figures.of_comparisons(pairs)
     files = list(map(str, write_files(options.out or options.study / COMPARISON, content)))

@@ -28,8 +28,7 @@ from selfmodel.report.subject import subject_of_run
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies.experiment import Experiment, run
-from selfmodel.studies.scores import choose_score
+from selfmodel.studies.experiment import Experiment, choose_score, run
 from selfmodel.trials.trial import Trial
 
 

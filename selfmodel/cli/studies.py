@@ -27,7 +27,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.studies import figures, plans
 from selfmodel.studies.comparisons import balance_warnings
-from selfmodel.studies.paper import tables_of, write_results
+from selfmodel.studies.paper_page import tables_of, write_results
 from selfmodel.studies.rows import outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import Interval
 from selfmodel.studies.study import Row, Study
@@ -38,8 +38,8 @@ from selfmodel.studies.tables import (
     check_format,
     results_files,
     suite_summaries,
-    summary_table,
     table_files,
+    table_of,
     write_files,
 )
 from selfmodel.tasks import ROBOTS
@@ -124,7 +124,7 @@ def run_suite(options: RunSuite) -> None:
     failed = run_shown(study, options)
     rows = study_rows(study.name, options.out)
     summaries = suite_summaries(rows)
-    found = summary_table("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
+    found = table_of("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
     _finish(
         study,
         failed,
@@ -248,7 +248,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
         }
         for one in scores
     ]
-    return summary_table("scores", scores, texts, texts=3)
+    return table_of("scores", scores, texts, texts=3)
 
 
 def _summary_texts(one: Row) -> dict[str, str]:

@@ -1,8 +1,8 @@
 """Cells of a study: each a function, its parameters and the cells that it needs, in a folder.
 
-The folder of a cell, ``FOLDER/KIND/NAME-DIGEST``, is named by the digest of these and of the code
-that computes it. It is filled under a new random name and renamed when it is complete, so a cell is
-finished if its ``cell.json`` stands there, and nothing else has to be kept.
+The folder of a cell, FOLDER/KIND/NAME-DIGEST, is named by the digest of these and of the code that
+computes it. It is filled under a random name and renamed when it is complete: a cell is finished if
+its ``cell.json`` stands there.
 """
 
 import errno
@@ -31,6 +31,9 @@ from selfmodel.logs.files import make_folder, not_written, replace_file
 CELL, UNFINISHED, ERRORS = "cell.json", "unfinished", "errors"
 """File of a finished cell; folders of the cells that are being computed, and of the failures."""
 
+PACKAGE = Path(__file__).parents[1]
+"""Folder of the code that determines the bits of every cell."""
+
 MAX_BYTES = 2**26
 """Largest ``cell.json`` that is read, bytes."""
 
@@ -39,6 +42,9 @@ REMEDY = "delete its folder, and the same command computes its cell again"
 Work = Callable[[Mapping[str, Any], Mapping[str, Path], Path], Any]
 """Function of a cell: from its parameters, the folders of the cells that it needs, and a new folder
 for files of its own, it returns the result as JSON."""
+
+Answer = tuple[float, str | None]
+"""Wall time of a cell, s, and the reason of its failure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +84,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class FinishedCell:
-    """A finished cell with its result.
+    """A finished cell.
 
     Attributes:
         name: Name for readers.
@@ -121,7 +127,7 @@ def finished(folder: Path) -> Iterator[FinishedCell]:
         yield cell
 
 
-def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, str | None]:
+def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
     """Computes a cell in a worker, unless it is finished meanwhile.
 
     Args:
@@ -129,27 +135,23 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, s
         cell: The cell.
         made: The versions and the digest of the code of the command.
 
-    Returns:
-        Wall time, s, and the reason of a failure.
-
     Raises:
         InputError: The worker has other code than the command.
         OSError: The disk is full or not writable.
     """
-    own = dict(made_with(cell.function))
-    if own != made:
+    here = made_with(cell.function)
+    if here != made:
         raise InputError(
-            f"the worker on {os.uname().nodename} has {listed(own)}, the command has "
+            f"the worker on {os.uname().nodename} has {listed(here)}, the command has "
             f"{listed(made)}: a study is of one version of each; install the same there"
         )
     begin, place = time.perf_counter(), folder / cell.place
     if _is_complete(place):
         return 0.0, None
     # A new name that nobody has: no link is followed, and no file is replaced.
-    unfinished = folder / UNFINISHED / cell.kind / f"{place.name}.{secrets.token_hex(8)}"
-    make_folder(unfinished.parent)
-    unfinished.mkdir()
+    unfinished = folder / UNFINISHED / f"{place.name}.{secrets.token_hex(8)}"
     try:
+        make_folder(unfinished)
         error = _perform(folder, cell, unfinished, begin)
         if error is None:
             _publish(unfinished, place)
@@ -163,7 +165,7 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> tuple[float, s
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _perform(folder: Path, cell: Cell, own: Path, begin: float) -> str | None:
+def _perform(folder: Path, cell: Cell, unfinished: Path, begin: float) -> str | None:
     """Calls the function of a cell, and writes its ``cell.json`` or the reason of its failure."""
     module, _, name = cell.function.partition(":")
     try:
@@ -172,34 +174,35 @@ def _perform(folder: Path, cell: Cell, own: Path, begin: float) -> str | None:
             warnings.simplefilter("ignore", RuntimeWarning)
             work: Work = getattr(importlib.import_module(module), name)
             needs = {key: folder / need.place for key, need in cell.needs.items()}
-            result = work(cell.parameters, needs, own)
-        paths = sorted(path for path in own.rglob("*") if path.is_file())
+            result = work(cell.parameters, needs, unfinished)
+        paths = sorted(path for path in unfinished.rglob("*") if path.is_file())
         content = {
             "cell": cell.definition,
             "result": result,
-            "files": [path.relative_to(own).as_posix() for path in paths],
+            "files": [path.relative_to(unfinished).as_posix() for path in paths],
             "seconds": time.perf_counter() - begin,
-            "made_with": dict(made_with(cell.function)),
+            "made_with": made_with(cell.function),
         }
         text = json.dumps({**content, "sha256": _digest(content)}, indent=1, allow_nan=False)
     except (OSError, InputError, WorkError, MemoryError) as cause:
         if isinstance(cause, OSError) and is_full(cause):
-            raise not_written(cause.filename or own, cause) from cause
-        return keep_error(folder, cell.place, str(cause) or type(cause).__name__)
+            raise not_written(cause.filename or unfinished, cause) from cause
+        reason = str(cause) or type(cause).__name__
+        keep_error(folder, cell.place, reason)
+        return reason
     except Exception as cause:  # noqa: BLE001  # a plug-in may raise any exception
         keep_error(folder, cell.place, "".join(traceback.format_exception(cause)))
         line = " ".join(traceback.format_exception_only(cause)[-1].split())[:300]
         return f"an unexpected error, {line}; its traceback is in {folder / ERRORS}"
-    replace_file(own / CELL, f"{text}\n".encode())
+    replace_file(unfinished / CELL, f"{text}\n".encode())
     return None
 
 
-def keep_error(folder: Path, place: str, text: str) -> str:
-    """Writes the error of a cell, and returns it."""
+def keep_error(folder: Path, place: str, text: str) -> None:
+    """Writes the error of a cell into its file."""
     make_folder(folder / ERRORS)
     path = folder / ERRORS / f"{Path(place).name}.txt"
     replace_file(path, f"{text}\n".encode(errors="replace"))
-    return text
 
 
 def _publish(unfinished: Path, place: Path) -> None:
@@ -235,24 +238,19 @@ def read_cell(path: Path) -> FinishedCell:
         content = json.loads(data)
         digest = content.pop("sha256")
         cell, made = content["cell"], content["made_with"]
-        found = FinishedCell(
+        finished_cell = FinishedCell(
             cell["name"], cell["parameters"], content["result"], path, made, content["files"]
         )
-        damaged = digest != _digest(content)
+        is_whole = digest == _digest(content) and path.parent.name == _folder_name(cell, made)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: expected a cell of a study, got {error!r}; {REMEDY}") from error
-    if damaged:
-        raise InputError(f"{path} was altered or damaged: {REMEDY}")
-    if path.parent.name != _folder_name(cell, made):
-        raise InputError(
-            f"{path}: expected the cell of its folder, got that of {_folder_name(cell, made)}; "
-            f"{REMEDY}, or restore the folder's name"
-        )
-    return found
+    if not is_whole:
+        raise InputError(f"{path} was altered or damaged, or its folder renamed: {REMEDY}")
+    return finished_cell
 
 
 @cache
-def made_with(function: str) -> Mapping[str, str]:
+def made_with(function: str) -> dict[str, str]:
     """Returns what determines the bits of a cell besides its definition.
 
     Args:
@@ -262,35 +260,30 @@ def made_with(function: str) -> Mapping[str, str]:
         The versions of selfmodel, MuJoCo and numpy, and the digest of the code: of all modules and
         models of selfmodel, and of the function's module.
     """
-    found = {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
-    digest = hashlib.sha256(_own_code())
+    files = [
+        Path(folder, name)
+        for folder, _, names in os.walk(PACKAGE, followlinks=True)
+        for name in names
+        if name.endswith((".py", ".xml"))
+    ]
+    code = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in files}
     module = importlib.util.find_spec(function.partition(":")[0])
     if module is not None and module.origin and not module.name.startswith("selfmodel."):
-        digest.update(hashlib.sha256(Path(module.origin).read_bytes()).digest())
-    return {**found, "code": digest.hexdigest()[:16]}
-
-
-@cache
-def _own_code() -> bytes:
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for folder, _, names in sorted(os.walk(root, followlinks=True)):
-        for name in sorted(name for name in names if name.endswith((".py", ".xml"))):
-            path = Path(folder, name)
-            for part in (path.relative_to(root).as_posix().encode(), path.read_bytes()):
-                digest.update(hashlib.sha256(part).digest())
-    return digest.digest()
+        code[""] = Path(module.origin).read_bytes()
+    digests = {name: hashlib.sha256(content).hexdigest() for name, content in code.items()}
+    versions = {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
+    return {**versions, "code": _digest(digests)[:16]}
 
 
 def _folder_name(definition: Mapping[str, Any], made: Mapping[str, str]) -> str:
-    return f"{definition['name'][:150]}-{_digest([definition, dict(made)])[:16]}"
+    return f"{definition['name'][:150]}-{_digest([definition, made])[:16]}"
 
 
-def _digest(values: Any) -> str:  # noqa: ANN401  # JSON
+def _digest(values: object) -> str:
     text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def listed(made: Mapping[str, str]) -> str:
     """Returns versions and the digest of the code as text."""
-    return ", ".join(f"{name} {one}" for name, one in made.items())[:300]
+    return ", ".join(f"{name} {value}" for name, value in made.items())[:300]

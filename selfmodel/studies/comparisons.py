@@ -33,11 +33,10 @@ the same ``table``, ``cell`` and ``seed`` are of the same physical robot and the
 methods are compared by pairs.
 
 ``table``: names of what is compared apart from other outcomes, such as robot and number of trials,
-a tuple; methods are compared, and their number is corrected for, within one table. ``method``: name
-of the method. ``cell``: names of the fixed conditions of the run, a tuple: gap and failure.
-``seed``: seed of the run; runs of one seed share gaits and parameters of the physical robot.
-``value``: 1 or 0 for right or wrong, or a finite number in the unit of the table. ``measure``:
-``share`` for right and wrong, ``number`` for other values; one in a table.
+a tuple. ``cell``: names of the fixed conditions of the run, a tuple: gap and failure. ``seed``:
+seed of the run; runs of one seed share gaits and parameters of the physical robot. ``value``: 1 or
+0 for right or wrong, or a finite number in the unit of the table. ``measure``: ``share`` for right
+and wrong, ``number`` for other values; one in a table.
 """
 
 
@@ -67,7 +66,7 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
         InputError: A value is not finite, or no 0 or 1 in a share; a method has two outcomes of one
             run; or a table has two measures.
     """
-    found: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     for table, measure, runs in _tables(outcomes):
         seeds = runs.index.get_level_values("seed").to_numpy()
         values = {method: runs[method].to_numpy(dtype=float) for method in runs}
@@ -76,15 +75,15 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
             for one, other in itertools.combinations(values, 2)
             if np.isfinite(values[one] + values[other]).any()
         ]
-        over_runs = holm([one["p_runs"] for one in pairs])
-        over_both = holm([max(one["p_runs"], one["p_seeds"]) for one in pairs])
-        for one, p_runs, p in zip(pairs, over_runs, over_both, strict=True):
-            one |= {"p_runs_holm": p_runs, "p_seeds": one.pop("p_seeds"), "p_holm": p}
-            one["better"] = one["first"] if p < LEVEL else None
-        found += pairs
-    frame = pd.DataFrame(found)
-    if found:  # pandas' texts have no None
-        frame["better"] = pd.Series([one["better"] for one in found], dtype=object)
+        over_runs = holm([pair["p_runs"] for pair in pairs])
+        over_both = holm([max(pair["p_runs"], pair["p_seeds"]) for pair in pairs])
+        for pair, p_runs, p in zip(pairs, over_runs, over_both, strict=True):
+            pair |= {"p_runs_holm": p_runs, "p_seeds": pair.pop("p_seeds"), "p_holm": p}
+            pair["better"] = pair["first"] if p < LEVEL else None
+        rows += pairs
+    frame = pd.DataFrame(rows)
+    if rows:  # pandas' texts have no None
+        frame["better"] = pd.Series([row["better"] for row in rows], dtype=object)
     return frame
 
 
@@ -101,9 +100,6 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
     Source: S. R. Searle, F. M. Speed and G. A. Milliken, *Population Marginal Means in the Linear
     Model*, The American Statistician 34 (1980).
 
-    Args:
-        outcomes: Outcomes of all methods, with the columns ``OUTCOME``.
-
     Returns:
         ``table``, ``method``; ``n``, the number of its runs in these cells, ``seeds``, ``cells``;
         ``left_out``, the number of its runs in other cells; ``mean``, ``mean_low``, ``mean_high``.
@@ -111,13 +107,13 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
     Raises:
         InputError: As for ``compare``.
     """
-    found = []
+    rows = []
     for table, measure, runs in _tables(outcomes):
         cells = runs.notna().groupby(level="cell").any().all(axis=1)
         common = runs[runs.index.get_level_values("cell").map(cells)]
         for method in runs.columns:
             values = common[method].unstack("cell").dropna(how="all").to_numpy(dtype=float)  # noqa: PD010  # a pivot of one column
-            found.append(
+            rows.append(
                 {
                     "table": table,
                     "method": method,
@@ -128,29 +124,21 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
                     **ends("mean", _marginal(values, measure) if values.size else UNKNOWN),
                 }
             )
-    return pd.DataFrame(found)
+    return pd.DataFrame(rows)
 
 
 def balance_warnings(outcomes: pd.DataFrame) -> tuple[str, ...]:
     """Returns a sentence for the tables whose methods have different runs, or uneven cells."""
     tables: dict[str, list[str]] = {}
     for table, _, runs in _tables(outcomes):
-        known = runs.notna()
-        cells = known.groupby(level="cell").sum().agg(["min", "max"])
-        if known.all(axis=None) and cells.loc["min"].equals(cells.loc["max"]):
-            continue
-        counts = [
-            f"{method} {known[method].sum()}"
-            + ("" if low == high else f" ({low} to {high} per cell)")
-            for method, (low, high) in cells.items()
-        ]
-        if not known.all(axis=None) and known.sum().min() == known.sum().max():
-            counts.append("not the same runs")
-        tables.setdefault(", ".join(counts), []).append(", ".join(table))
+        counts = runs.notna().groupby(level="cell").sum()
+        if runs.isna().any(axis=None) or (counts != counts.iloc[0]).any(axis=None):
+            numbers = ", ".join(f"{method} {number}" for method, number in counts.sum().items())
+            tables.setdefault(numbers, []).append(", ".join(table))
     return tuple(
-        f"{'; '.join(names)}: the cells are unbalanced (runs: {counts}): compare paired "
+        f"{'; '.join(names)}: the cells are unbalanced (runs: {numbers}): compare paired "
         f"differences, not means of all runs; marginal means balance the cells, and not the seeds"
-        for counts, names in tables.items()
+        for numbers, names in tables.items()
     )
 
 
@@ -164,29 +152,28 @@ def _tables(outcomes: pd.DataFrame) -> Iterator[tuple[tuple[str, ...], str, pd.D
 
     The values have a row per run, by cell and seed, and a column per method; NaN for none.
     """
-    for table in dict.fromkeys(outcomes["table"]):
-        own = outcomes[[one == table for one in outcomes["table"]]]
-        measures = own["measure"].unique()
-        if len(measures) > 1:
+    for table, rows in outcomes.groupby("table", sort=False):
+        measure, *others = rows["measure"].unique()
+        if others:
             raise InputError(
-                f"expected one measure in the table {', '.join(table)}, got "
-                f"{' and '.join(measures)}: name two tables"
+                f"expected one measure in the table {', '.join(table)}, got {measure} and "
+                f"{' and '.join(others)}: name two tables"
             )
-        share = measures[0] == "share"
-        allowed = own["value"].isin([0, 1]) if share else np.isfinite(own["value"])
-        twice = own.duplicated(["method", "cell", "seed"])
+        share = measure == "share"
+        allowed = rows["value"].isin([0, 1]) if share else np.isfinite(rows["value"])
         expected = "1 or 0, for right or wrong," if share else "a finite value"
+        twice = rows.duplicated(["method", "cell", "seed"])
         for wrong, what in ((~allowed, expected), (twice, "one outcome")):
             if wrong.any():
-                row = own[wrong].iloc[0]
+                row = rows[wrong].iloc[0]
                 run = ", ".join((*table, *map(str.strip, row["cell"]), f"seed {row['seed']}"))
                 got = "two" if wrong is twice else row["value"]
                 raise InputError(
                     f"expected {what} of {row['method']} in {run}, got {got}: compare the rows of "
                     f"one study, each once, without runs that have no value"
                 )
-        runs = own.pivot(index=["cell", "seed"], columns="method", values="value")  # noqa: PD010  # not to be aggregated
-        yield table, str(measures[0]), runs
+        runs = rows.pivot(index=["cell", "seed"], columns="method", values="value")  # noqa: PD010  # not to be aggregated
+        yield table, str(measure), runs
 
 
 def _compared(
@@ -206,30 +193,29 @@ def _compared(
         seed: Seed of all random numbers.
     """
     common = np.isfinite(values[pair[0]] + values[pair[1]])
-    own = {name: values[name][common] for name in pair}
-    means = {name: float(np.mean(of_method)) for name, of_method in own.items()}
-    first, second = sorted(own, key=lambda name: -means[name])  # stable: by name if equal
-    differences, drawn = (own[first] - own[second]).tolist(), seeds[common].tolist()
-    only_first, only_second = [one > 0 for one in differences], [one < 0 for one in differences]
-    rng = np.random.default_rng(seed)
+    means = {name: float(np.mean(values[name][common])) for name in pair}
+    first, second = sorted(pair, key=lambda name: -means[name])  # stable: by name if equal
+    differences = (values[first] - values[second])[common]
+    only_first, only_second = int((differences > 0).sum()), int((differences < 0).sum())
+    runs, rng = (differences.tolist(), seeds[common].tolist()), np.random.default_rng(seed)
     if measure == "share":
-        difference = paired_proportion_interval(differences, drawn, rng)
+        interval = paired_proportion_interval(*runs, rng)
         p = exact_mcnemar(only_first, only_second)
     else:
-        difference = paired_interval(differences, drawn, rng)
-        p = sign_flip_test(differences, rng)
+        interval = paired_interval(*runs, rng)
+        p = sign_flip_test(runs[0], rng)
     return {
         "first": first,
         "second": second,
-        "n": len(drawn),
-        "seeds": len(set(drawn)),
+        "n": len(differences),
+        "seeds": len(set(runs[1])),
         "first_mean": means[first],
         "second_mean": means[second],
-        **ends("difference", difference),
-        "only_first": sum(only_first),
-        "only_second": sum(only_second),
+        **ends("difference", interval),
+        "only_first": only_first,
+        "only_second": only_second,
         "p_runs": p,
-        "p_seeds": seed_test(differences, drawn),
+        "p_seeds": seed_test(*runs),
     }
 
 

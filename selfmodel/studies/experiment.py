@@ -1,37 +1,50 @@
-"""Recovery of a simulated physical robot with known faults: definition, run, correctness."""
+"""Recovery of a simulated physical robot with known faults: definition, score, run, correctness."""
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmodel.arguments import fitted
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel import plugins
+from selfmodel.arguments import fitted, read_logs
+from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.diagnosis.choice import ComparatorChoice
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
+from selfmodel.logs.recordings.recording import TABLE
+from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.plugins import NEXT_TRIAL, PAPER, repair
 from selfmodel.recovery.recover import RecoveryLoop, random_stream
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, upright_within
+from selfmodel.recovery.tracking import TRACKING, Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.model_factors import with_model
 from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import Entry
 from selfmodel.trials.signals import SIGNALS
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Stage, Trial
+
+LEAST_MOTION = 0.02
+"""Smallest motion of a joint that can be followed, rad."""
+
+TIME = "time"
+"""Name of the column of a table with the time of each row, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +67,11 @@ class Experiment:
         next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
         design: Controller design; None for the robot's network.
         score: Fitness of the repair.
+        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
+            the model; unused with a reality gap.
         repair: Name of the repair, ``robust`` or ``paper``.
         search: Name of the search of the repair; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
-        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
-            the model; unused with a reality gap.
     """
 
     robot: Robot
@@ -77,7 +90,7 @@ class Experiment:
     design: Design | None = None
     score: Score = DISPLACEMENT
     physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
-    repair: str = PAPER
+    repair: str = plugins.PAPER
     search: str | None = None
     repertoire: Repertoire | None = None
 
@@ -102,8 +115,8 @@ class Outcome:
 def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     """Runs an experiment. The algorithm has access to the trials, not to the truth."""
     start = perf_counter()
-    robot, truth = experiment.robot, experiment.truth
-    simulator = Simulator(robot, experiment.threads)
+    robot, truth, threads = experiment.robot, experiment.truth, experiment.threads
+    simulator = Simulator(robot, threads)
     reality = draw_reality(robot, experiment.seed, experiment.gap)
     if experiment.physical is not None and reality.text is None:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
@@ -112,15 +125,16 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     journal = create_journal(
         experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
+    hidden: dict[Stage, str] = {
+        "before": str(INTACT),
+        "after": str(truth),
+        "recovery": str(truth),
+    }
     recovery = RecoveryLoop(
         simulator=simulator,
         choose_comparator=experiment.choose_comparator,
         run_trial=TrialRunner(
-            journal.trials,
-            robot,
-            experiment.settings,
-            hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
-            gap=reality.text,
+            journal.trials, robot, experiment.settings, hidden=hidden, gap=reality.text
         ),
         journal=journal,
         settings=experiment.settings,
@@ -129,34 +143,20 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         gait=experiment.gait,
         design=experiment.design,
         kinds=experiment.kinds,
-        calibrate=partial(fitted, robot, threads=experiment.threads)
-        if experiment.calibrated
-        else None,
-        next_trial=NEXT_TRIAL[experiment.next_trial],
+        calibrate=partial(fitted, robot, threads=threads) if experiment.calibrated else None,
+        next_trial=plugins.NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
-        make_repair=repair(experiment.repair, experiment.search, experiment.repertoire),
+        make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),
     ).run(healthy, damaged)
-    return Outcome(
-        recovery=recovery,
-        stats=simulator.stats,
-        seconds=perf_counter() - start,
-        correct=is_correct(
-            recovery.diagnosis.best,
-            truth,
-            recovery.trials[1:],
-            # A separate simulator: scoring does not count as cost of the recovery.
-            Simulator(robot, experiment.threads),
-        ),
-    )
+    seconds = perf_counter() - start
+    judge = Simulator(robot, threads)  # scoring is no cost of the recovery
+    correct = is_correct(recovery.diagnosis.best, truth, recovery.trials[1:], judge)
+    return Outcome(recovery, correct, simulator.stats, seconds)
 
 
 @dataclass(frozen=True)
 class Reality:
-    """Difference between a physical robot and its model, apart from faults.
-
-    Attributes:
-        gap: The reality gap; level 0 is none.
-    """
+    """Difference between a physical robot and its model, apart from faults; level 0 is none."""
 
     gap: RealityGap
 
@@ -178,12 +178,7 @@ class Reality:
 
 
 def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
-    """Returns the reality gap of a physical robot.
-
-    Args:
-        robot: The nominal robot.
-        seed: Seed; a search with the same seed draws other numbers.
-        level: Level of the reality gap.
+    """Returns the reality gap of a physical robot; a search with the same seed draws other numbers.
 
     Raises:
         InputError: The level is out of range.
@@ -196,20 +191,171 @@ def is_correct(
 ) -> bool:
     """Returns whether a hypothesis is the truth, or behaves like the truth in all trials.
 
-    Two hypotheses behave alike if all signals of their simulations are the same to the bit under
-    the controller of every trial.
+    Two hypotheses, in canonical form, behave alike if all signals of their simulations are the same
+    to the bit under the controller of every trial.
+    """
+
+    def alike(trial: Trial) -> bool:
+        runs = [(one, trial.plan.controller) for one in (best, truth)]
+        behaviour = simulator.run(runs, trial.behaviour.steps, SIGNALS).behaviour
+        return all(np.array_equal(*behaviour[signal]) for signal in SIGNALS)
+
+    return best == truth or all(map(alike, trials))
+
+
+class ChosenScore(NamedTuple):
+    """Fitness of a repair, and the controller whose motion is to be followed, if that is needed."""
+
+    score: Score
+    gait: Controller | None = None
+
+
+def choose_score(
+    name: str,
+    entry: Entry,
+    design: Design,
+    *,
+    steps: int,
+    seed: int,
+    reference: Path | None = None,
+    gait: Controller | None = None,
+    max_speed: float | None = None,
+    max_torque: float | None = None,
+    max_self_collision: float | None = None,
+) -> ChosenScore:
+    """Returns the score of that name for a robot.
 
     Args:
-        best: Best hypothesis of a diagnosis, in canonical form.
-        truth: Hypothesis of the physical robot, in canonical form.
-        trials: Trials that the diagnosis explains.
-        simulator: Self-model.
+        name: ``displacement``, ``upright``, ``energy``, ``return`` or ``tracking``; the name of an
+            entry point in the group ``selfmodel.scores``, or ``package.module:object``.
+        entry: The robot.
+        design: Design of the controllers.
+        steps: Control steps of a trial.
+        seed: Seed of all random numbers of the recovery.
+        reference: File of the trajectory to follow; None for the motion of the first controller in
+            simulation.
+        gait: The first controller; None for one with random weights if its motion is needed.
+        max_speed: Largest speed of a joint, rad/s; None for no limit.
+        max_torque: Largest torque of a joint, N m; None for no limit.
+        max_self_collision: Largest depth to which two bodies penetrate each other, m; None for no
+            limit.
+
+    Raises:
+        InputError: The name is unknown or the robot has no such score, a reference or a limit is
+            given for another score, a limit is out of range, or the motion of the first controller
+            stops.
     """
-    return best == truth or all(_same_bits(best, truth, trial, simulator) for trial in trials)
+    robot = entry.robot()
+    check_score(name, entry)
+    if reference is not None and name != TRACKING:
+        raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
+    limits = (max_speed, max_torque, max_self_collision)
+    if any(limit is not None for limit in limits):
+        return ChosenScore(_limited(name, limits), gait)
+    if name != TRACKING:
+        return ChosenScore(plugins.score(name, robot.name, entry), gait)
+    if reference is not None:
+        return ChosenScore(tracking(read_reference(reference, robot), robot), gait)
+    random = Controller(design, draw_genomes(random_stream(seed, "repair"), (design.weights,)))
+    motion = simulated_reference(robot, first := gait or random, steps)
+    # A pose that is reached is nothing to follow.
+    if np.ptp(motion.positions[len(motion.time) // 2 :], axis=0).max() < LEAST_MOTION:
+        raise InputError(
+            "the first controller, which has random weights, moves the joints into a pose and "
+            "stops, so there is no motion to follow: give --controller cpg, whose motion goes on, "
+            "another --seed, or --reference FILE"
+        )
+    return ChosenScore(tracking(motion, robot), first)
 
 
-def _same_bits(best: Hypothesis, truth: Hypothesis, trial: Trial, simulator: Simulator) -> bool:
-    controller = trial.plan.controller
-    runs = [(best, controller), (truth, controller)]
-    behaviour = simulator.run(runs, trial.behaviour.steps, SIGNALS).behaviour
-    return all(np.array_equal(*behaviour[signal]) for signal in SIGNALS)
+def _limited(name: str, limits: Sequence[float | None]) -> Score:
+    """Returns the score ``upright`` with limits of speed, torque and depth; None for no limit."""
+    options = {
+        "--max-joint-speed": "above 0 rad/s",
+        "--max-joint-torque": "above 0 N m",
+        "--max-self-collision": "of 0 m or above",
+    }
+    if name != UPRIGHT.name:
+        raise InputError(
+            f"{', '.join(options)} are limits of --score {UPRIGHT.name}, got {name}: leave them out"
+        )
+    for (option, allowed), limit in zip(options.items(), limits, strict=True):
+        is_depth = option == "--max-self-collision"
+        if limit is not None and not (limit > 0 or (is_depth and limit == 0)):
+            raise InputError(
+                f"expected {option} {allowed}, got {limit:g}: give the largest value that is "
+                f"allowed, or leave the option out"
+            )
+    return upright_within(*(math.inf if limit is None else limit for limit in limits))
+
+
+def check_score(name: str, entry: Entry) -> None:
+    """Checks that a robot has a score of that name.
+
+    Raises:
+        InputError: The name is unknown, the robot has no task with rewards, or the score is a
+            displacement and the base is fixed.
+    """
+    if name != TRACKING:
+        robot = entry.robot()
+        check_motion(plugins.score(name, robot.name, entry), robot)
+
+
+def check_motion(score: Score, robot: Robot) -> None:
+    """Checks that the base of a robot moves if its score is a displacement.
+
+    Raises:
+        InputError: The score is a displacement and the base is fixed.
+    """
+    if robot.has_fixed_base and score.needs_free_base:
+        raise InputError(
+            f"the base of {robot.name} is fixed, and the score {score.name} is a displacement of "
+            f"the base: give --score {TRACKING}, with --reference FILE for a joint trajectory to "
+            f"follow, or with --controller cpg alone for the motion of a random CPG"
+        )
+
+
+def read_reference(path: Path, robot: Robot) -> Reference:
+    """Returns the reference trajectory in a file, which begins at time 0.
+
+    Args:
+        path: A trial's log, or a table with a column ``time``, s, and columns with the names of
+            hinges, rad. Other columns are ignored.
+        robot: The robot that is to follow the trajectory.
+
+    Raises:
+        InputError: The file cannot be read, or has no column of the robot.
+    """
+    if path.suffix.lower() == ".mcap":
+        (log,) = read_logs([path])
+        behaviour = log.trial.behaviour
+        seen = np.isfinite(behaviour["joint_positions"])
+        columns = np.flatnonzero(seen.any(axis=0))
+        rows = seen[:, columns].all(axis=1)
+        hinges = tuple(behaviour.names.hinges[column] for column in columns)
+        time, positions = behaviour.time[rows], behaviour["joint_positions"][rows][:, columns]
+    elif is_table(path):
+        table = read_table(path, (TIME, *robot.anatomy.hinges)).series[TABLE]
+        hinges = tuple(name for name in robot.anatomy.hinges if name in table.columns)
+        if TIME not in table.columns or not hinges:
+            raise InputError(
+                f"{path}: expected a column {TIME} and columns with names of joints of "
+                f"{robot.name} ({', '.join(robot.anatomy.hinges)}), got "
+                f"{', '.join(table.names) or 'none'}: rename its columns"
+            )
+        time = table.columns[TIME].values[:, 0]
+        positions = np.concatenate([table.columns[name].values for name in hinges], axis=1)
+    else:
+        raise InputError(
+            f"{path}: expected a log (.mcap) or a table ({', '.join(FORMATS)}) as reference"
+        )
+    try:
+        return Reference(hinges, time - time[:1], positions)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def simulated_reference(robot: Robot, driver: CommandSource, steps: int) -> Reference:
+    """Returns the joint trajectory of a controller of the healthy robot in simulation."""
+    run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, ["joint_positions"]).behaviour
+    return Reference(run.names.hinges, run.time, run["joint_positions"][0])

@@ -1,6 +1,7 @@
 """Figures of studies, with numbers of runs in them, in the style of one file: PNG, PDF and SVG."""
 
 import io
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,7 +14,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
@@ -31,24 +31,21 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#3
 Source: M. Okabe and K. Ito, *Color Universal Design* (2008).
 """
 
-Style = dict[str, Any]
-"""Arguments of matplotlib."""
-
 MARKERS = "osD^v<P*"
 """Markers of methods, one more than colours, so that no pair recurs soon."""
+
+Style = dict[str, Any]
+"""Arguments of matplotlib."""
 
 REFERENCE: Style = {"color": "0.35", "linestyle": "--", "linewidth": 1.0}
 
 SLOT = 0.8
 """Width of all lines of one case in Figure 5; the distance between two cases is 1."""
 
-SIDE = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).T
-"""Right, up and towards the viewer in a picture from the side, the columns, ``(3, 3)``."""
+VIEWS = {"from the side": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).T, "from above": np.eye(3)}
+"""Right, up and towards the viewer of a picture, the columns, ``(3, 3)``."""
 
-ABOVE = np.eye(3)
-"""Right, up and towards the viewer in a picture from above."""
-
-CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 TURNS = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
@@ -67,25 +64,23 @@ def files_of(name: str, figure: Figure) -> dict[str, bytes]:
         name: Name of the files without an extension.
         figure: The figure.
     """
-    found = {}
+    files = {}
     with figure_style():
         for suffix, date in (("png", None), ("pdf", "CreationDate"), ("svg", "Date")):
             data = io.BytesIO()
             figure.savefig(data, format=suffix, metadata={date: None} if date else None)
-            found[f"{name}.{suffix}"] = data.getvalue()
-    return found
+            files[f"{name}.{suffix}"] = data.getvalue()
+    return files
 
 
 def of_ablation(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
     """Returns the files of the figures of an ablation by their name; none without rows."""
     files = files_of("gap", by_gap(scores)) if rows else {}
     ends = _first_and_last(rows)
-    for robot in sorted({row["robot"] for row in rows}):
-        for trials in ends:
-            same = [row for row in rows if (row["robot"], row["trials"]) == (robot, trials)]
-            if same:
-                name = f"cases-{robot_key(robot)}-{trials}"
-                files |= files_of(name, by_case(robot, trials, same))
+    for (robot, trials), same in sorted(grouped(rows, "robot", "trials").items()):
+        if trials in ends:
+            name = f"cases-{robot_key(robot)}-{trials}"
+            files |= files_of(name, by_case(robot, trials, same))
     return files
 
 
@@ -98,43 +93,31 @@ def by_gap(scores: Sequence[Row]) -> Figure:
     robots, gaps, comparators = (
         sorted({score[name] for score in scores}) for name in ("robot", "gap", "comparator")
     )
-    shown = _first_and_last(scores)
-    figure = Figure(figsize=(1 + 4.2 * len(shown), 0.8 + 3.2 * len(robots)), layout="constrained")
-    panels = figure.subplots(len(robots), len(shown), sharex=True, sharey=True, squeeze=False)
-    spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
-    handles: dict[str, Any] = {}
-    for (i, robot), (j, trials) in ((r, t) for r in enumerate(robots) for t in enumerate(shown)):
-        axes = panels[i, j]
-        for k, comparator in enumerate(comparators):
-            key = robot, comparator, trials
-            line = [s for s in scores if (s["robot"], s["comparator"], s["trials"]) == key]
-            if line:
-                shift = spread * (k - (len(comparators) - 1) / 2)
-                handles[comparator] = _errorbars(
-                    axes,
-                    [score["gap"] + shift for score in line],
-                    [score["correct"].estimate for score in line],
-                    [(score["correct"].low, score["correct"].high) for score in line],
-                    k,  # the same look in panels without all comparators
-                )
-        axes.set_title(f"{robot}, {counted_trials(trials)}")
-        axes.set_ylim(-0.03, 1.03)
-        axes.set_xticks(gaps)
-        axes.grid(axis="y")
-        axes.tick_params(labelbottom=True)
-    for axes in panels[-1]:
-        axes.set_xlabel("reality gap")
-    figure.supylabel("right diagnoses (95 % interval)")
     counts = {
         name: counts_text(one["runs"] for one in scores if one["comparator"] == name)
         for name in comparators
     }
-    figure.legend(
-        [handles[name] for name in comparators],
-        [f"{name} ({counts[name]})" for name in comparators],
-        loc="outside lower center",
-        ncols=min(2, len(comparators)),
+    ends = _first_and_last(scores)
+    figure, panels = _panels(
+        len(robots) * len(ends), len(ends), size=(4.2, 3.2), margin=(1, 0.8), share=True
     )
+    lines = grouped(scores, "robot", "trials", "comparator")
+    spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
+    for axes, (robot, trials) in zip(panels, itertools.product(robots, ends), strict=True):
+        for number, name in enumerate(comparators):  # the same look in panels without all of them
+            points = [
+                (score["gap"] + spread * (number - (len(comparators) - 1) / 2), score["correct"])
+                for score in lines.get((robot, trials, name), [])
+            ]
+            if points:
+                ends_of = [(x, one.estimate, one.low, one.high) for x, one in points]
+                _errorbars(axes, ends_of, number, label=f"{name} ({counts[name]})")
+        axes.set(title=f"{robot}, {counted_trials(trials)}", ylim=(-0.03, 1.03), xticks=gaps)
+        axes.grid(axis="y")
+    for axes in panels[-len(ends) :]:
+        axes.set_xlabel("reality gap")
+    figure.supylabel("right diagnoses (95 % interval)")
+    _legend(figure, columns=min(2, len(comparators)))
     return figure
 
 
@@ -153,10 +136,9 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
     labels = [f"{name} ({counts_text(counts[name])})" for name in comparators]
     figure, panels = _panels(
         len(gaps),
-        width=0.4 + 0.42 * len(cases),
-        height=0.8 + 0.36 * len(comparators),
+        size=(0.4 + 0.42 * len(cases), 0.8 + 0.36 * len(comparators)),
         margin=(1.2 + 0.09 * max(map(len, labels)), 0.6),
-        sharey=True,
+        share="y",
     )
     for axes, gap in zip(panels, gaps, strict=True):
         shares = frame[frame["gap"] == gap].pivot_table(
@@ -172,67 +154,56 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
         axes.set_xticks(range(len(cases)), cases)
         axes.set_yticks(range(len(comparators)), labels)
         axes.spines[:].set_visible(False)
-        axes.set_title(f"gap {gap:g}", fontsize=10)
-        axes.set_xlabel("case")
+        axes.set(title=f"gap {gap:g}", xlabel="case")
     figure.suptitle(f"{robot}, {counted_trials(trials)}: right diagnoses, %")
     return figure
 
 
-def of_comparisons(found: pd.DataFrame) -> dict[str, bytes]:
+def of_comparisons(comparisons: pd.DataFrame) -> dict[str, bytes]:
     """Returns the files of a figure of paired differences per robot, over all conditions."""
-    shown = whole(found)
+    shown = whole(comparisons)
     files: dict[str, bytes] = {}
-    for robot in dict.fromkeys(table[0] for table in shown.get("table", ())):
-        own = shown[[table[0] == robot for table in shown["table"]]]
-        files |= files_of(f"differences-{robot_key(robot)}", paired_differences(own))
+    if len(shown):
+        for robot, own in shown.groupby(shown["table"].map(lambda table: table[0]), sort=False):
+            files |= files_of(f"differences-{robot_key(robot)}", paired_differences(own))
     return files
 
 
 @figure_style()
-def paired_differences(found: pd.DataFrame) -> Figure:
+def paired_differences(comparisons: pd.DataFrame) -> Figure:
     """Returns the mean paired difference of every pair of methods, a panel per table.
 
     A filled marker is a difference that the corrected tests call better; the intervals are not
     corrected. The labels have the number n of runs that both methods have.
 
     Args:
-        found: Comparisons of one or several tables; at least one.
+        comparisons: Comparisons of one or several tables; at least one.
     """
-    own = {
-        table: found[[one == table for one in found["table"]]].sort_values(
-            "difference", kind="stable"
-        )
-        for table in dict.fromkeys(found["table"])
-    }
+    tables = comparisons.sort_values("difference", kind="stable").groupby("table", sort=False)
     minus = "\N{MINUS SIGN}"
-    labels = {
-        table: [f"{one.first} {minus} {one.second} (n = {one.n})" for one in rows.itertuples()]
-        for table, rows in own.items()
-    }
-    longest = max(len(label) for one in labels.values() for label in one)
+    names = comparisons["first"] + f" {minus} " + comparisons["second"]
     # Proportions have one scale; metres and ratios do not.
-    is_shared = bool((found[["difference_low", "difference_high"]].abs() <= 1).all(axis=None))
+    ends = comparisons[["difference_low", "difference_high"]]
     figure, panels = _panels(
-        len(own),
-        width=3.2 + 0.068 * longest,
-        height=0.7 + 0.21 * max(map(len, own.values())),
-        margin=(0.0, 0.5),
-        sharex=is_shared,
+        len(tables),
+        size=(3.7 + 0.068 * names.str.len().max(), 0.7 + 0.21 * tables.size().max()),
+        margin=(0.4, 0.5),
+        share="x" if (ends.abs() <= 1).all(axis=None) else False,
     )
-    for axes, (table, rows) in zip(panels, own.items(), strict=True):
+    for axes, (table, rows) in zip(panels, tables, strict=True):
         axes.axvline(0, color="0.3", linewidth=0.8)
-        for place, one in enumerate(rows.itertuples()):
-            colour = COLOURS[0] if one.better else "0.55"
-            ends = [one.difference_low, one.difference_high]
-            axes.plot(ends, [place, place], color=colour, linewidth=1.2)
-            face = colour if one.better else "white"
+        for place, row in enumerate(rows.itertuples()):
+            colour = COLOURS[0] if row.better else "0.55"
+            axes.plot(
+                [row.difference_low, row.difference_high], [place] * 2, color=colour, linewidth=1.2
+            )
+            face = colour if row.better else "white"
             style: Style = {"marker": "o", "markersize": 4.5, "markerfacecolor": face}
-            axes.plot([one.difference], [place], color=colour, **style)
-        axes.set_yticks(range(len(rows)), labels[table], fontsize=8)
-        axes.set_ylim(-0.7, len(rows) - 0.3)
+            axes.plot([row.difference], [place], color=colour, **style)
+        labels = [f"{row.first} {minus} {row.second} (n = {row.n})" for row in rows.itertuples()]
+        axes.set_yticks(range(len(rows)), labels, fontsize=8)
+        axes.set(title=", ".join(table), ylim=(-0.7, len(rows) - 0.3))
         axes.grid(axis="x")
-        axes.tick_params(labelbottom=True)
-        axes.set_title(", ".join(table))
     figure.supxlabel(
         "mean paired difference, first minus second, with 95 % interval; filled: better"
     )
@@ -255,45 +226,41 @@ def by_trial(
         grey: Cases by robot that the paper did not restore.
         restored: Function of the trials of a recovery to the values of its line.
     """
-    robots = list(dict.fromkeys(trial["robot"] for trial in trials))
-    comparators = list(dict.fromkeys(trial["comparator"] for trial in trials))
+    robots, comparators = (
+        list(dict.fromkeys(trial[name] for trial in trials)) for name in ("robot", "comparator")
+    )
     cases = sorted({trial["case"] for trial in trials})
     lines: dict[tuple[Any, ...], list[list[float]]] = {}
     for key, one in grouped(trials, "robot", "case", "comparator", "seed").items():
         lines.setdefault(key[:3], []).append(restored(one))
-    size = (1.8 + 0.75 * max(len(cases), 4), 0.9 + 2.6 * len(robots))
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(len(robots), 1, sharex=True, squeeze=False)[:, 0]
+    size = (1.8 + 0.75 * max(len(cases), 4), 2.6)
+    figure, panels = _panels(len(robots), 1, size=size, margin=(0, 0.9), share="x")
     width = SLOT / len(comparators)
     for axes, robot in zip(panels, robots, strict=True):
         for place, case in enumerate(cases):
             if case in grey[robot]:
                 axes.axvspan(place - 0.5, place + 0.5, color="0.9", zorder=0)
             for number, comparator in enumerate(comparators):
-                values = lines.get((robot, case, comparator), [])
-                values = [value for value in values if not np.isnan(value).any()]
-                if values:
+                values = np.array(lines.get((robot, case, comparator), []))
+                values = values[np.isfinite(values).all(axis=-1)]
+                if len(values):
                     middle = np.median(values, axis=0)
                     left = place - SLOT / 2 + number * width
                     x = left + width * (np.arange(len(middle)) + 0.75) / (len(middle) + 0.5)
-                    style = {**look(number), "markersize": 3.5}
-                    axes.plot(x, middle, **style, linewidth=1.2)
+                    style: Style = {**look(number), "markersize": 3.5}
+                    axes.plot(x, middle, **style, linewidth=1.2, label=comparator)
                     # The failing trial is an open marker.
                     axes.plot(x[:1], middle[:1], **style, markerfacecolor="white")
         axes.axhline(1, **REFERENCE)
-        axes.set_xlim(-0.5, len(cases) - 0.5)
         axes.set_xticks(range(len(cases)), [str(case) for case in cases])
-        axes.tick_params(labelbottom=True)
-        counts = [len(one) for key, one in lines.items() if key[0] == robot]
-        axes.set_title(f"{robot} ({counts_text(counts)} per line)")
-        axes.grid(axis="y", alpha=0.3)
+        counts = counts_text(len(one) for key, one in lines.items() if key[0] == robot)
+        axes.set(title=f"{robot} ({counts} per line)", xlim=(-0.5, len(cases) - 0.5))
+        axes.grid(axis="y")
     is_grey = any(case in grey[robot] for robot in robots for case in cases)
     legend = "; grey: not restored in the paper" if is_grey else ""
     panels[-1].set_xlabel(f"case of Table I{legend}")
-    figure.supylabel("displacement ÷ before the failure", fontsize=10)
-    handles = [panels[0].plot([], [], **look(number))[0] for number in range(len(comparators))]
-    columns = max(1, min(3, len(comparators)))
-    figure.legend(handles, comparators, loc="outside lower center", ncols=columns)
+    figure.supylabel("displacement ÷ before the failure")
+    _legend(figure, columns=min(3, len(comparators)))
     return figure
 
 
@@ -306,141 +273,122 @@ def by_cost(costs: Sequence[Row], band: str, reported: tuple[float, float, str])
         band: The way that is drawn as a line with a band.
         reported: Trials, restored function, and label of the paper's own number.
     """
-    robots = list(dict.fromkeys(cost["robot"] for cost in costs))
-    ways = [way for way in dict.fromkeys(cost["way"] for cost in costs) if way != band]
-    figure = Figure(figsize=(0.8 + 4.4 * len(robots), 4.0), layout="constrained")
-    panels = figure.subplots(1, len(robots), sharey=True, squeeze=False)[0]
+    robots, ways = (list(dict.fromkeys(cost[name] for cost in costs)) for name in ("robot", "way"))
+    others = [way for way in ways if way != band]
+    lines = grouped(costs, "robot", "way")
+    figure, panels = _panels(len(robots), len(robots), size=(4.4, 4.0), margin=(0.8, 0), share="y")
     for axes, robot in zip(panels, robots, strict=True):
-        own = [cost for cost in costs if cost["robot"] == robot]
-        for number, way in enumerate(ways):
-            line = [cost for cost in own if cost["way"] == way]
-            shift = 1 + 0.06 * (number - (len(ways) - 1) / 2)
-            _errorbars(
-                axes,
-                [shift * cost["physical_trials"] for cost in line],
-                [cost["recovery"] for cost in line],
-                [(cost["low"], cost["high"]) for cost in line],
-                number,
-                label=way,
-                linewidth=1.2,
+        for number, way in enumerate(others):
+            shift = 1 + 0.06 * (number - (len(others) - 1) / 2)
+            points = [
+                (shift * cost["physical_trials"], cost["recovery"], cost["low"], cost["high"])
+                for cost in lines.get((robot, way), [])
+            ]
+            _errorbars(axes, points, number, label=way, linewidth=1.2)
+        if control := lines.get((robot, band)):
+            table = pd.DataFrame(control).sort_values("physical_trials")
+            x, low, middle, high = (
+                table[name] for name in ("physical_trials", "low", "recovery", "high")
             )
-        line = sorted((c for c in own if c["way"] == band), key=lambda c: c["physical_trials"])
-        if line:
-            x = [cost["physical_trials"] for cost in line]
-            middle = [cost["recovery"] for cost in line]
             axes.plot(x, middle, color="black", label="evolution on the robot")
-            ends = ([cost[end] for cost in line] for end in ("low", "high"))
-            axes.fill_between(x, *ends, color="black", alpha=0.12, linewidth=0)
-        star: Style = {
-            "marker": "*",
-            "markersize": 11,
-            "markerfacecolor": "white",
-            "color": "black",
-        }
-        axes.plot([reported[0]], [reported[1]], linestyle="none", label=reported[2], **star)
+            axes.fill_between(x, low, high, color="black", alpha=0.12, linewidth=0)
+        star: Style = {"marker": "*", "markersize": 11, "markerfacecolor": "white"}
+        axes.plot(*reported[:2], color="black", linestyle="none", label=reported[2], **star)
         axes.axhline(1, **REFERENCE)
-        axes.set_xscale("log")
-        axes.set_xlim(0.8, 2 * reported[0])
+        axes.set(xscale="log", xlim=(0.8, 2 * reported[0]))
         axes.set_xticks([1, 3, 10, 100, 1000], ["1", "3", "10", "100", "1,000"])
         axes.minorticks_off()
         axes.set_xlabel("physical trials after the failing one")
-        axes.set_title(f"{robot} ({counts_text(cost['runs'] for cost in own)})")
-        axes.grid(axis="y", alpha=0.3)
+        counts = counts_text(cost["runs"] for cost in costs if cost["robot"] == robot)
+        axes.set_title(f"{robot} ({counts})")
+        axes.grid(axis="y")
     panels[0].set_ylabel("displacement ÷ before the failure")
-    legend = panels[0].get_legend_handles_labels()
-    figure.legend(*legend, loc="outside lower center", ncols=len(robots))
+    _legend(figure, columns=len(robots))
     return figure
 
 
 @figure_style()
 def robots(shown: Sequence[Robot]) -> Figure:
     """Returns Figure 1: a row per robot in its standing pose, with its joints and sensors."""
-    figure = Figure(figsize=(8.4, 0.7 + 2.5 * len(shown)), layout="constrained")
-    panels = figure.subplots(len(shown), 2, squeeze=False)
-    for row, robot in zip(panels, shown, strict=True):
+    figure, panels = _panels(2 * len(shown), size=(4.2, 2.5), margin=(0, 0.7), share=False)
+    for axes, (robot, view) in zip(panels, itertools.product(shown, VIEWS), strict=True):
+        _draw_robot(axes, robot, VIEWS[view])
         anatomy = robot.anatomy
-        data = mujoco.MjData(robot.model)
-        mujoco.mj_forward(robot.model, data)
-        for axes, plane, view in ((row[0], SIDE, "from the side"), (row[1], ABOVE, "from above")):
-            _draw_robot(axes, robot, data, plane)
-            axes.set_title(f"{robot.name}, {view}", fontsize=10)
-        row[0].set_xlabel(
-            f"{len(anatomy.joints)} joints, {len(anatomy.names.hinges)} degrees of freedom, "
-            f"{len(anatomy.names.sensors)} sensors",
-            fontsize=9,
+        parts = (
+            f"{len(anatomy.joints)} joints, {len(anatomy.hinges)} degrees of freedom, "
+            f"{len(anatomy.sensors)} sensors"
         )
-        row[1].set_xlabel("forward is to the right; m", fontsize=9)
-    legend = panels[0, 0].get_legend_handles_labels()
-    figure.legend(*legend, loc="outside lower center", ncols=3)
+        axes.set_title(f"{robot.name}, {view}")
+        axes.set_xlabel(
+            parts if view == "from the side" else "forward is to the right; m", fontsize=9
+        )
+    _legend(figure, columns=3)
     return figure
 
 
-def _draw_robot(axes: Axes, robot: Robot, data: mujoco.MjData, plane: FloatArray) -> None:
+def _draw_robot(axes: Axes, robot: Robot, plane: FloatArray) -> None:
     """Draws the outlines of the geoms, the farthest first, and the joints and sensors."""
-    model = robot.model
+    model, data = robot.model, mujoco.MjData(robot.model)
+    mujoco.mj_forward(model, data)
     bodies = np.flatnonzero(model.geom_bodyid > 0)
-    order = np.argsort(data.geom_xpos[bodies] @ plane[:, 2])
-    for depth, geom in enumerate(bodies[order], start=2):
-        points = _points(model, data, int(geom), plane)
+    for geom in bodies[np.argsort(data.geom_xpos[bodies] @ plane[:, 2])]:
+        points = _outline(model, data, int(geom), plane[:, :2])
         colour = "0.78" if model.body_parentid[model.geom_bodyid[geom]] == 0 else "0.92"
         outline = points[ConvexHull(points).vertices].T
-        axes.fill(*outline, facecolor=colour, edgecolor="0.25", linewidth=0.6, zorder=depth)
-    sensors = robot.anatomy.sensors
-    hinges = [joint.hinges[0] for joint in robot.anatomy.joints]
-    angles = [sensor.hinge for sensor in sensors if sensor.kind == "angle"]
-    touch = [model.sensor(one.name).objid[0] for one in sensors if one.kind == "touch"]
+        axes.fill(*outline, facecolor=colour, edgecolor="0.25", linewidth=0.6, zorder=2)
+    anatomy = robot.anatomy
     ring: Style = {"markersize": 9.5, "markerfacecolor": "none", "markeredgewidth": 1.3}
-    drawn: tuple[tuple[list[FloatArray], Style, str], ...] = (
-        (
-            [data.joint(name).xanchor for name in hinges],
+    places: dict[str, tuple[list[FloatArray], Style]] = {
+        "joint": (
+            [data.joint(joint.hinges[0]).xanchor for joint in anatomy.joints],
             {"marker": "o", "color": COLOURS[1], "markersize": 4.5},
-            "joint",
         ),
-        (
-            [data.joint(name).xanchor for name in angles],
+        "angle sensor": (
+            [data.joint(one.hinge).xanchor for one in anatomy.sensors if one.kind == "angle"],
             {**ring, "marker": "o", "color": COLOURS[0]},
-            "angle sensor",
         ),
-        (
-            [data.site_xpos[site] for site in touch],
+        "touch sensor": (
+            [
+                data.site_xpos[model.sensor(one.name).objid[0]]
+                for one in anatomy.sensors
+                if one.kind == "touch"
+            ],
             {**ring, "marker": "^", "color": COLOURS[2]},
-            "touch sensor",
         ),
-    )
-    for positions, style, label in drawn:
+    }
+    for label, (positions, style) in places.items():
         x, y = (np.array(positions).reshape(-1, 3) @ plane[:, :2]).T
-        axes.add_line(Line2D(x, y, linestyle="none", label=label, zorder=1000, **style))
+        axes.plot(x, y, linestyle="none", label=label, zorder=3, **style)
     axes.set_aspect("equal")
     axes.margins(0.08)
 
 
-def _points(model: mujoco.MjModel, data: mujoco.MjData, geom: int, plane: FloatArray) -> FloatArray:
-    """Returns points in a plane, the convex hull of which is the outline of a geom, ``(n, 2)``, m.
+def _outline(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, plane: FloatArray
+) -> FloatArray:
+    """Returns points in a plane, whose convex hull is the outline of a geom, ``(n, 2)``, m.
 
     Capsules and spheres are exact, other geoms are drawn as their bounding boxes.
     """
-    rotation, centre = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
-    if kind in (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_SPHERE):
-        half = rotation[:, 2] * (size[1] if kind == mujoco.mjtGeom.mjGEOM_CAPSULE else 0.0)
-        ends = np.stack([centre - half, centre + half]) @ plane[:, :2]
-        found: FloatArray = (ends[:, None] + size[0] * CIRCLE).reshape(-1, 2)
-        return found
-    middle, reach = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-    corners: FloatArray = (centre + (middle + CORNERS * reach) @ rotation.T) @ plane[:, :2]
-    return corners
+    is_capsule = kind == mujoco.mjtGeom.mjGEOM_CAPSULE
+    if is_round := is_capsule or kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        local = np.array([(0, 0, -1), (0, 0, 1)]) * (size[1] if is_capsule else 0.0)
+    else:
+        local = model.geom_aabb[geom, :3] + CORNERS * model.geom_aabb[geom, 3:]
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    points: FloatArray = (data.geom_xpos[geom] + local @ rotation.T) @ plane
+    return (points[:, None] + size[0] * CIRCLE).reshape(-1, 2) if is_round else points
 
 
-def look(number: int) -> dict[str, Any]:
+def look(number: int) -> Style:
     """Returns colour and marker of a method by its number, as arguments of matplotlib."""
     return {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
 
 
 def counts_text(counts: Iterable[int]) -> str:
     """Returns the smallest and the largest of some numbers of runs: n = 4, or n = 4 to 12."""
-    ordered = sorted(counts)
-    if not ordered:
-        return "n = 0"
+    ordered = sorted(counts) or [0]
     low, high = ordered[0], ordered[-1]
     return f"n = {low}" if low == high else f"n = {low} to {high}"
 
@@ -452,37 +400,51 @@ def _first_and_last(rows: Sequence[Row]) -> list[int]:
 
 def _errorbars(
     axes: Axes,
-    x: Sequence[float],
-    y: Sequence[float],
-    ends: Sequence[tuple[float, float]],
+    points: Sequence[tuple[float, float, float, float]],
     number: int,
     **style: Any,  # noqa: ANN401  # of matplotlib
-) -> Any:  # noqa: ANN401  # a container of matplotlib
-    """Draws estimates with the ends of their intervals, in the look of a method."""
-    middle, limits = np.array(y), np.array(ends).reshape(-1, 2).T
+) -> None:
+    """Draws estimates with the ends of their intervals, x, y, low and high, in a method's look."""
+    x, y, low, high = np.array(points).reshape(-1, 4).T
     # An interval may end a rounding error inside its estimate.
-    bars = np.maximum([middle - limits[0], limits[1] - middle], 0)
+    bars = np.maximum([y - low, high - y], 0)
     drawn = {"markersize": 5, "capsize": 2, "elinewidth": 0.8, **look(number), **style}
-    return axes.errorbar(x, middle, yerr=bars, **drawn)
+    axes.errorbar(x, y, yerr=bars, **drawn)
 
 
 def _panels(
     count: int,
+    columns: int = 2,
     *,
-    width: float,
-    height: float,
+    size: tuple[float, float],
     margin: tuple[float, float],
-    sharex: bool = False,
-    sharey: bool = False,
+    share: Any,  # noqa: ANN401  # of matplotlib
 ) -> tuple[Figure, list[Axes]]:
-    """Returns a figure with panels in two columns, as many as are needed, sizes in inches."""
-    across = min(2, count)
-    down = math.ceil(count / across)
-    size = (margin[0] + across * width, margin[1] + down * height)
-    figure = Figure(figsize=size, layout="constrained")
-    panels = list(
-        figure.subplots(down, across, sharex=sharex, sharey=sharey, squeeze=False).flatten()
-    )
-    for axes in panels[count:]:
-        axes.set_visible(False)
+    """Returns a figure with panels; sizes and the margin around all of them in inches.
+
+    Args:
+        count: Number of panels.
+        columns: Number of columns, if there are as many panels.
+        size: Width and height of a panel.
+        margin: Width and height in addition to those of the panels.
+        share: Axes that panels share: ``x``, ``y``, True for both, or False.
+    """
+    rows, columns = math.ceil(count / columns), min(count, columns)
+    whole_size = (margin[0] + columns * size[0], margin[1] + rows * size[1])
+    figure = Figure(figsize=whole_size, layout="constrained")
+    sharex, sharey = (share in (way, True) for way in "xy")
+    panels = list(figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False).flat)
+    for number, axes in enumerate(panels):
+        axes.tick_params(labelbottom=True)
+        axes.set_visible(number < count)
     return figure, panels[:count]
+
+
+def _legend(figure: Figure, columns: int) -> None:
+    """Puts a legend of the labels of all panels below them."""
+    handles = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -16,18 +15,19 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import Self
+from typing import ParamSpec, TypeVar
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.files import make_folder
 from selfmodel.studies.cells import (
     CELL,
     UNFINISHED,
+    Answer,
     Cell,
     FinishedCell,
     compute,
@@ -37,28 +37,19 @@ from selfmodel.studies.cells import (
     read_cell,
 )
 
-AT_ONCE = 1000
-"""Cells that are submitted at a time to an executor of the caller: more than a cluster has workers,
-some of which come later."""
-
 ATTEMPTS = 2
-"""Attempts to compute a cell whose process exits; in the last one it is alone."""
+"""Attempts to compute a cell whose process ends."""
 
-CONNECT_SECONDS = 30
-"""Longest wait for the scheduler of a cluster, s."""
+CONNECT_SECONDS, PING_SECONDS = 30, 30
+"""Longest wait for an answer of a cluster's scheduler, and time between two questions, s."""
 
-Answer = tuple[float, str | None]
-"""Wall time of a cell, s, and the reason of its failure."""
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class GridBegins:
-    """Start or continuation of a grid.
-
-    Attributes:
-        total: Number of cells, with those that others need.
-        finished: Number of cells that were finished before, or that no other cell needs any more.
-    """
+    """Start of a grid: the number of all cells, and of those that need not be computed."""
 
     total: int
     finished: int
@@ -66,15 +57,7 @@ class GridBegins:
 
 @dataclass(frozen=True)
 class CellEnds:
-    """End of a cell.
-
-    Attributes:
-        name: Name of the cell.
-        number: Number of cells that have finished or failed so far.
-        total: Number of cells.
-        seconds: Wall time of the cell.
-        error: Reason of a failure; None for a finished cell.
-    """
+    """End of a cell: its number of the total, its wall time, s, and the reason of a failure."""
 
     name: str
     number: int
@@ -109,23 +92,216 @@ def run_grid(
         OSError: The folder cannot be written; all finished cells are kept.
         WorkError: The executor ended; all finished cells are kept.
     """
-    wanted = _with_needs(cells)
-    left = _unfinished(cells, _finished_here(folder, wanted.values()))
-    total, number = len(wanted), len(wanted) - len(left)
-    on_progress(GridBegins(total, number))
+    every = _with_needs(cells)
+    left = _unfinished(folder, cells, every)
+    number = len(every) - len(left)
+    on_progress(GridBegins(len(every), number))
     failures: list[CellEnds] = []
     if left:
         make_folder(folder)
-    ordered = {place: cell for place, cell in wanted.items() if place in left}
-    for cell, (seconds, error) in _computed(folder, ordered, executor, workers):
-        number += 1
-        end = CellEnds(cell.name, number, total, seconds, error)
-        failures += [end] if error is not None else []
-        on_progress(end)
-    for empty in (*(folder / UNFINISHED).glob("*"), folder / UNFINISHED):
-        with suppress(OSError):  # another command computes cells there
-            empty.rmdir()
+        for cell, (seconds, error) in _computed(folder, left, executor, workers):
+            number += 1
+            end = CellEnds(cell.name, number, len(every), seconds, error)
+            failures += [end] if error is not None else []
+            on_progress(end)
+    with suppress(OSError):  # another command computes cells there
+        (folder / UNFINISHED).rmdir()
     return tuple(failures)
+
+
+def _with_needs(cells: Iterable[Cell]) -> dict[str, Cell]:
+    """Returns cells and all that they need by their place, each once and after its needs."""
+    ordered: dict[str, Cell] = {}
+    for cell in cells:
+        if cell.place not in ordered:
+            ordered |= _with_needs(cell.needs.values())
+            ordered[cell.place] = cell
+    return ordered
+
+
+def _unfinished(folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]) -> dict[str, Cell]:
+    """Returns the cells to compute by their place.
+
+    A cell that only finished ones need is not computed; one that others need, and that lacks files,
+    is.
+
+    Raises:
+        InputError: A cell in the folder is damaged, or was made by other code than this.
+    """
+    made = [made_with(function) for function in {cell.function for cell in every.values()}]
+    known: dict[str, FinishedCell] = {}
+    for path in sorted(folder.glob(f"*/*/{CELL}")):
+        cell = read_cell(path)
+        if made and cell.made_with not in made:
+            raise InputError(
+                f"{path.parent} was made with {listed(cell.made_with)}, installed are "
+                f"{listed(made[0])}: a study is of one version of each; install those versions, "
+                f"or choose another folder"
+            )
+        known[path.parent.relative_to(folder).as_posix()] = cell
+    places: set[str] = set()
+    todo = [cell for cell in cells if cell.place not in known]
+    while todo:
+        place = (wanted := todo.pop()).place
+        if place not in places and not (place in known and known[place].has_files):
+            places.add(place)
+            todo += wanted.needs.values()
+    return {place: cell for place, cell in every.items() if place in places}
+
+
+def _computed(
+    folder: Path, cells: Mapping[str, Cell], given: Executor | None, workers: int
+) -> Iterator[tuple[Cell, Answer]]:
+    """Yields each cell with its answer, in order of completion.
+
+    Args:
+        folder: Folder of the study.
+        cells: The cells by their place; a need that is not among them is finished.
+        given: Executor of the caller, which gets every cell as soon as it can be computed; None for
+            processes, which get the first cells first: an interrupted study has whole runs.
+        workers: Number of the processes.
+    """
+    graph = TopologicalSorter(
+        {
+            place: {need.place for need in cell.needs.values()} & cells.keys()
+            for place, cell in cells.items()
+        }
+    )
+    graph.prepare()
+    limit = min(workers, len(cells)) if given is None else len(cells)
+    rank = {place: number for number, place in enumerate(cells)}
+    ready: list[str] = []
+    running: dict[Future[Answer], str] = {}
+    failed: set[str] = set()
+    with nullcontext(given) if given is not None else Processes(limit) as executor:
+        while graph.is_active():
+            ready = sorted([*ready, *graph.get_ready()], key=rank.__getitem__)
+            answers: dict[str, Answer] = {}
+            while ready and len(running) < limit:
+                cell = cells[place := ready.pop(0)]
+                if lost := [need.name for need in cell.needs.values() if need.place in failed]:
+                    answers[place] = 0.0, f"not computed: it needs {lost[0]}, which failed"
+                else:
+                    running[_submitted(executor, folder, cell)] = place
+            for future in wait(running, return_when=FIRST_COMPLETED).done if not answers else ():
+                place = running.pop(future)
+                answers[place] = _answer(future, folder, place)
+            for place, answer in answers.items():
+                graph.done(place)
+                failed |= set() if answer[1] is None else {place}
+                yield cells[place], answer
+
+
+def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]":
+    try:
+        return executor.submit(compute, folder, cell, dict(made_with(cell.function)))
+    except RuntimeError as error:  # of an executor that has ended
+        raise WorkError(
+            f"the executor takes no more cells ({error}): finished cells are kept; the same "
+            f"command continues"
+        ) from error
+
+
+def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
+    """Returns the answer of a call that has ended.
+
+    Raises:
+        InputError: The worker has other code than the command.
+        OSError: The worker cannot write into the folder.
+        WorkError: The executor has ended.
+    """
+    if future.cancelled():
+        raise WorkError(
+            "the executor has ended, such as the scheduler of a cluster: finished cells are kept; "
+            "start it, and the same command continues"
+        )
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, InputError | OSError):
+        raise error
+    line = " ".join(f"{type(error).__name__}: {error}".split())[:1000]
+    if isinstance(error, ImportError):
+        raise InputError(
+            f"a worker cannot import what computes a cell ({line}): install the same version of "
+            f"selfmodel there as here"
+        ) from error
+    reason = f"the executor failed to compute it: {line}"
+    keep_error(folder, place, reason)
+    return 0.0, reason
+
+
+class Processes(Executor):
+    """Processes of this machine; a call whose process ends is repeated once, in a new one.
+
+    The processes end with the ``with`` block.
+
+    Args:
+        workers: Number of processes.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._threads, self._of_thread = ThreadPoolExecutor(workers), threading.local()
+        self._others = set(multiprocessing.active_children())
+        self._has_ended, self._starts = False, threading.Lock()
+
+    def __exit__(self, *_: object) -> None:
+        with self._starts:
+            self._has_ended = True
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()  # a cell may take minutes, and its result would not be wanted
+        self._threads.shutdown()
+
+    def submit(
+        self, call: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs
+    ) -> "Future[_T]":
+        """Calls a function in one of the processes."""
+        return self._threads.submit(lambda: self._call(call, *args, **kwargs))
+
+    def _call(self, call: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        reason: object = None
+        for _ in range(ATTEMPTS):
+            with self._starts:  # none starts after the others were killed
+                if self._has_ended:
+                    break
+                if not hasattr(self._of_thread, "pool"):
+                    self._of_thread.pool = _one_process()
+                future: Future[_T] = self._of_thread.pool.submit(call, *args, **kwargs)
+            try:
+                return future.result()
+            except BrokenExecutor as error:
+                reason = error
+                del self._of_thread.pool
+        raise BrokenExecutor(f"its process ended in each of {ATTEMPTS} attempts: {reason}")
+
+
+def _one_process() -> ProcessPoolExecutor:
+    """Returns an executor of one process.
+
+    Python's resource tracker, which it needs, must not end with the terminal, by SIGHUP: started
+    again, it prints a traceback for each semaphore that it does not know.
+    """
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
+
+
+def _begin_worker() -> None:
+    """Prepares a worker process, which ends with the command, and by nothing else."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to workers as well
+    os.dup2(2, 1)  # standard output is for the results of the command
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+
+
+def _exit_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager
@@ -159,8 +335,8 @@ def dask_executor(address: str) -> Iterator[Executor]:
     # The connection itself has a timeout of its own, and is tried until that of the client ends.
     limits = dask.config.set({"distributed.comm.timeouts.connect": f"{CONNECT_SECONDS}s"})
     try:
-        with limits, ThreadPoolExecutor(1) as own:  # a notebook has an event loop in this thread
-            own.submit(asyncio.run, greet()).result()
+        with limits, ThreadPoolExecutor(1) as thread:  # a notebook has an event loop in this thread
+            thread.submit(asyncio.run, greet()).result()
             client = Client(place, timeout=CONNECT_SECONDS)
     except (OSError, ValueError, RuntimeError) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
@@ -168,217 +344,23 @@ def dask_executor(address: str) -> Iterator[Executor]:
             f"no Dask scheduler answers at {address} ({reason}): start one with `dask scheduler`, "
             f"and workers with `dask worker`, or correct the address"
         ) from error
-    with client:
+    ended = threading.Event()
+
+    def watch() -> None:
+        """Closes the client of a mute scheduler, which cancels all calls: TCP alone would wait."""
+        while not ended.wait(PING_SECONDS):
+            try:
+                client.sync(client.scheduler.identity, callback_timeout=CONNECT_SECONDS)  # type: ignore[union-attr]  # connected
+            except OSError:
+                client.close()
+                return
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    try:
         # A pure call of the same arguments would be answered with the error of the last one.
         yield client.get_executor(pure=False)
-
-
-def _with_needs(cells: Iterable[Cell]) -> dict[str, Cell]:
-    """Returns cells and all that they need by their place, each once and after its needs."""
-    found: dict[str, Cell] = {}
-    for cell in cells:
-        if cell.place not in found:
-            found |= _with_needs(cell.needs.values())
-            found[cell.place] = cell
-    return found
-
-
-def _finished_here(folder: Path, wanted: Iterable[Cell]) -> dict[str, FinishedCell]:
-    """Returns the finished cells in the folder of a study by their place.
-
-    Raises:
-        InputError: A cell is damaged, or was made by other code than this.
-    """
-    made = [dict(made_with(function)) for function in {cell.function for cell in wanted}]
-    found: dict[str, FinishedCell] = {}
-    for path in sorted(folder.glob(f"*/*/{CELL}")):
-        cell = read_cell(path)
-        if made and cell.made_with not in made:
-            raise InputError(
-                f"{path.parent} was made with {listed(cell.made_with)}, installed are "
-                f"{listed(made[0])}: a study is of one version of each; install those versions, "
-                f"or choose another folder"
-            )
-        found[path.parent.relative_to(folder).as_posix()] = cell
-    return found
-
-
-def _unfinished(cells: Iterable[Cell], known: Mapping[str, FinishedCell]) -> set[str]:
-    """Returns the places of the cells to compute.
-
-    A cell that only finished ones need is not computed; one that others need, and that lacks files,
-    is.
-    """
-    left: set[str] = set()
-    todo = [cell for cell in cells if cell.place not in known]
-    while todo:
-        cell = todo.pop()
-        is_there = cell.place in known and known[cell.place].has_files
-        if not is_there and cell.place not in left:
-            left.add(cell.place)
-            todo += cell.needs.values()
-    return left
-
-
-def _computed(
-    folder: Path, cells: Mapping[str, Cell], given: Executor | None, workers: int
-) -> Iterator[tuple[Cell, Answer]]:
-    """Yields each cell with its answer, in order of completion.
-
-    Args:
-        folder: Folder of the study.
-        cells: The cells to compute by their place, each after those that it needs; a need that is
-            not among them is finished.
-        given: Executor of the caller; None for processes.
-        workers: Number of the processes.
-    """
-    places = list(cells)
-    graph = TopologicalSorter(
-        {
-            place: {need.place for need in cell.needs.values()} & cells.keys()
-            for place, cell in cells.items()
-        }
-    )
-    graph.prepare()
-    number = {place: rank for rank, place in enumerate(places)}
-    ready: list[int] = []  # first cells first, so that an interrupted study has whole runs
-    alone: list[str] = []
-    running: dict[Future[Answer], str] = {}
-    exits: Counter[str] = Counter()
-    failed: set[str] = set()
-    with _Pool(given, min(workers, len(cells))) as pool:
-        while graph.is_active():
-            ready = sorted([*ready, *map(number.__getitem__, graph.get_ready())])
-            answers: dict[str, Answer] = {}
-            while ready and len(running) < pool.at_once:
-                place = places[ready.pop(0)]
-                needs = [need for need in cells[place].needs.values() if need.place in failed]
-                if needs:
-                    reason = f"not computed: it needs {needs[0].name}, which failed"
-                    answers[place] = 0.0, reason
-                    continue
-                running[pool.submit(folder, cells[place])] = place
-            if alone and not running:
-                place = alone.pop(0)
-                running[pool.submit(folder, cells[place])] = place
-            for future in wait(running, return_when=FIRST_COMPLETED).done if not answers else ():
-                if pool.is_broken_by(future):  # and with it are all other calls
-                    exits.update(running.values())
-                    alone += [place for place in running.values() if exits[place] < ATTEMPTS]
-                    answers |= {
-                        place: _crashed(future, folder, place)
-                        for place in running.values()
-                        if exits[place] == ATTEMPTS
-                    }
-                    running.clear()
-                    break
-                place = running.pop(future)
-                answers[place] = _answer(future, folder, place)
-            for place, answer in answers.items():
-                graph.done(place)
-                failed |= set() if answer[1] is None else {place}
-                yield cells[place], answer
-
-
-def _crashed(future: "Future[Answer]", folder: Path, place: str) -> Answer:
-    reason = f"its process ended in each of {ATTEMPTS} attempts: {future.exception()}"
-    return 0.0, keep_error(folder, place, reason)
-
-
-def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
-    """Returns the answer of a call that has ended.
-
-    Raises:
-        InputError: The worker has other code than the command.
-        OSError: The worker cannot write into the folder.
-        WorkError: The executor has ended.
-    """
-    if future.cancelled():
-        raise WorkError(
-            "the executor has ended, such as the scheduler of a cluster: finished cells are kept; "
-            "start it, and the same command continues"
-        )
-    error = future.exception()
-    if error is None:
-        return future.result()
-    if isinstance(error, InputError | OSError):
-        raise error
-    line = " ".join(f"{type(error).__name__}: {error}".split())[:1000]
-    if isinstance(error, ImportError):
-        raise InputError(
-            f"a worker cannot import what computes a cell ({line}): install the same version of "
-            f"selfmodel there as here"
-        ) from error
-    return 0.0, keep_error(folder, place, f"the executor failed to compute it: {line}")
-
-
-class _Pool:
-    """Processes, replaced when one exits, or the executor of the caller.
-
-    Attributes:
-        at_once: Number of cells to submit at a time.
-    """
-
-    def __init__(self, given: Executor | None, workers: int) -> None:
-        self._given, self._workers, self._pool = given, workers, given
-        self.at_once = workers if given is None else AT_ONCE
-        self._others = set(multiprocessing.active_children())
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: object, *_error: object) -> None:
-        if self._given is not None or self._pool is None:
-            return
-        self._pool.shutdown(wait=kind is None, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - self._others:
-            process.kill()  # a cell may take minutes, and its result would not be wanted
-
-    def submit(self, folder: Path, cell: Cell) -> "Future[Answer]":
-        if self._pool is None:
-            _start_resource_tracker()
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(self._workers, context, _begin_worker)
-        try:
-            return self._pool.submit(compute, folder, cell, dict(made_with(cell.function)))
-        except RuntimeError as error:  # of an executor that has ended
-            raise WorkError(
-                f"the executor takes no more cells ({error}): finished cells are kept; the same "
-                f"command continues"
-            ) from error
-
-    def is_broken_by(self, future: "Future[Answer]") -> bool:
-        """Returns whether a process of the pool exited; a new pool then takes its place."""
-        if self._given is not None or future.cancelled():
-            return False
-        if not isinstance(future.exception(), BrokenExecutor):
-            return False
-        self._pool = None
-        return True
-
-
-def _start_resource_tracker() -> None:
-    """Starts Python's resource tracker so that a terminal that closes does not end it.
-
-    It ignores SIGINT and SIGTERM by itself; ended by SIGHUP, it is started again, and prints a
-    traceback for each semaphore that it does not know.
-    """
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
-    try:
-        resource_tracker.ensure_running()
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-def _begin_worker() -> None:
-    """Prepares a worker process, which ends with the command, and by nothing else."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to workers as well
-    os.dup2(2, 1)  # standard output is for the results of the command
-    threading.Thread(target=_exit_with_parent, daemon=True).start()
-
-
-def _exit_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+        ended.set()
+        watching.join()  # two calls of close at a time would mix
+        client.close()

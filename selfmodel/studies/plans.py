@@ -2,7 +2,8 @@
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,8 +21,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
-from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, robot_key
-from selfmodel.studies.scores import check_score
+from selfmodel.studies.experiment import check_score
+from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, repair_parameters, robot_key
 from selfmodel.studies.study import Point, Study
 from selfmodel.tasks import ROBOTS, suite_bodies
 
@@ -109,12 +110,13 @@ def ablation(
         only: Share of the runs.
 
     Raises:
-        InputError: The definition is invalid, or the bank lacks a gait.
+        InputError: The definition is invalid.
     """
-    chosen = _checked_repair(repair, search, score)
+    chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
-    _check_ablation(lists, cases, damages, settings.trials, next_trial)
-    if bank is not None and next_trial == BANK and repair != plugins.PAPER:
+    _check_lists(lists, cases, damages)
+    _check_trials(next_trial, settings.trials, gaps)
+    if bank is not None and by_bank and repair != plugins.PAPER:
         raise InputError(
             f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
             f"--repair {repair}: leave one of them out, or give --next-trial repair"
@@ -122,50 +124,39 @@ def ablation(
     failures = {robot: _failures(robot, cases, damages, kinds) for robot in robots}
     for robot in robots:
         check_score(chosen["score"], robot_entry(robot))
-    runs: list[dict[str, Any]] = [
-        {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed}
+    runs = [
+        _point(robot, case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
         for case, truth in failures[robot]
         for gap in gaps
     ][only[0] - 1 :: only[1]]
-    models = {robot: recoveries.planned(robot) for robot in {run["robot"] for run in runs}}
-    count = max(HEALTHY_TRIALS, settings.trials) if next_trial == BANK else 1
-    wanted = {(run["robot"], k) for run in runs for k in _gait_numbers(run["seed"], count)}
-    gaits = {
-        (robot, number): recoveries.gait_cell(models[robot], settings, number, chosen)
-        if bank is None
-        else recoveries.given_gait_cell(bank, models[robot], number)
-        for robot, number in sorted(wanted)
-    }
-    if next_trial != BANK:  # the trials of a recovery exclude the failing one
-        settings = dataclasses.replace(settings, trials=settings.trials - 1)
-    evolves = bank is None or next_trial != BANK
+    count = max(HEALTHY_TRIALS, settings.trials) if by_bank else 1
+    # The trials of a recovery exclude the failing one.
+    trials = settings.trials if by_bank else settings.trials - 1
     shared = {
-        **_shared(settings, kinds, chosen, next_trial=next_trial),
-        "evolves": evolves,
+        **_shared(dataclasses.replace(settings, trials=trials), kinds, chosen, next_trial),
+        "evolves": bank is None or not by_bank,
     }
+
+    @cache
+    def gait(robot: str, number: int) -> Cell:
+        model = recoveries.planned(robot)
+        if bank is None:
+            return recoveries.gait_cell(model, settings, number, chosen)
+        return recoveries.given_gait_cell(bank, model, number)
 
     def needs(point: Point) -> dict[str, Cell]:
-        own = [gaits[point["robot"], number] for number in _gait_numbers(point["seed"], count)]
-        if next_trial != BANK:
-            return {"gait": own[0]}
-        named = {f"gait-{number}": gait for number, gait in enumerate(own)}
+        gaits = [gait(point["robot"], (point["seed"] + trial) % GAITS) for trial in range(count)]
+        if not by_bank:
+            return {"gait": gaits[0]}
         run = {name: value for name, value in point.items() if name != "comparator"}
-        parameters = {**run, "shared": shared}
+        named = {f"gait-{number}": one for number, one in enumerate(gaits)}
         function = f"{recoveries.__name__}:run_trials"
-        return {"trials": Cell(function, _run_name(run), parameters, named, "trials")}
+        return {"trials": Cell(function, _name(run), {**run, "shared": shared}, named, "trials")}
 
-    points = {
-        f"{_run_name(run)}-{_plain(comparator)}": {
-            **models[run["robot"]],
-            **run,
-            "comparator": comparator,
-        }
-        for run in runs
-        for comparator in comparators
-    }
-    function = "diagnose" if next_trial == BANK else "recover"
-    return Study("ablate", folder, f"{recoveries.__name__}:{function}", points, shared, needs)
+    points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
+    function = "diagnose" if by_bank else "recover"
+    return _study("ablate", folder, points, shared, needs, function=function)
 
 
 def suite(
@@ -209,51 +200,25 @@ def suite(
     """
     comparator_choice(comparator)
     plugins.kinds(kinds)
-    chosen = _checked_repair(repair, search, score)
-    _check_keys(bodies)
-    entries = {body: robot_entry(body) for body in bodies}
-    hidden = {}
-    for body, entry in entries.items():
-        hidden[body] = plugins.design(controller, entry.robot(), neurons).hidden
-        check_score(chosen["score"], entry)
-    _check_gaps([gap])
+    chosen = repair_parameters(repair, search, score)
     known = known_cases(bodies)
     for case in cases:
         if case not in known:
             raise unknown_name("case of these bodies", str(case), map(str, known))
-    points, gaits = {}, {}
+    design = {"controller": controller, "neurons": neurons}
+    points: list[Point] = []
     for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
-        model = recoveries.planned(body)
-        gaits[body, seed] = recoveries.gait_cell(
-            model, settings, seed, chosen, controller=controller, neurons=neurons
-        )
+        entry = robot_entry(body)
+        check_score(chosen["score"], entry)
+        robot = entry.robot()
+        hidden = plugins.design(controller, robot, neurons).hidden
         for case in cases:
-            truth = entries[body].cases.get(case)
-            anatomy = entries[body].robot().anatomy
+            truth = entry.cases.get(case)
             # Controllers without hidden neurons have none that could fail.
-            if (
-                truth is None
-                or max(silent_neurons(parse(truth, anatomy)), default=-1) >= hidden[body]
-            ):
-                continue
-            point = {"case": case, "truth": truth, "gap": gap, "seed": seed}
-            name = f"{robot_key(body)}-case{case:02d}-seed{seed:03d}"
-            points[name] = {**model, **point, "comparator": comparator}
-    shared = {
-        **_shared(settings, kinds, chosen),
-        "controller": controller,
-        "neurons": neurons,
-        "comparator": comparator,
-        "gap": gap,
-    }
-    return Study(
-        "suite",
-        folder,
-        f"{recoveries.__name__}:recover",
-        points,
-        shared,
-        lambda point: {"gait": gaits[point["robot"], point["seed"]]},
-    )
+            if truth and max(silent_neurons(parse(truth, robot.anatomy)), default=-1) < hidden:
+                points.append(_point(body, case, truth, gap, seed, comparator=comparator))
+    shared = {**_shared(settings, kinds, chosen), **design, "comparator": comparator, "gap": gap}
+    return _study("suite", folder, points, shared, _one_gait(settings, chosen, **design))
 
 
 def paper(
@@ -291,32 +256,129 @@ def paper(
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
         comparator_choice(comparator)
-    chosen = _checked_repair(plugins.PAPER, None, None)
-    models = {robot: recoveries.planned(robot) for robot in robots}
-    gaits = {
-        (robot, seed): recoveries.gait_cell(models[robot], settings, seed, chosen)
-        for seed, robot in itertools.product(seeds, robots)
-    }
-    points = {
-        f"{robot}-case{case:02d}-seed{seed:03d}-{_plain(way)}": {
-            **models[robot],
-            "case": case,
-            "truth": ROBOTS[robot].cases[case],
-            "gap": 0.0,
-            "seed": seed,
-            "comparator": way,
-        }
+    chosen = repair_parameters(plugins.PAPER, None, None)
+    points = [
+        _point(robot, case, ROBOTS[robot].cases[case], 0.0, seed, comparator=way)
         for seed, robot, case in itertools.product(seeds, robots, cases)
         for way in (*comparators, ON_ROBOT)
+    ]
+    shared = {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False}
+    return _study("paper", folder, points, shared, _one_gait(settings, chosen))
+
+
+Needs = Callable[[Point], Mapping[str, Cell]]
+
+
+def _one_gait(settings: Settings, repair: Mapping[str, str], **design: Any) -> Needs:  # noqa: ANN401  # name and neurons
+    """Returns the needs of a recovery: the gait of its robot and seed."""
+
+    @cache
+    def gait(robot: str, seed: int) -> Cell:
+        return recoveries.gait_cell(recoveries.planned(robot), settings, seed, repair, **design)
+
+    return lambda point: {"gait": gait(point["robot"], point["seed"])}
+
+
+def _study(
+    name: str,
+    folder: Path,
+    points: Iterable[Point],
+    shared: Mapping[str, Any],
+    needs: Needs,
+    *,
+    function: str = "recover",
+) -> Study:
+    """Returns a study at points, which get their models and names.
+
+    Raises:
+        InputError: A gap is out of range, or two robots would have the same file names.
+    """
+    planned = cache(recoveries.planned)
+    named: dict[str, Point] = {}
+    for given in points:
+        if not 0 <= given["gap"] <= MAX_GAP_LEVEL:
+            raise InputError(
+                f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {given['gap']}"
+            )
+        point = {**planned(given["robot"]), **given}
+        other = named.setdefault(_name(point), point)["robot"]
+        if other != point["robot"]:
+            raise InputError(
+                f"{other} and {point['robot']} would have the same file names: rename one of the "
+                f"files"
+            )
+    return Study(name, folder, f"{recoveries.__name__}:{function}", named, shared, needs)
+
+
+def _point(
+    robot: str, case: int | None, truth: str, gap: float, seed: int, **more: str
+) -> dict[str, Any]:
+    return {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed, **more}
+
+
+def _name(run: Point) -> str:
+    """Returns the name of a run or of a point, in which a colon of a plug-in's is quoted."""
+    failure = quote(run["truth"], safe="=") if run["case"] is None else f"case{run['case']:02d}"
+    name = f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
+    return "-".join([name, *(quote(run[key], safe="=") for key in ("comparator",) if key in run)])
+
+
+def _shared(
+    settings: Settings, kinds: str, repair: Mapping[str, str], next_trial: str = "repair"
+) -> dict[str, Any]:
+    """Returns the parameters of all points: those of a recovery, with their defaults."""
+    return {
+        "settings": dataclasses.asdict(settings),
+        "kinds": kinds,
+        **repair,
+        "next_trial": next_trial,
+        "controller": "network",
+        "neurons": None,
+        "calibrated": True,
+        "evolves": True,
     }
-    return Study(
-        "paper",
-        folder,
-        f"{recoveries.__name__}:recover_or_evolve",
-        points,
-        {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False},
-        lambda point: {"gait": gaits[point["robot"], point["seed"]]},
-    )
+
+
+def _check_lists(
+    lists: Mapping[str, Sequence[Any]], cases: Sequence[int] | None, damages: Sequence[str]
+) -> None:
+    for name, values in lists.items():
+        if not values:
+            raise InputError(f"expected at least one of the {name} of an ablation, got none")
+    if not (cases is None or cases or damages):
+        raise InputError("expected at least one case or one damage of an ablation, got neither")
+    for comparator in lists["comparators"]:
+        plugins.comparator(comparator)
+
+
+def _check_trials(next_trial: str, trials: int, gaps: Sequence[float]) -> None:
+    if next_trial not in NEXT_TRIAL:
+        raise unknown_name("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial != BANK and trials < 2:
+        raise InputError(
+            f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
+            f"diagnosis chooses the second trial"
+        )
+    if next_trial == BANK and trials > GAITS and 0 in gaps:
+        raise InputError(
+            f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
+            f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
+        )
+
+
+def _failures(
+    robot: str, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
+) -> list[tuple[int | None, str]]:
+    """Returns the failures of a robot: the number in Table I, or None, and the notation."""
+    entry, searched = robot_entry(robot), plugins.kinds(kinds)
+    anatomy = entry.robot().anatomy
+    HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
+    for case in cases or ():
+        if case not in entry.cases:
+            raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
+    numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
+    named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
+    return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
@@ -336,10 +398,10 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
     Raises:
         InputError: A domain is unknown or has none of the tasks, or no domain has a task.
     """
-    found: list[str] = []
+    bodies: list[str] = []
     for given in domains:
         if is_model(given):
-            found.append(given)
+            bodies.append(given)
             continue
         domain = _domain(given)
         every = DOMAINS[domain]
@@ -349,18 +411,18 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
                 f"{domain} has none of the tasks {', '.join(tasks or ())}: it has "
                 f"{', '.join(every)}"
             )
-        found += [domain] if domain in ROBOTS else [f"{domain}-{task}" for task in chosen]
+        bodies += [domain] if domain in ROBOTS else [f"{domain}-{task}" for task in chosen]
     known = tasks_of(domains)
     for task in tasks or ():
         if task not in known:
             raise unknown_name("task of these domains", task, known)
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(bodies))
 
 
 def tasks_of(domains: Sequence[str]) -> tuple[str, ...]:
     """Returns the names of the tasks of domains; see ``bodies_of``."""
-    own = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
-    return tuple(sorted({task for tasks in own for task in tasks}))
+    every = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
+    return tuple(sorted({task for tasks in every for task in tasks}))
 
 
 def _domain(given: str) -> str:
@@ -368,117 +430,3 @@ def _domain(given: str) -> str:
     if domain not in DOMAINS:
         raise unknown_name("domain", given, DOMAINS)
     return domain
-
-
-def _shared(
-    settings: Settings,
-    kinds: str,
-    repair: Mapping[str, str],
-    next_trial: str = "repair",
-) -> dict[str, Any]:
-    """Returns the parameters of all points: those of a recovery, with their defaults."""
-    return {
-        "settings": dataclasses.asdict(settings),
-        "kinds": kinds,
-        **repair,
-        "next_trial": next_trial,
-        "controller": "network",
-        "neurons": None,
-        "calibrated": True,
-        "evolves": True,
-    }
-
-
-def _gait_numbers(seed: int, count: int) -> list[int]:
-    """Returns the numbers of the gaits of a run in the bank, one per trial."""
-    return [(seed + trial) % GAITS for trial in range(count)]
-
-
-def _run_name(run: Point) -> str:
-    case, truth = run["case"], run["truth"]
-    failure = f"case{case:02d}" if case is not None else quote(truth, safe="=")
-    return f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
-
-
-def _plain(name: str) -> str:
-    """Returns a comparator's part of a name; those of plug-ins have a colon."""
-    return quote(name, safe="=")
-
-
-def _failures(
-    robot: str, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
-) -> list[tuple[int | None, str]]:
-    """Returns the failures of a robot: the number in Table I, or None, and the notation."""
-    entry, searched = robot_entry(robot), plugins.kinds(kinds)
-    anatomy = entry.robot().anatomy
-    HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
-    for case in cases or ():
-        if case not in entry.cases:
-            raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
-    numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
-    named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
-    return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
-
-
-def _check_gaps(gaps: Iterable[float]) -> None:
-    for gap in gaps:
-        if not 0 <= gap <= MAX_GAP_LEVEL:
-            raise InputError(f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {gap}")
-
-
-def _check_ablation(
-    lists: Mapping[str, Sequence[Any]],
-    cases: Sequence[int] | None,
-    damages: Sequence[str],
-    trials: int,
-    next_trial: str,
-) -> None:
-    for name, values in lists.items():
-        if not values:
-            raise InputError(f"expected at least one of the {name} of an ablation, got none")
-    if not (cases is None or cases or damages):
-        raise InputError("expected at least one case or one damage of an ablation, got neither")
-    _check_keys(lists["robots"])
-    _check_gaps(lists["gaps"])
-    for comparator in lists["comparators"]:
-        plugins.comparator(comparator)
-    if next_trial not in NEXT_TRIAL:
-        raise unknown_name("choice of the next trial", next_trial, NEXT_TRIAL)
-    if next_trial != BANK and trials < 2:
-        raise InputError(
-            f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
-            f"diagnosis chooses the second trial"
-        )
-    if next_trial == BANK and trials > GAITS and 0 in lists["gaps"]:
-        raise InputError(
-            f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
-            f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
-        )
-
-
-def _checked_repair(repair: str, search: str | None, score: str | None) -> dict[str, str]:
-    """Returns the names of a repair, its search and its score.
-
-    Raises:
-        InputError: A name is unknown, the paper's repair is to have another search, or the search
-            needs a repertoire, which a study does not have.
-    """
-    if search == plugins.REPERTOIRE:
-        raise InputError(
-            f"a repertoire is of one robot, and a study of many has none, got --search {search}: "
-            f"give --search {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
-            f"recover --repertoire FILE`"
-        )
-    plugins.repair(repair, search)
-    return recoveries.repair_parameters(repair, search, score)
-
-
-def _check_keys(robots: Iterable[str]) -> None:
-    """Checks that robots have different file names."""
-    taken: dict[str, str] = {}
-    for robot in robots:
-        other = taken.setdefault(robot_key(robot), robot)
-        if other != robot:
-            raise InputError(
-                f"{other} and {robot} would have the same file names: rename one of the files"
-            )

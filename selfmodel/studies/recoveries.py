@@ -7,6 +7,7 @@ Each is computed in a worker from JSON parameters: those of a point (``robot``, 
 import base64
 import dataclasses
 import math
+import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -33,16 +34,21 @@ from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import model_digest
 from selfmodel.recovery.result import Event, SearchBegins
-from selfmodel.recovery.scores import DISPLACEMENT, falls_of
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, falls_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.cells import Cell
-from selfmodel.studies.experiment import Experiment, draw_reality, is_correct, run
-from selfmodel.studies.scores import choose_score
-from selfmodel.studies.study import file_name
+from selfmodel.studies.experiment import (
+    Experiment,
+    choose_score,
+    draw_reality,
+    is_correct,
+    run,
+)
+from selfmodel.studies.study import Row
 from selfmodel.tasks import Entry
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
@@ -62,7 +68,7 @@ DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
 
 Parameters = Mapping[str, Any]
 Folders = Mapping[str, Path]
-Rows = dict[str, list[dict[str, Any]]]
+Rows = dict[str, list[Row]]
 """Rows by the name of their table."""
 
 
@@ -88,11 +94,24 @@ def planned_entry(parameters: Parameters) -> Entry:
 
 def robot_key(robot: str) -> str:
     """Returns the robot's part of a file name: its name, or the name of its model file."""
-    return file_name(Path(robot).stem if is_model(robot) else robot)
+    name = Path(robot).stem if is_model(robot) else robot
+    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "_"
 
 
 def repair_parameters(repair: str, search: str | None, score: str | None) -> dict[str, str]:
-    """Returns the names that determine a repair, with the defaults of the repair for None."""
+    """Returns the names that determine a repair, with the defaults of the repair for None.
+
+    Raises:
+        InputError: A name is unknown, the paper's repair is to have another search, or the search
+            needs a repertoire, which a study does not have.
+    """
+    if search == plugins.REPERTOIRE:
+        raise InputError(
+            f"a repertoire is of one robot, and a study of many has none, got --search {search}: "
+            f"give --search {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
+            f"recover --repertoire FILE`"
+        )
+    plugins.repair(repair, search)
     return {
         "repair": repair,
         "search": plugins.search_name(repair, search, None),
@@ -132,26 +151,21 @@ def gait_cell(
     return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits")
 
 
-def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> dict[str, Any]:
+def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
     """Evolves a gait, writes it, and returns the number of evaluations."""
     entry, settings = planned_entry(parameters), Settings(**parameters["settings"])
     robot, seed = entry.robot(), parameters["seed"]
     design = plugins.design(parameters["controller"], robot, parameters["neurons"])
-    chosen = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=seed)
-    if chosen.gait is not None:
-        write_gait(folder, chosen.gait)
-        return {"evaluations": 0}
-    make_repair = plugins.repair(parameters["repair"], parameters["search"])
-    repair = make_repair(Simulator(robot, threads=1), settings, design, chosen.score)
-    found = repair(
-        (INTACT,),
-        partial(assumed_uncertainty, robot),
-        (),
-        random_stream(seed, "repair"),
-        lambda _: None,
-    )
-    write_gait(folder, found[0].controller)
-    return {"evaluations": repair.evaluations}
+    score, gait = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=seed)
+    evaluations = 0
+    if gait is None:
+        make_repair = plugins.repair(parameters["repair"], parameters["search"])
+        repair = make_repair(Simulator(robot, threads=1), settings, design, score)
+        assumed, stream = partial(assumed_uncertainty, robot), random_stream(seed, "repair")
+        gait = repair((INTACT,), assumed, (), stream, lambda _: None)[0].controller
+        evaluations = repair.evaluations
+    replace_file(folder / GAIT, controller_bytes(gait))
+    return {"evaluations": evaluations}
 
 
 def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
@@ -173,7 +187,7 @@ def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
     return Cell(function, f"{robot_key(name)}-{number}", parameters, kind="gaits")
 
 
-def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> dict[str, Any]:
+def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
     """Writes a given gait into the folder of its cell."""
     replace_file(folder / GAIT, base64.b64decode(parameters["controller"]))
     return {"evaluations": 0}
@@ -187,13 +201,8 @@ def bank_gait(bank: Path, robot: str, number: int) -> Controller:
 def _bank_file(bank: Path, robot: str, number: int) -> Path:
     key = robot_key(robot)
     evolved = sorted(bank.glob(f"{key}-seed{number:03d}-*/{GAIT}"))
-    own = bank / f"{key}-{number}.npz"
-    return evolved[0] if evolved and not own.exists() else own
-
-
-def write_gait(folder: Path, gait: Controller) -> None:
-    """Writes a gait into the folder of its cell."""
-    replace_file(folder / GAIT, controller_bytes(gait))
+    given = bank / f"{key}-{number}.npz"
+    return evolved[0] if evolved and not given.exists() else given
 
 
 def read_gait(folder: Path, robot: Robot) -> Controller:
@@ -211,23 +220,24 @@ def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str
     Returns:
         The names of the trials.
     """
-    shared = parameters["shared"]
-    robot, settings = planned_entry(parameters).robot(), Settings(**shared["settings"])
+    settings = Settings(**parameters["shared"]["settings"])
+    robot, seed = planned_entry(parameters).robot(), parameters["seed"]
     gaits = [read_gait(needs[f"gait-{number}"], robot) for number in range(len(needs))]
-    stages: list[tuple[Stage, int]] = [("before", number) for number in range(HEALTHY_TRIALS)]
-    stages += [("after", number) for number in range(settings.trials)]
-    reality = draw_reality(robot, parameters["seed"], parameters["gap"])
-    trials = []
-    for number, (stage, gait) in enumerate(stages):
+    stages: list[Stage] = ["before" for _ in range(HEALTHY_TRIALS)]
+    stages += ["after" for _ in range(settings.trials)]
+    reality = draw_reality(robot, seed, parameters["gap"])
+    trials: list[Trial] = []
+    for number, stage in enumerate(stages):
         name = f"{number:02d}-{stage}"
-        plan = TrialPlan(name, stage, gaits[gait], settings.steps, parameters["seed"])
+        gait = gaits[number if stage == "before" else number - HEALTHY_TRIALS]
         hidden = INTACT if stage == "before" else truth_of(parameters, robot)
         # Noise differs between trials and is the same for every comparator.
         physical = reality.robot(robot, hidden, stream=number)
+        plan = TrialPlan(name, stage, gait, settings.steps, seed)
         header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
         trials.append(run_trial(physical, plan, folder / f"{name}.mcap", robot, header))
-    fitted = calibrate(robot, trials[:HEALTHY_TRIALS], threads=1).robot
-    replace_file(folder / CALIBRATED, fitted.mjcf.encode())
+    calibrated = calibrate(robot, trials[:HEALTHY_TRIALS], threads=1).robot
+    replace_file(folder / CALIBRATED, calibrated.mjcf.encode())
     return [trial.plan.name for trial in trials]
 
 
@@ -243,20 +253,19 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     Raises:
         InputError: The comparator cannot compare the trials.
     """
-    folder, shared, counts = needs["trials"], parameters["shared"], []
+    folder, shared = needs["trials"], parameters["shared"]
     logged = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
-    healthy, trials = logged[:HEALTHY_TRIALS], logged[HEALTHY_TRIALS:]
+    trials = logged[HEALTHY_TRIALS:]
     robot = planned_entry(parameters).robot()
     mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
-    calibrated = dataclasses.replace(robot, mjcf=mjcf)
     search = DiagnosticSearch(
-        Simulator(calibrated, threads=1),
+        Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
         plugins.comparator(parameters["comparator"]),
         Settings(**shared["settings"]),
         plugins.kinds(shared["kinds"]),
-        healthy_trials=healthy,
+        healthy_trials=logged[:HEALTHY_TRIALS],
     )
-    watch = _DiagnosisWatch()
+    watch, counts = _DiagnosisWatch(), []
 
     def on_event(event: Event) -> None:
         watch(event)
@@ -264,8 +273,7 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
             counts.append(search.distinct_hypotheses)
 
     diagnose_trials(trials, search, parameters["seed"], on_event, after={1, len(trials)})
-    truth = truth_of(parameters, robot)
-    rows = _diagnosis_rows(watch, shared, robot, truth, trials)
+    rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
     for row, count in zip(rows, counts, strict=True):
         row["distinct_hypotheses"] = count
     return {"diagnoses": rows}
@@ -274,10 +282,14 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     """Runs a recovery, and returns rows of its diagnoses, of its trials, and its own.
 
+    In place of a recovery, the paper's control runs the repair EA on the robot.
+
     Raises:
         InputError: The comparator cannot compare the trials.
         WorkError: A trial could not be run or read.
     """
+    if parameters["comparator"] == ON_ROBOT:
+        return _evolve_on_robot(parameters, needs)
     shared, entry = parameters["shared"], planned_entry(parameters)
     robot, settings = entry.robot(), Settings(**shared["settings"])
     design = plugins.design(shared["controller"], robot, shared["neurons"])
@@ -313,7 +325,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         for number, trial in enumerate(recovery.trials)
     ]
     best = recovery.trials[2 + recoveries.index(max(recoveries))].behaviour
-    diagnoses = _diagnosis_rows(watch, shared, robot, truth, recovery.trials[1:])
+    diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
         row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
@@ -331,6 +343,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "upright": bool(falls_of(robot, truth, best) == best.steps),
         "distinct_hypotheses": recovery.distinct_hypotheses,
         "diverged": outcome.stats.diverged,
+        "simulated_steps": outcome.stats.steps,
         "seconds": outcome.seconds,
         "repair": shared["repair"],
         "search": shared["search"],
@@ -342,33 +355,31 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
             "stage": trial.plan.stage,
             "hypothesis": str(tried),
             "displacement": trial.displacement,
+            "upright": UPRIGHT.of_trial(robot, tried, trial),
+            "predicted": _finite(recovery.predicted[number]),
+            "fell_at_step": recovery.falls[number],
         }
         for number, (trial, tried) in enumerate(zip(recovery.trials, recovery.tried, strict=True))
     ]
     return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
 
 
-def recover_or_evolve(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
-    """Runs a recovery, or, in place of one, the paper's control: the repair EA on the robot.
+def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
+    """Runs the paper's control, and returns a row per generation.
 
     Without a reality gap, an evaluation on the robot is a simulation with the true failure. The
     search begins from the gait before the failure and random controllers, as a repair does.
     """
-    if parameters["comparator"] != ON_ROBOT:
-        return recover(parameters, needs, folder)
-    robot, settings = (
-        planned_entry(parameters).robot(),
-        Settings(**parameters["shared"]["settings"]),
-    )
+    robot = planned_entry(parameters).robot()
+    settings = Settings(**parameters["shared"]["settings"])
     simulator, gait = Simulator(robot, threads=1), read_gait(needs["gait"], robot)
     walk = simulator.run([(INTACT, gait)], settings.steps, DISPLACEMENT.record).behaviour
     before = float(DISPLACEMENT.of(robot, INTACT, walk)[0])
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
 
     def keep(generation: Generation) -> None:
-        if math.isfinite(generation.best):
-            best = {"evaluations": generation.evaluations, "best": float(generation.best)}
-            rows.append({"before": before, **best})
+        if math.isfinite(best := float(generation.best)):
+            rows.append({"before": before, "evaluations": generation.evaluations, "best": best})
 
     # A stream that no repair of the recovery draws from: the control is an independent search.
     stream = random_stream(parameters["seed"], "repair", settings.trials + 1)
@@ -378,14 +389,10 @@ def recover_or_evolve(parameters: Parameters, needs: Folders, folder: Path) -> R
 
 
 class _DiagnosisWatch:
-    """Keeps diagnoses with their cost so far, without the time between them.
-
-    Attributes:
-        found: Each diagnosis, with the hypotheses evaluated and the wall time, s, until its end.
-    """
+    """Keeps each diagnosis with the hypotheses that were evaluated, and the seconds, until then."""
 
     def __init__(self) -> None:
-        self.found: list[tuple[Diagnosis, int, float]] = []
+        self._diagnoses: list[tuple[Diagnosis, int, float]] = []
         self._evaluations, self._seconds, self._start, self._diagnosing = 0, 0.0, 0.0, False
 
     def __call__(self, event: Event) -> None:
@@ -397,29 +404,21 @@ class _DiagnosisWatch:
                 self._evaluations += event.evaluations
             case Diagnosis():
                 self._seconds += perf_counter() - self._start
-                self.found.append((event, self._evaluations, self._seconds))
+                self._diagnoses.append((event, self._evaluations, self._seconds))
 
-
-def _diagnosis_rows(
-    watch: _DiagnosisWatch,
-    shared: Parameters,
-    robot: Robot,
-    truth: Hypothesis,
-    trials: Sequence[Trial],
-) -> list[dict[str, Any]]:
-    """Returns a row per diagnosis, without displacements and number of distinct hypotheses."""
-    simulator = Simulator(robot, threads=1)  # scoring is no cost of the diagnosis
-    rows = []
-    for diagnosis, evaluations, seconds in watch.found:
-        best = diagnosis.ranked[0]
-        explained = trials[: diagnosis.trials]
-        rows.append(
+    def rows(
+        self, shared: Parameters, robot: Robot, truth: Hypothesis, trials: Sequence[Trial]
+    ) -> list[Row]:
+        """Returns a row per diagnosis, without displacements and number of distinct hypotheses."""
+        simulator = Simulator(robot, threads=1)  # scoring is no cost of the diagnosis
+        evolved = shared["evolves"]
+        return [
             {
                 "next_trial": shared["next_trial"],
                 "trials": diagnosis.trials,
-                "best": str(best.hypothesis),
-                "correct": is_correct(best.hypothesis, truth, explained, simulator),
-                "distance": _finite(best.distance),
+                "best": str(diagnosis.best),
+                "correct": is_correct(diagnosis.best, truth, trials[: diagnosis.trials], simulator),
+                "distance": _finite(diagnosis.ranked[0].distance),
                 "intact_distance": _finite(diagnosis.intact_distance),
                 "verdict": diagnosis.verdict,
                 "rivals": len(diagnosis.indistinguishable),
@@ -427,11 +426,11 @@ def _diagnosis_rows(
                 "distinct_hypotheses": None,
                 "seconds": seconds,
                 **dict.fromkeys(("before", "after", "recovered")),
-                "repair": shared["repair"] if shared["evolves"] else None,
-                "search": shared["search"] if shared["evolves"] else None,
+                "repair": shared["repair"] if evolved else None,
+                "search": shared["search"] if evolved else None,
             }
-        )
-    return rows
+            for diagnosis, evaluations, seconds in self._diagnoses
+        ]
 
 
 def _finite(distance: float) -> float | None:

@@ -94,29 +94,30 @@ def _of_methods(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
     The tables are those of a robot, a number of physical trials and a unit. There is none after
     more trials than any method had on the robot.
     """
-    found = []
-    runs = list(rows.itertuples())
-    oracles = {
-        (one.robot, one.case, one.gap, one.seed): method_value(one, 1)
-        for one in runs
-        if one.method == ORACLE
-    }
-    compared = [one for one in runs if one.method != ORACLE]
-    longest = {
-        one.robot: max(len(o.best) for o in compared if o.robot == one.robot) for one in compared
-    }
+    bounds = oracles(rows)
+    compared = rows[rows["method"] != ORACLE]
+    longest = compared["best"].map(len).groupby(compared["robot"]).max()
+    outcomes: list[tuple[Any, ...]] = []
     for trials in AFTER:
-        for one in compared:
-            if trials > longest[one.robot]:
+        for row in compared.itertuples():
+            if trials > longest[row.robot]:
                 continue
-            value = method_value(one, trials)
-            oracle = oracles.get((one.robot, one.case, one.gap, one.seed), 0.0)
-            run = one.method, (f"gap {one.gap:g}", f"{one.case:2d}"), one.seed
-            table = one.robot, f"after {counted_trials(trials)}"
-            found.append(((*table, "m"), *run, value, "number"))
-            if oracle > 0:
-                found.append(((*table, "÷ oracle"), *run, value / oracle, "number"))
-    return found
+            value = method_value(row, trials)
+            bound = bounds.get((row.robot, row.case, row.gap, row.seed), 0.0)
+            run = row.method, (f"gap {row.gap:g}", f"{row.case:2d}"), row.seed
+            table = row.robot, f"after {counted_trials(trials)}"
+            outcomes.append(((*table, "m"), *run, value, "number"))
+            if bound > 0:
+                outcomes.append(((*table, "÷ oracle"), *run, value / bound, "number"))
+    return outcomes
+
+
+def oracles(rows: pd.DataFrame) -> dict[tuple[Any, ...], float]:
+    """Returns the displacement of the oracle, m, by robot, case, gap and seed."""
+    return {
+        (row.robot, row.case, row.gap, row.seed): method_value(row, 1)
+        for row in rows[rows["method"] == ORACLE].itertuples()
+    }
 
 
 def method_value(row: Any, trials: int) -> float:  # noqa: ANN401  # a row of a frame
@@ -234,44 +235,59 @@ def load(path: str | Path) -> LoadedStudy:
                 f"{place}: expected the folder of a study ({', '.join(KINDS)}) with a finished "
                 f"run, got none in {place / 'runs'}: run the study first"
             )
-        return _loaded(name, place, frame_of(study_rows(name, place), KINDS[name].columns))
-    data = read_file(
-        place, "the folder of a study, its results.csv or its results.jsonl", MAX_BYTES
-    )
-    try:
-        text = data.decode("utf-8-sig")
-        if place.suffix == ".jsonl":
-            rows = frame_of([json.loads(line) for line in text.splitlines()])
-        else:
-            texts = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
-            rows = _typed(texts.apply(_parsed))
-    except (ValueError, RecursionError) as error:  # pandas' own errors are ValueErrors
-        reason = " ".join(str(error).split())
-        raise InputError(f"{place}: expected the rows of a study, got {reason}") from error
-    for name, kind in KINDS.items():
-        if set(kind.columns) - set(kind.optional) <= set(rows.columns) <= set(kind.columns):
-            return _loaded(name, place, rows)
-    raise InputError(
-        f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
-        f"{', '.join(map(str, rows.columns))[:300]}"
-    )
-
-
-def _loaded(name: str, path: Path, rows: pd.DataFrame) -> LoadedStudy:
+        rows = frame_of(study_rows(name, place), KINDS[name].columns)
+    else:
+        rows = _rows_of_file(place)
+        columns = set(rows.columns)
+        fitting = (
+            name
+            for name, kind in KINDS.items()
+            if set(kind.columns) - set(kind.optional) <= columns <= set(kind.columns)
+        )
+        if not (name := next(fitting, "")):
+            raise InputError(
+                f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
+                f"{', '.join(map(str, rows.columns))[:300]}"
+            )
     if not len(rows):
-        raise InputError(f"{path}: expected the rows of a study, got none: run the study first")
+        raise InputError(f"{place}: expected the rows of a study, got none: run the study first")
     for column, kinds in (("correct", "b"), ("gap", "fi"), ("seed", "iu"), ("case", "iu")):
         if column in rows and rows[column].dtype.kind not in kinds:
             odd = rows[column].dropna().astype(str).iloc[0]
             raise InputError(
-                f"{path}: expected {'true or false' if kinds == 'b' else 'numbers'} in the column "
+                f"{place}: expected {'true or false' if kinds == 'b' else 'numbers'} in the column "
                 f"{column}, got values such as {odd!r}"
             )
     try:
-        outcomes = outcomes_of(name, rows)
+        return LoadedStudy(name, place, rows, outcomes_of(name, rows))
     except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: expected the rows of a study by {name}, got {error}") from error
-    return LoadedStudy(name, path, rows, outcomes)
+        raise InputError(f"{place}: expected the rows of a study by {name}, got {error}") from error
+
+
+def _rows_of_file(path: Path) -> pd.DataFrame:
+    """Returns the rows in a CSV file, or in lines of JSON; numbers are exact."""
+    what = "the folder of a study, its results.csv or its results.jsonl"
+    data = read_file(path, what, MAX_BYTES)
+    try:
+        text = data.decode("utf-8-sig")
+        if path.suffix == ".jsonl":
+            return frame_of([json.loads(line) for line in text.splitlines()])
+        texts = pd.read_csv(io.StringIO(text), dtype=str, na_values=[""], keep_default_na=False)
+        return _typed(texts.apply(_parsed))
+    except (ValueError, RecursionError) as error:  # pandas' own errors are ValueErrors
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path}: expected the rows of a study, got {reason}") from error
+
+
+def _parsed(texts: pd.Series) -> pd.Series:
+    """Returns a column as flags or numbers, if all of its texts are; exact, unlike pandas' own."""
+    flags = texts.str.lower().map({"true": True, "false": False})
+    if flags.notna().any() and (flags.notna() == texts.notna()).all():
+        return flags
+    try:
+        return texts.map(float)
+    except ValueError:
+        return texts
 
 
 def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
@@ -280,7 +296,7 @@ def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
     return pd.DataFrame(KINDS[name].outcomes(frame), columns=list(OUTCOME))
 
 
-def study_rows(name: str, folder: Path, table: str | None = None) -> list[dict[str, Any]]:
+def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
     """Returns the rows of all finished runs in the folder of a study, in order.
 
     Args:
@@ -289,29 +305,17 @@ def study_rows(name: str, folder: Path, table: str | None = None) -> list[dict[s
         table: Name of the table; None for that with the columns of the kind.
     """
     kind = KINDS[name]
-    found = rows_in(folder, table or kind.table)
+    rows = rows_in(folder, table or kind.table)
     if table is None:
-        found = [{column: row[column] for column in kind.columns} for row in found]
+        rows = [{column: row[column] for column in kind.columns} for row in rows]
     # Stable: of a run, the rows of the paper's comparator are the first.
-    found.sort(key=lambda row: row.get("comparator") != REFERENCE)
-    return sorted(map(dict, found), key=kind.order)
+    rows.sort(key=lambda row: row.get("comparator") != REFERENCE)
+    return sorted(rows, key=kind.order)
 
 
 def frame_of(rows: Sequence[Row], columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Returns rows as a frame; whole numbers remain whole where some are unknown."""
     return _typed(pd.DataFrame(rows, columns=None if columns is None else list(columns)))
-
-
-def _parsed(texts: pd.Series) -> pd.Series:
-    """Returns a column of a CSV file as flags or numbers, if all of its texts are; exact."""
-    known = texts[texts != ""]
-    flags = known.str.lower()
-    if len(known) and flags.isin(["true", "false"]).all():
-        return (flags == "true").reindex(texts.index)
-    try:
-        return known.map(float).reindex(texts.index)
-    except ValueError:
-        return known.reindex(texts.index)
 
 
 def _typed(frame: pd.DataFrame) -> pd.DataFrame:
@@ -321,10 +325,10 @@ def _typed(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.astype(dict.fromkeys(whole_numbers, "Int64"))
 
 
-def whole(found: pd.DataFrame) -> pd.DataFrame:
+def whole(tables: pd.DataFrame) -> pd.DataFrame:
     """Returns what is of the tables over all conditions: those with the fewest names."""
-    lengths = [len(table) for table in found["table"]] if len(found) else []
-    return found[[length == min(lengths) for length in lengths]] if lengths else found
+    lengths = [len(table) for table in tables["table"]] if len(tables) else []
+    return tables[[length == min(lengths) for length in lengths]] if lengths else tables
 
 
 def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number, or pandas' NA

@@ -20,11 +20,8 @@ NORMAL = float(stats.norm.ppf(TAIL))
 RESAMPLES = 2000
 """Resamples of a bootstrap."""
 
-MAX_EXACT = 14
-"""Largest number of differences whose signs are all enumerated."""
-
-FLIPS = 20_000
-"""Number of random sign vectors for more differences."""
+MAX_EXACT, FLIPS = 14, 20_000
+"""Largest number of differences whose signs are all enumerated; random sign vectors of more."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +29,11 @@ class Interval:
     """Estimate with the ends of its 95 % confidence interval; NaN where they are unknown."""
 
     estimate: float
-    low: float
-    high: float
+    low: float = math.nan
+    high: float = math.nan
 
 
-UNKNOWN = Interval(math.nan, math.nan, math.nan)
+UNKNOWN = Interval(math.nan)
 
 
 def proportion(successes: int, trials: int) -> Interval:
@@ -57,10 +54,9 @@ def proportion(successes: int, trials: int) -> Interval:
 
 
 def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interval:
-    """Returns the ratio of the means of pairs, with a percentile bootstrap interval.
+    """Returns the ratio of the means of pairs, with a percentile bootstrap interval over the pairs.
 
-    Pairs are resampled together, with the same seed in every call, so that the same numbers give
-    the same interval. It is NaN for one pair, and with the estimate without pairs.
+    The same numbers give the same interval in every call; one pair has none.
 
     Source: B. Efron and R. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
 
@@ -77,7 +73,7 @@ def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interva
         return UNKNOWN
     estimate = float(above.mean() / below.mean())
     if len(above) == 1:
-        return Interval(estimate, math.nan, math.nan)
+        return Interval(estimate)
     return Interval(estimate, *_bootstrap_ratio(above, below, np.random.default_rng(0)))
 
 
@@ -114,7 +110,7 @@ def paired_interval(
     members = groups == np.unique(groups)[:, None]
     number = len(members)
     if number < 2:
-        return Interval(mean, math.nan, math.nan)
+        return Interval(mean)
     low, high = _bootstrap_ratio(members @ values, members.sum(axis=1).astype(float), rng)
     wider = math.sqrt(number / (number - 1)) * float(stats.t.ppf(TAIL, number - 1)) / NORMAL
     return Interval(mean, mean - wider * (mean - low), mean + wider * (high - mean))
@@ -127,11 +123,7 @@ def paired_proportion_interval(
 
     It is the smallest interval that contains ``paired_interval`` and ``matched_proportions``: a
     bootstrap alone cannot draw the rare error that no seed has shown, and has no width without one.
-
-    Args:
-        differences: -1, 0 or 1: first minus second, one per run.
-        seeds: Seed of each run.
-        rng: Draws the seeds.
+    The differences are -1, 0 or 1.
     """
     found = paired_interval(differences, seeds, rng)
     if math.isnan(found.low):
@@ -163,8 +155,8 @@ def matched_proportions(only_first: int, only_second: int, runs: int) -> Interva
     return Interval(estimate, max(-1.0, middle - half), min(1.0, middle + half))
 
 
-def exact_mcnemar(first: Sequence[bool], second: Sequence[bool]) -> float:
-    """Returns the two-sided p of the exact McNemar test of who was right, run by run.
+def exact_mcnemar(only_first: int, only_second: int) -> float:
+    """Returns the two-sided p of the exact McNemar test, from the numbers of discordant runs.
 
     The runs in which only one method is right are a fair coin's throws if both are equally good.
 
@@ -174,11 +166,8 @@ def exact_mcnemar(first: Sequence[bool], second: Sequence[bool]) -> float:
     Source: Q. McNemar, *Note on the sampling error of the difference between correlated
     proportions or percentages*, Psychometrika 12 (1947); the binomial test is exact.
     """
-    only_first = sum(a and not b for a, b in zip(first, second, strict=True))
-    only_second = sum(b and not a for a, b in zip(first, second, strict=True))
-    if not only_first + only_second:
-        return 1.0
-    return float(stats.binomtest(only_first, only_first + only_second).pvalue)
+    discordant = only_first + only_second
+    return float(stats.binomtest(only_first, discordant).pvalue) if discordant else 1.0
 
 
 def sign_flip_test(differences: Sequence[float], rng: np.random.Generator) -> float:
@@ -224,10 +213,6 @@ def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
     runs is needed too.
 
     Source: Student, *The probable error of a mean*, Biometrika 6 (1908).
-
-    Args:
-        differences: First minus second, one per run.
-        seeds: Seed of each run.
 
     Raises:
         ValueError: A difference is NaN or infinite.

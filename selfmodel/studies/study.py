@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -33,10 +32,10 @@ def points_of(**axes: Iterable[Any]) -> dict[str, Point]:
     Args:
         **axes: Values by the name of the axis, as JSON.
     """
-    found = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
+    points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
     return {
         "-".join(f"{axis}={quote(str(value), safe='')}" for axis, value in point.items()): point
-        for point in found
+        for point in points
     }
 
 
@@ -69,13 +68,13 @@ class Study:
             InputError: The folder contains another study, or a run of a point with other inputs.
         """
         shared = {"study": self.name, **self.shared}
-        found = [
+        cells = [
             Cell(self.function, name, {**point, SHARED: shared}, self.needs(point), RUNS)
             for name, point in self.points.items()
         ]
-        if found:
-            self._check(found)
-        return found
+        if cells:
+            self._check(cells)
+        return cells
 
     def run(
         self,
@@ -99,16 +98,19 @@ class Study:
         models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
         for run in finished(self.folder / RUNS):
             robot, model = run.parameters.get("robot"), run.parameters.get("model")
-            where = _difference(run.parameters.get(SHARED), cells[0].parameters[SHARED])
-            where = where or _difference(model, models.get(robot, model), f"the model of {robot}")
-            if where:
+            there = {**run.parameters.get(SHARED, {}), f"the model of {robot}": model}
+            requested = {
+                **cells[0].parameters[SHARED],
+                f"the model of {robot}": models.get(robot, model),
+            }
+            if where := _difference(there, requested):
                 raise InputError(
                     f"{self.folder} contains a study with other settings ({where}): choose another "
                     f"folder"
                 )
             place = f"{RUNS}/{run.path.parent.name}"
-            own = run.made_with == made_with(self.function)
-            if own and places.get(run.name, place) != place:
+            same_code = run.made_with == made_with(self.function)
+            if same_code and places.get(run.name, place) != place:
                 raise InputError(
                     f"{self.folder} contains {run.name}, made with other inputs, such as another "
                     f"gait: choose another folder, or delete {run.path.parent}"
@@ -127,18 +129,17 @@ def rows_in(folder: Path, table: str | None = None) -> list[Row]:
     """
     rows: list[Row] = []
     for cell in finished(folder / RUNS):
-        axes = {
-            key: cell.parameters[key] for key in cell.parameters if key not in (SHARED, "model")
-        }
-        found = cell.result
-        if table and isinstance(found, dict):
-            found = found.get(table, [])
-        found = found if isinstance(found, list) else [found]
-        if not all(isinstance(row, dict) for row in found):
+        hidden = (SHARED, "model")
+        axes = {key: value for key, value in cell.parameters.items() if key not in hidden}
+        result = cell.result
+        if table and isinstance(result, dict):
+            result = result.get(table, [])
+        result = result if isinstance(result, list) else [result]
+        if not all(isinstance(row, dict) for row in result):
             raise InputError(
-                f"{cell.path}: expected rows of a study, got {json.dumps(found)[:80]}; {REMEDY}"
+                f"{cell.path}: expected rows of a study, got {json.dumps(result)[:80]}; {REMEDY}"
             )
-        rows += [{**axes, **row} for row in found]
+        rows += [{**axes, **row} for row in result]
     return rows
 
 
@@ -150,32 +151,26 @@ def study_in(folder: Path) -> str | None:
 
 def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
     """Returns rows by their values of some columns, in the order of the first row of each group."""
-    found: dict[tuple[Any, ...], list[Row]] = {}
+    groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
-        found.setdefault(tuple(row[name] for name in names), []).append(row)
-    return found
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return groups
 
 
-def file_name(text: str) -> str:
-    """Returns a text as a part of a file name."""
-    return re.sub(r"[^\w.-]", "_", text, flags=re.ASCII).lstrip(".-") or "_"
-
-
-_ABSENT = object()
-"""Value of a key that only the other object has; null is a value."""
-
-
-def _difference(there: Any, requested: Any, name: str = "") -> str | None:  # noqa: ANN401  # JSON
+def _difference(there: object, requested: object) -> str | None:
     """Returns the first difference of two JSON values as a clause; None if they are equal."""
-    if isinstance(there, dict) and isinstance(requested, dict):
-        inner = (
-            _difference(there.get(key, _ABSENT), requested.get(key, _ABSENT), f"{name}.{key}")
-            for key in sorted(there.keys() | requested.keys())
-        )
-        return next(filter(None, inner), None)
-    if there == requested:
-        return None
-    found = "absent" if there is _ABSENT else json.dumps(there)
-    wanted = "none" if requested is _ABSENT else repr(requested)
-    # Values in a file may have megabytes.
-    return f"{name.lstrip('.')[:300]} is {found[:300]} there, requested is {wanted[:300]}"
+    old, new = _leaves(there), _leaves(requested)
+    for name in sorted(old.keys() | new.keys()):
+        if old.get(name) != new.get(name):
+            # Values in a file may have megabytes.
+            was, wanted = (leaves.get(name, "absent")[:300] for leaves in (old, new))
+            return f"{name.strip('.')[:300]} is {was} there, requested is {wanted}"
+    return None
+
+
+def _leaves(value: object, name: str = "") -> dict[str, str]:
+    """Returns the values in a JSON value, as JSON texts, by their keys with dots between them."""
+    if not isinstance(value, dict) or not value:
+        return {name: json.dumps(value, sort_keys=True)}
+    leaves = (_leaves(inner, f"{name}.{key}") for key, inner in value.items())
+    return {key: text for some in leaves for key, text in some.items()}

@@ -17,14 +17,14 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.studies.comparisons import ends
 from selfmodel.studies.rows import KINDS, REFERENCE, frame_of
-from selfmodel.studies.statistics import Interval, proportion, ratio
+from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
 
 
-def ablation_scores(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def ablation_scores(rows: Sequence[Row]) -> list[Row]:
     """Returns the score of each comparator per robot, gap and number of trials, over all cases.
 
     Returns:
@@ -33,8 +33,9 @@ def ablation_scores(rows: Sequence[Row]) -> list[dict[str, Any]]:
         those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery trial
         over that before the failure. The last two are None without such runs.
     """
-    groups = grouped(rows, "robot", "gap", "comparator", "trials")
-    found = []
+    names = ("robot", "gap", "comparator", "trials")
+    groups = grouped(rows, *names)
+    scores = []
     for (robot, gap, comparator, trials), own in sorted(groups.items()):
         reference = {
             (row["truth"], row["seed"]): row["seconds"]
@@ -45,29 +46,26 @@ def ablation_scores(rows: Sequence[Row]) -> list[dict[str, Any]]:
             for row in own
             if (key := (row["truth"], row["seed"])) in reference
         ]
-        scores = [
+        recoveries = [
             (row["recovered"], row["before"])
             for row in own
             if None not in (row["recovered"], row["before"]) and row["before"] > 0
         ]
         right = sum(row["correct"] for row in own)
-        found.append(
+        scores.append(
             {
-                "robot": robot,
-                "gap": gap,
-                "comparator": comparator,
-                "trials": trials,
+                **dict(zip(names, (robot, gap, comparator, trials), strict=True)),
                 "runs": len(own),
                 "right": right,
                 "correct": proportion(right, len(own)),
                 "time": ratio(*zip(*times, strict=True)) if times else None,
-                "recovery": ratio(*zip(*scores, strict=True)) if scores else None,
+                "recovery": ratio(*zip(*recoveries, strict=True)) if recoveries else None,
             }
         )
-    return found
+    return scores
 
 
-def suite_summaries(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def suite_summaries(rows: Sequence[Row]) -> list[Row]:
     """Returns the summaries of each body: one per case, then one of all single faults.
 
     Returns:
@@ -78,17 +76,16 @@ def suite_summaries(rows: Sequence[Row]) -> list[dict[str, Any]]:
         number of runs whose best recovery trial had no fall; the mean number of ``trials``; the
         median of the ``seconds``.
     """
-    found = []
+    summaries = []
     for (robot,), own in grouped(rows, "robot").items():
         for (case,), same in sorted(grouped(own, "case").items()):
-            found.append(_suite_summary(robot, case, same[0]["truth"], same))
-        single = [row for row in own if row["case"] in SINGLE]
-        if single:
-            found.append(_suite_summary(robot, None, "", single))
-    return found
+            summaries.append(_suite_summary(robot, case, same[0]["truth"], same))
+        if single := [row for row in own if row["case"] in SINGLE]:
+            summaries.append(_suite_summary(robot, None, "", single))
+    return summaries
 
 
-def _suite_summary(robot: str, case: int | None, truth: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _suite_summary(robot: str, case: int | None, truth: str, rows: Sequence[Row]) -> Row:
     right = sum(row["correct"] for row in rows)
     ratios = [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
     return {
@@ -134,53 +131,42 @@ class Table:
     texts: int
 
 
-def summary_table(
-    name: str, records: Sequence[Row], shown: Sequence[Mapping[str, str]], texts: int
-) -> Table:
-    """Returns summaries as a table; an interval has three columns, as ``correct_low``.
-
-    Args:
-        name: Name of its file, without an extension.
-        records: The summaries.
-        shown: Their texts for readers, by the title of the column.
-        texts: Number of leading columns of texts.
-    """
-    intervals = {
-        key for record in records for key, one in record.items() if isinstance(one, Interval)
-    }
-    unknown = Interval(math.nan, math.nan, math.nan)
-    flat = [
-        {
-            column: one
-            for key, value in record.items()
-            for column, one in (
-                ends(key, value or unknown) if key in intervals else {key: value}
-            ).items()
-        }
-        for record in records
-    ]
-    return Table(name, frame_of(flat), pd.DataFrame(shown), texts)
-
-
-def frame_table(
+def table_of(
     name: str,
-    records: pd.DataFrame,
+    records: pd.DataFrame | Sequence[Row],
     shown: Sequence[Mapping[str, str]] | None = None,
     texts: int = 0,
 ) -> Table:
-    """Returns a frame as a table; without other texts, readers are shown its values.
+    """Returns rows as a table.
 
     Args:
         name: Name of its file, without an extension.
-        records: The frame; the names of a table in it become one text.
-        shown: Texts for readers, by the title of the column.
+        records: The rows; an interval becomes three columns, as ``correct_low``, and the names of a
+            table in a frame one text.
+        shown: Their texts for readers, by the title of the column; None for the values themselves.
         texts: Number of leading columns of texts.
     """
-    plain = records.assign(table=records["table"].map(", ".join)) if "table" in records else records
+    if isinstance(records, pd.DataFrame):
+        named = "table" in records
+        frame = records.assign(table=records["table"].map(", ".join)) if named else records
+    else:
+        frame = frame_of([_flat(record, _interval_keys(records)) for record in records])
     if shown is None:
-        values = plain.astype(object).where(plain.notna(), "-").map(str)
-        return Table(name, plain, values, len(plain.columns))
-    return Table(name, plain, pd.DataFrame(shown), texts)
+        values = frame.astype(object).where(frame.notna(), "-").map(str)
+        return Table(name, frame, values, len(frame.columns))
+    return Table(name, frame, pd.DataFrame(shown), texts)
+
+
+def _interval_keys(records: Sequence[Row]) -> set[str]:
+    return {key for record in records for key in record if isinstance(record[key], Interval)}
+
+
+def _flat(record: Row, intervals: set[str]) -> Row:
+    columns = (
+        ends(key, value or UNKNOWN) if key in intervals else {key: value}
+        for key, value in record.items()
+    )
+    return {key: value for column in columns for key, value in column.items()}
 
 
 def results_files(
@@ -207,20 +193,13 @@ def csv_bytes(frame: pd.DataFrame) -> bytes:
     return text.encode()
 
 
-def markdown_table(rows: Sequence[Mapping[str, str]], numbers: Sequence[int] = ()) -> str:
-    """Returns rows as a Markdown table, aligned left but for the columns of numbers, from 0."""
-    rule = ["---:" if place in numbers else "---" for place in range(len(rows[0]))]
+def markdown_of(table: Table) -> str:
+    """Returns a table in Markdown, with numbers aligned right; nothing without a row."""
     safe = str.maketrans({"\\": "\\\\", "|": "\\|", "\n": " "})
-    lines = [
-        [text.translate(safe) for text in line] for line in (rows[0], *(r.values() for r in rows))
-    ]
+    titles, rows = list(table.shown.columns), table.shown.to_numpy().tolist()
+    rule = ["---" if place < table.texts else "---:" for place in range(len(titles))]
+    lines = [[text.translate(safe) for text in line] for line in (titles, *rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
-
-
-def _markdown(table: Table) -> bytes:
-    rows = table.shown.to_dict("records")
-    numbers = range(table.texts, len(table.shown.columns))
-    return markdown_table(rows, numbers).encode()
 
 
 def _latex(table: Table) -> bytes:
@@ -248,7 +227,7 @@ FORMATS: Mapping[str, tuple[str, Callable[[Table], bytes]]] = MappingProxyType(
         "csv": ("csv", lambda table: csv_bytes(table.records)),
         "parquet": ("parquet", _parquet),
         "latex": ("tex", _latex),
-        "markdown": ("md", _markdown),
+        "markdown": ("md", lambda table: markdown_of(table).encode()),
     }
 )
 """Suffix and writer by the name of a format. CSV and Parquet files have the records, LaTeX (with
@@ -262,8 +241,7 @@ def check_format(wanted: str | None) -> None:
         InputError: The format is unknown, or needs a package that is missing.
     """
     if wanted is not None:
-        one = pd.DataFrame({"n": ["1"]})
-        table_files([Table("none", one, one, 0)], wanted)
+        table_files([table_of("none", [{"n": "1"}])], wanted)
 
 
 def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:

@@ -8,8 +8,9 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -37,156 +38,135 @@ if __name__ == "__main__":
 """
 
 
-@pytest.fixture(autouse=True)
-def _found_by_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(ROOT))
+@dataclass
+class Study:
+    """A folder in which cells are computed by threads of this process, with the events."""
+
+    notes: Path
+    threads: ThreadPoolExecutor
+    events: list = field(default_factory=list)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the cells."""
+        return self.notes / "study"
+
+    def run(self, wanted: Sequence[Cell], **options: object) -> tuple[CellEnds, ...]:
+        """Computes cells, by threads unless options have another executor."""
+        given = options or {"executor": self.threads}
+        return run_grid(self.folder, wanted, on_progress=self.events.append, **given)
+
+    def names(self) -> list[str]:
+        """Names of the finished cells."""
+        return [one.name for one in finished(self.folder / "runs")]
+
+    def numbers(self) -> list[int]:
+        """Results of the finished cells."""
+        return [one.result["number"] for one in finished(self.folder / "runs")]
 
 
 @pytest.fixture
-def threads() -> Iterator[ThreadPoolExecutor]:
-    """An executor of the caller, in this process."""
-    with ThreadPoolExecutor(2) as executor:
-        yield executor
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Study]:
+    monkeypatch.syspath_prepend(str(ROOT))  # of the workers
+    with ThreadPoolExecutor(2) as threads:
+        yield Study(tmp_path, threads)
 
 
-def names(folder: Path) -> list[str]:
-    return [one.name for one in finished(folder / "runs")]
+def named(count: int) -> list[str]:
+    return [f"run-{seed:02d}" for seed in range(count)]
 
 
-def start(folder: Path) -> "subprocess.Popen[bytes]":
-    """Starts a slow grid in a process group of its own, and waits for its first result."""
-    (folder / "script.py").write_text(SCRIPT)
-    process = subprocess.Popen(
-        [sys.executable, folder / "script.py", folder],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
-    limit = time.monotonic() + LIMIT
-    while not list(folder.glob("study/runs/*/cell.json")):
-        assert process.poll() is None
-        if time.monotonic() > limit:
-            process.kill()
-            pytest.fail(f"no first result within {LIMIT} s")
-        time.sleep(0.05)
-    return process
+def test_a_grid_computes_every_cell_once_and_not_again(study: Study):
+    wanted = cells(study.notes, 6)
 
-
-def test_a_grid_computes_every_cell_once_and_not_again(tmp_path: Path, threads: ThreadPoolExecutor):
-    events: list = []
-    wanted = cells(tmp_path, 6)
-    first, again = (
-        run_grid(tmp_path / "study", wanted, executor=threads, on_progress=events.append)
-        for _ in range(2)
-    )
-
-    assert (first, again) == ((), ())
-    assert calls(tmp_path) == {f"run-{seed:02d}": 1 for seed in range(6)}
-    assert events[0] == GridBegins(total=6, finished=0)
-    assert [event.number for event in events[1:7]] == [1, 2, 3, 4, 5, 6]
-    assert events[7:] == [GridBegins(total=6, finished=6)]
-    assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["runs"]
+    assert (study.run(wanted), study.run(wanted)) == ((), ())
+    assert calls(study.notes) == dict.fromkeys(named(6), 1)
+    begin, *ends, again = study.events
+    assert (begin, again) == (GridBegins(6, 0), GridBegins(6, 6))
+    assert [(end.number, end.error, end.seconds > 0) for end in ends] == [
+        (number, None, True) for number in range(1, 7)
+    ]
+    assert sorted(end.name for end in ends) == named(6)
+    assert [path.name for path in study.folder.iterdir()] == ["runs"]
 
 
 @pytest.mark.process
-def test_the_results_are_those_of_any_executor(tmp_path: Path, threads: ThreadPoolExecutor):
-    run_grid(tmp_path / "threads", cells(tmp_path, 4), executor=threads)
-    run_grid(tmp_path / "processes", cells(tmp_path, 4), workers=2)
-    one, two = ([*finished(tmp_path / name / "runs")] for name in ("threads", "processes"))
+def test_the_results_are_those_of_any_executor(study: Study):
+    study.run(cells(study.notes, 4))
+    by_threads = [*finished(study.folder / "runs")]
+    shutil.rmtree(study.folder)
+    study.run(cells(study.notes, 4), workers=2)
 
-    assert one == two
-    assert [each.result["number"] for each in one] == [0, 10, 20, 30]
-
-
-def test_a_cell_that_others_need_is_computed_once_before_them(
-    tmp_path: Path, threads: ThreadPoolExecutor
-):
-    events: list = []
-    study = tmp_path / "study"
-    run_grid(study, shared(tmp_path), executor=threads, on_progress=events.append)
-
-    assert events[0] == GridBegins(total=4, finished=0)
-    assert events[1].name == "need"
-    assert calls(tmp_path)["need"] == 1
-    assert [each.result["number"] for each in finished(study / "runs")] == [5, 15, 25]
+    assert [*finished(study.folder / "runs")] == by_threads
+    assert study.numbers() == [0, 10, 20, 30]
 
 
-def test_a_needed_cell_without_its_files_is_computed_again_only_if_it_is_needed(
-    tmp_path: Path, threads: ThreadPoolExecutor
-):
-    first, *others = shared(tmp_path)
-    study = tmp_path / "study"
-    run_grid(study, [first], executor=threads)
-    (study / first.needs["0"].place / "number.txt").unlink()
-    run_grid(study, [first], executor=threads)
-    assert calls(tmp_path)["need"] == 1
+def test_a_cell_that_others_need_is_computed_once_before_them(study: Study):
+    study.run(shared(study.notes))
 
-    assert run_grid(study, others, executor=threads) == ()
-    assert calls(tmp_path) == {"need": 2, "run-0": 1, "run-1": 1, "run-2": 1}
+    assert study.events[0] == GridBegins(total=4, finished=0)
+    assert study.events[1].name == "need"
+    assert calls(study.notes)["need"] == 1
+    assert study.numbers() == [5, 15, 25]
 
 
-def test_cells_that_need_a_failed_one_are_named_and_not_computed(
-    tmp_path: Path, threads: ThreadPoolExecutor
-):
-    wanted = [*shared(tmp_path, fails="bug"), *cells(tmp_path, 1)]
-    failed = run_grid(tmp_path / "study", wanted, executor=threads)
+def test_a_needed_cell_without_its_files_is_computed_again_only_if_it_is_needed(study: Study):
+    first, *others = shared(study.notes)
+    study.run([first])
+    (study.folder / first.needs["0"].place / "number.txt").unlink()
+    study.run([first])
+    assert calls(study.notes)["need"] == 1
 
-    assert sorted(each.name for each in failed) == ["need", "run-0", "run-1", "run-2"]
-    assert {each.error for each in failed if each.name != "need"} == {
-        "not computed: it needs need, which failed"
-    }
-    assert set(calls(tmp_path)) == {"need", "run-00"}
+    assert study.run(others) == ()
+    assert calls(study.notes) == {"need": 2, "run-0": 1, "run-1": 1, "run-2": 1}
 
 
 @pytest.mark.parametrize(
     ("fails", "words"),
     [("foreseen", "the cause and the cure"), ("bug", "an unexpected error, ZeroDivisionError")],
 )
-def test_a_failure_is_kept_stops_no_other_and_is_tried_again(
-    tmp_path: Path, threads: ThreadPoolExecutor, fails: str, words: str
-):
-    study = tmp_path / "study"
-    wanted = [cell(tmp_path, "bad", fails=fails), *cells(tmp_path, 2)]
-    (failed,) = run_grid(study, wanted, executor=threads)
-    (file,) = (study / "errors").iterdir()
+def test_a_failure_is_kept_stops_no_other_and_is_tried_again(study: Study, fails: str, words: str):
+    wanted = [*shared(study.notes, fails=fails), *cells(study.notes, 2)]
+    failed = {end.name: str(end.error) for end in study.run(wanted)}
+    (file,) = (study.folder / "errors").iterdir()
 
-    assert (failed.name, words in str(failed.error)) == ("bad", True)
+    assert words in failed.pop("need")
+    assert failed == dict.fromkeys(
+        ("run-0", "run-1", "run-2"), "not computed: it needs need, which failed"
+    )
     assert ("Traceback" in file.read_text()) == (fails == "bug")
-    assert names(study) == ["run-00", "run-01"]
+    assert study.names() == named(2)
+    assert set(calls(study.notes)) == {"need", *named(2)}
     if fails == "foreseen":
-        (tmp_path / "mended").touch()
-        assert run_grid(study, wanted, executor=threads) == ()
-        assert not list((study / "errors").iterdir())
+        (study.notes / "mended").touch()
+        assert study.run(wanted) == ()
+        assert not list((study.folder / "errors").iterdir())
 
 
 @pytest.mark.process
-def test_a_crash_costs_its_own_cell_alone(tmp_path: Path):
-    study = tmp_path / "study"
-    wanted = [cell(tmp_path, "bad", fails="crash"), *cells(tmp_path, 4, seconds=0.2)]
-    (failed,) = run_grid(study, wanted, workers=2)
+def test_a_crash_costs_its_own_cell_alone(study: Study):
+    wanted = [cell(study.notes, "bad", fails="crash"), *cells(study.notes, 4, seconds=0.2)]
+    (failed,) = study.run(wanted, workers=2)
 
     assert failed.name == "bad"
     assert "its process ended in each of 2 attempts" in str(failed.error)
-    assert names(study) == [f"run-{seed:02d}" for seed in range(4)]
-    assert calls(tmp_path)["bad"] == 2
+    assert study.names() == named(4)
+    assert calls(study.notes) == {"bad": 2, **dict.fromkeys(named(4), 1)}
 
 
 @pytest.mark.parametrize("left", ["nothing", "its other files"])
-def test_a_cell_whose_result_was_deleted_is_computed_again(
-    tmp_path: Path, threads: ThreadPoolExecutor, left: str
-):
-    wanted = cells(tmp_path, 2)
-    run_grid(tmp_path / "study", wanted, executor=threads)
-    place = tmp_path / "study" / wanted[1].place
+def test_a_cell_whose_result_was_deleted_is_computed_again(study: Study, left: str):
+    wanted = cells(study.notes, 2)
+    study.run(wanted)
+    place = study.folder / wanted[1].place
     if left == "nothing":
         shutil.rmtree(place)
     else:
         (place / CELL).unlink()
 
-    assert run_grid(tmp_path / "study", wanted, executor=threads) == ()
-    assert calls(tmp_path) == {"run-00": 1, "run-01": 2}
-    assert names(tmp_path / "study") == ["run-00", "run-01"]
+    assert study.run(wanted) == ()
+    assert calls(study.notes) == {"run-00": 1, "run-01": 2}
+    assert study.names() == named(2)
 
 
 def test_other_inputs_and_other_code_are_other_cells(
@@ -195,43 +175,34 @@ def test_other_inputs_and_other_code_are_other_cells(
     (one,), (other,) = cells(tmp_path, 1), cells(tmp_path, 1, more=1)
     assert one.place == cells(tmp_path, 1)[0].place != other.place
 
-    before = cell_files.made_with.__wrapped__("tests.helpers.grids:work")
-    monkeypatch.setattr(cell_files, "_own_code", lambda: b"changed")
-    assert cell_files.made_with.__wrapped__("tests.helpers.grids:work")["code"] != before["code"]
-    (tmp_path / "theirs.py").write_text("def work(): ...")
     monkeypatch.syspath_prepend(str(tmp_path))
-    first = cell_files.made_with.__wrapped__("theirs:work")
-    (tmp_path / "theirs.py").write_text("def work(): return 1")
-    assert cell_files.made_with.__wrapped__("theirs:work") != first
+    made = []
+    for text, package in (("", ROOT / "comparators"), ("pass", None), ("pass", tmp_path)):
+        (tmp_path / "theirs.py").write_text(text)
+        monkeypatch.setattr(cell_files, "PACKAGE", package or ROOT / "comparators")
+        made.append(cell_files.made_with.__wrapped__("theirs:work")["code"])
+    assert len(set(made)) == 3
 
 
-def test_a_study_of_other_code_is_neither_continued_nor_mixed(
-    tmp_path: Path, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
+def test_a_study_of_other_code_is_neither_continued_nor_mixed_nor_computed_by_a_worker(
+    study: Study, monkeypatch: pytest.MonkeyPatch
 ):
-    study = tmp_path / "study"
-    run_grid(study, cells(tmp_path, 1), executor=threads)
+    study.run(cells(study.notes, 1))
     made = {**cell_files.made_with("tests.helpers.grids:work"), "code": "other"}
-    for module in (cell_files, grid):
-        monkeypatch.setattr(module, "made_with", lambda _function: made)
-    later = cells(tmp_path, 2)[1:]
-
-    with pytest.raises(InputError, match=r"run-00.* was made with .*code.*, installed are .*other"):
-        run_grid(study, later, executor=threads)
-    run_grid(tmp_path / "other", later, executor=threads)
-    shutil.copytree(tmp_path / "other" / later[0].place, study / later[0].place)
-    with pytest.raises(InputError, match="a table is of one version of each"):
-        list(finished(study / "runs"))
-
-
-def test_a_worker_with_other_code_is_refused_by_name(
-    tmp_path: Path, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
-):
-    made = {**cell_files.made_with("tests.helpers.grids:work"), "code": "other"}
+    later, other = cells(study.notes, 2)[1:], study.notes / "other"
     monkeypatch.setattr(grid, "made_with", lambda _function: made)
-
+    with pytest.raises(InputError, match=r"run-00.* was made with .*code.*, installed are .*other"):
+        study.run(later)
     with pytest.raises(InputError, match=r"the worker on .* has .*, the command has .*code other"):
-        run_grid(tmp_path / "study", cells(tmp_path, 1), executor=threads)
-    assert not calls(tmp_path)
+        run_grid(other, later, executor=study.threads)
+    assert calls(study.notes) == {"run-00": 1}
+
+    monkeypatch.setattr(cell_files, "made_with", lambda _function: made)
+    later = cells(study.notes, 2)[1:]
+    run_grid(other, later, executor=study.threads)
+    shutil.copytree(other / later[0].place, study.folder / later[0].place)
+    with pytest.raises(InputError, match="a table is of one version of each"):
+        study.names()
 
 
 @pytest.mark.parametrize("name", ["", "..", "a/b", ".hidden", "a b"])
@@ -240,16 +211,15 @@ def test_a_name_that_cannot_name_a_folder_is_refused(name: str):
         Cell("a:b", name, {})
 
 
-def test_no_link_in_the_folder_of_a_study_is_followed(tmp_path: Path, threads: ThreadPoolExecutor):
-    precious = tmp_path / "precious"
+def test_no_link_in_the_folder_of_a_study_is_followed(study: Study):
+    (wanted,) = cells(study.notes, 1)
+    precious, place = study.notes / "precious", study.folder / wanted.place
     precious.mkdir()
     (precious / "number.txt").write_text("mine")
-    (wanted,) = cells(tmp_path, 1)
-    place = tmp_path / "study" / wanted.place
     place.parent.mkdir(parents=True)
     place.symlink_to(precious)
     with pytest.raises(OSError, match="cannot be written"):
-        run_grid(tmp_path / "study", [wanted], executor=threads)
+        study.run([wanted])
 
     assert (precious / "number.txt").read_text() == "mine"
     assert [path.name for path in precious.iterdir()] == ["number.txt"]
@@ -275,110 +245,120 @@ def test_no_damage_of_a_cell_goes_unnoticed(
     copy = tmp_path / "runs" / one_cell.parent.name / CELL
     copy.parent.mkdir(parents=True, exist_ok=True)
     copy.write_bytes(data)
-
     message = ""
     try:
-        found = [*finished(tmp_path / "runs")]
+        results = [one.result for one in finished(tmp_path / "runs")]
     except InputError as error:
         message = str(error)
-    assert (
-        (str(copy) in message and "its folder" in message)
-        if message
-        else ([one.result for one in found] == [content["result"]])
-    )
+    if message:
+        assert str(copy) in message
+        assert "its folder" in message
+    else:
+        assert results == [content["result"]]
 
 
 def test_a_cell_under_the_name_of_another_is_refused(one_cell: Path, tmp_path: Path):
     shutil.copytree(one_cell.parent, tmp_path / "runs" / "run-01-0123456789abcdef")
 
-    with pytest.raises(InputError, match="expected the cell of its folder, got that of run-00-"):
+    with pytest.raises(InputError, match="was altered or damaged, or its folder renamed"):
         list(finished(tmp_path / "runs"))
 
 
-def test_a_full_disk_ends_the_grid(
-    tmp_path: Path, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
+def test_a_full_disk_and_an_executor_that_has_ended_end_the_grid(
+    study: Study, monkeypatch: pytest.MonkeyPatch
 ):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "cell.json")
 
-    monkeypatch.setattr(cell_files, "replace_file", full)
-    with pytest.raises(OSError, match="No space left"):
-        run_grid(tmp_path / "study", cells(tmp_path, 3), executor=threads)
-
-
-def test_an_executor_that_has_ended_is_named(tmp_path: Path, threads: ThreadPoolExecutor):
-    threads.shutdown()
-
+    with monkeypatch.context() as patched:
+        patched.setattr(cell_files, "replace_file", full)
+        with pytest.raises(OSError, match="No space left"):
+            study.run(cells(study.notes, 3))
+    study.threads.shutdown()
     with pytest.raises(WorkError, match=r"takes no more cells .* the same command continues"):
-        run_grid(tmp_path / "study", cells(tmp_path, 1), executor=threads)
-
-
-@pytest.mark.process
-def test_a_grid_that_was_killed_goes_on_where_it_was(tmp_path: Path):
-    process = start(tmp_path)
-    process.kill()
-    process.communicate(timeout=LIMIT)
-    done = names(tmp_path / "study")
-    assert 0 < len(done) < 6
-
-    run_grid(tmp_path / "study", cells(tmp_path, 6, seconds=0.3), workers=2)
-
-    assert names(tmp_path / "study") == [f"run-{seed:02d}" for seed in range(6)]
-    assert all(calls(tmp_path)[name] == 1 for name in done)
-
-
-@pytest.mark.process
-def test_an_interrupt_ends_every_process_at_once_and_quietly(tmp_path: Path):
-    process = start(tmp_path)
-    os.killpg(process.pid, signal.SIGINT)  # a terminal's Ctrl-C reaches the workers too
-    _, told = process.communicate(timeout=LIMIT)  # ends when the last of them has closed it
-    started = calls(tmp_path).total()
-    time.sleep(0.5)
-
-    assert told.count(b"Traceback") == 1  # the script's own KeyboardInterrupt
-    assert calls(tmp_path).total() == started < 6
-
-
-@pytest.mark.process
-def test_two_commands_at_one_study_agree(tmp_path: Path):
-    process = start(tmp_path)
-    failed = run_grid(tmp_path / "study", cells(tmp_path, 6, seconds=0.3), workers=2)
-    out, _ = process.communicate(timeout=LIMIT)
-
-    assert (failed, process.returncode) == ((), 0)
-    assert names(tmp_path / "study") == [f"run-{seed:02d}" for seed in range(6)]
-    assert max(calls(tmp_path).values()) <= 2
-    assert not (tmp_path / "study" / "unfinished").exists()
-    assert b"a plug-in may print" not in out
+        study.run(cells(study.notes, 1))
 
 
 @pytest.fixture
-def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The address of a Dask cluster of two worker processes on this machine."""
-    distributed = pytest.importorskip("distributed", reason="needs the extra dask")
-    config = pytest.importorskip("dask").config
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of the workers
-    place = {"dashboard_address": ":0", "host": "127.0.0.1"}
-    with (
-        config.set({"distributed.scheduler.allowed-failures": 0}),
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, **place) as local,
-    ):
-        yield local.scheduler_address.removeprefix("tcp://")
+def started(study: Study) -> "Iterator[subprocess.Popen[bytes]]":
+    """A slow grid in a process group of its own, after its first result."""
+    (study.notes / "script.py").write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, study.notes / "script.py", study.notes],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    limit = time.monotonic() + LIMIT
+    while not list(study.notes.glob("study/runs/*/cell.json")):
+        assert process.poll() is None
+        assert time.monotonic() < limit
+        time.sleep(0.05)
+    yield process
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.mark.process
+def test_a_grid_that_was_killed_goes_on_where_it_was(
+    study: Study, started: "subprocess.Popen[bytes]"
+):
+    started.kill()
+    started.communicate(timeout=LIMIT)
+    done = study.names()
+    assert 0 < len(done) < 6
+
+    study.run(cells(study.notes, 6, seconds=0.3), workers=2)
+    assert study.names() == named(6)
+    assert all(calls(study.notes)[name] == 1 for name in done)
+
+
+@pytest.mark.process
+def test_an_interrupt_ends_every_process_at_once_and_quietly(
+    study: Study, started: "subprocess.Popen[bytes]"
+):
+    os.killpg(started.pid, signal.SIGINT)  # a terminal's Ctrl-C reaches the workers too
+    _, told = started.communicate(timeout=LIMIT)  # ends when the last of them has closed it
+    begun = calls(study.notes).total()
+    time.sleep(0.5)
+
+    assert told.count(b"Traceback") == 1  # the script's own KeyboardInterrupt
+    assert calls(study.notes).total() == begun < 6
+
+
+@pytest.mark.process
+def test_two_commands_at_one_study_agree(study: Study, started: "subprocess.Popen[bytes]"):
+    failed = study.run(cells(study.notes, 6, seconds=0.3), workers=2)
+    out, _ = started.communicate(timeout=LIMIT)
+
+    assert (failed, started.returncode) == ((), 0)
+    assert study.names() == named(6)
+    assert max(calls(study.notes).values()) <= 2
+    assert not (study.folder / "unfinished").exists()
+    assert b"a plug-in may print" not in out
 
 
 @pytest.mark.process
 def test_a_cluster_continues_what_processes_began_and_loses_a_crash_alone(
-    cluster: str, tmp_path: Path
+    study: Study, monkeypatch: pytest.MonkeyPatch
 ):
-    study, wanted = tmp_path / "study", cells(tmp_path, 6)
-    run_grid(study, wanted[:2], workers=1)
-    with dask_executor(cluster) as executor:
-        assert run_grid(study, wanted, executor=executor) == ()
-        bad = cell(tmp_path, "bad", fails="crash")
-        (failed,) = run_grid(study, [bad], executor=executor)
+    distributed = pytest.importorskip("distributed", reason="needs the extra dask")
+    config = pytest.importorskip("dask").config
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of the workers
+    wanted = cells(study.notes, 6)
+    study.run(wanted[:2], workers=1)
+    place = {"dashboard_address": ":0", "host": "127.0.0.1"}
+    with (
+        config.set({"distributed.scheduler.allowed-failures": 0}),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, **place) as cluster,
+        dask_executor(cluster.scheduler_address.removeprefix("tcp://")) as executor,
+    ):
+        assert study.run(wanted, executor=executor) == ()
+        (failed,) = study.run([cell(study.notes, "bad", fails="crash")], executor=executor)
 
-    assert names(study) == [f"run-{seed:02d}" for seed in range(6)]
-    assert set(calls(tmp_path).values()) == {1}
+    assert study.names() == named(6)
+    assert set(calls(study.notes).values()) == {1}
     assert (failed.name, "the executor failed" in str(failed.error)) == ("bad", True)
 
 
@@ -401,9 +381,21 @@ def test_a_scheduler_that_does_not_answer_ends_the_command(
             pass
 
 
-def test_an_end_names_its_cell(tmp_path: Path, threads: ThreadPoolExecutor):
-    events: list = []
-    run_grid(tmp_path / "s", cells(tmp_path, 1), executor=threads, on_progress=events.append)
-
-    assert isinstance(events[1], CellEnds)
-    assert (events[1].name, events[1].error, events[1].seconds > 0) == ("run-00", None, True)
+@pytest.mark.process
+def test_a_scheduler_that_goes_mute_ends_the_study(study: Study, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("distributed", reason="needs the extra dask")
+    monkeypatch.setattr(grid, "PING_SECONDS", 0.2)
+    file, module = study.notes / "scheduler.json", "distributed.cli.dask_scheduler"
+    options = ("--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", file)
+    command = [sys.executable, "-m", module, *options]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as scheduler:
+        try:
+            while not file.exists() or not file.read_text():
+                time.sleep(0.05)
+            with dask_executor(json.loads(file.read_text())["address"]) as executor:
+                monkeypatch.setattr(grid, "CONNECT_SECONDS", 2)
+                scheduler.send_signal(signal.SIGSTOP)
+                with pytest.raises(WorkError, match=r"has ended.*the same command continues"):
+                    study.run(cells(study.notes, 1), executor=executor)
+        finally:
+            scheduler.kill()

@@ -6,12 +6,23 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from selfmodel.settings import Settings
-from selfmodel.studies.paper import UNKNOWN, PaperResults, page, tables_of, write_results
+from selfmodel.studies import figures
+from selfmodel.studies.paper_page import (
+    NOT_RESTORED,
+    UNKNOWN,
+    PaperResults,
+    best_so_far,
+    page,
+    tables_of,
+    write_results,
+)
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.tables import csv_bytes
+from selfmodel.tasks import ROBOTS
 from tests.helpers.study_rows import evolution, recovery, trials
 
 
@@ -78,8 +89,8 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     }
     assert all(f"({path.name})" in text for path in files if path.suffix == ".png")
     for line in (
-        "| 1 | a lower leg breaks off | `break:front_left_knee` |  |",
-        "| 7 | a | not restored | 1 of 1 | 0 of 1 | 2.00 | 0.50 | 2.00 | 1.00 | `intact` | 50 |",
+        "| 1 | a lower leg breaks off | quadruped | break:front_left_knee |",
+        "| quadruped | 7 | a | not restored | 1 of 1 | 0 of 1 | 2.00 | 0.50 | 2.00 | 1.00 |",
         f"| quadruped | {ON_ROBOT} | 10 | 1 | 0.50 |",
         "| quadruped | a | 2 | 1 | 1.50 |",
         "7, 8 of the quadruped; 4, 7, 10 of the hexapod",
@@ -101,3 +112,32 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
             "50.5",
         ]
     assert "figure-6" not in page(results(rows))
+
+
+def test_figure_five_has_medians_of_its_runs_and_greys_what_the_paper_did_not_restore():
+    rows = [
+        row
+        for seed, last in enumerate((1.0, 2.0, 6.0))
+        for case in (4, 7, 9)
+        for row in trials([2.0, 0.5, 1.0, last], seed=seed, robot="hexapod", case=case)
+    ]
+    rows += trials([0.0, 0.5, 1.0, 1.0], robot="hexapod", case=1)  # did not walk forward
+    (axes,) = figures.by_trial(rows, NOT_RESTORED, best_so_far).axes
+    drawn = [np.asarray(line.get_ydata()) for line in axes.get_lines()]
+
+    assert sum(np.array_equal(line, [0.25, 0.5, 1.0]) for line in drawn) == 3
+    assert all(np.isfinite(line).all() for line in drawn)
+    assert len(axes.patches) == 2
+    assert axes.get_title() == "hexapod (n = 1 to 3 per line)"
+
+
+def test_figure_one_has_every_joint_and_sensor_of_a_robot():
+    robot = ROBOTS["quadruped"].robot()
+    kinds = [sensor.kind for sensor in robot.anatomy.sensors]
+
+    for axes in figures.robots([robot]).axes:
+        assert {line.get_label(): len(line.get_xdata()) for line in axes.get_lines()} == {
+            "joint": len(robot.anatomy.joints),
+            "angle sensor": kinds.count("angle"),
+            "touch sensor": kinds.count("touch"),
+        }

@@ -1,13 +1,17 @@
-"""Tables of studies: summaries with intervals, and files in every format."""
+"""Tables of studies: summaries with intervals, files in every format, figures with their counts."""
 
 import io
+import itertools
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.studies.rows import KINDS, frame_of
+from selfmodel.studies import figures
+from selfmodel.studies.comparisons import compare
+from selfmodel.studies.rows import KINDS, frame_of, outcomes_of
 from selfmodel.studies.statistics import Interval
 from selfmodel.studies.tables import (
     FORMATS,
@@ -16,13 +20,12 @@ from selfmodel.studies.tables import (
     check_format,
     csv_bytes,
     suite_summaries,
-    summary_table,
     table_files,
+    table_of,
 )
 from tests.helpers.study_rows import body, diagnosis
 
-PAPERS = "forward-displacement"
-TABLE = summary_table(
+TABLE = table_of(
     "made",
     [{"name": "a|b_1", "n": 3, "share": Interval(0.5, 0.25, math.nan), "ok": True}],
     [{"name": "a|b_1", "n": "3", "share": "0.5 ÷ 50 %"}],
@@ -36,7 +39,7 @@ def scored(comparator: str, case: int, seconds: float, *, correct: bool) -> dict
 
 
 def test_time_is_compared_on_the_runs_that_both_have():
-    rows = [scored(PAPERS, case, 2.0, correct=case > 7) for case in range(10)]
+    rows = [scored("forward-displacement", case, 2.0, correct=case > 7) for case in range(10)]
     rows += [scored("other", case, 3.0, correct=True) for case in range(5, 15)]
     rows += [scored("other", 20, 1000.0, correct=True)]
     ours, other = ablation_scores(rows)
@@ -60,24 +63,14 @@ def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
     assert case["correct"].low < 2 / 3 < case["correct"].high
 
 
-def test_a_csv_has_all_digits_lower_case_flags_and_empty_cells():
-    rows = [diagnosis("a", distance=0.1 + 0.2, case=None)]
-    line = csv_bytes(frame_of(rows, KINDS["ablate"].columns)).decode().splitlines()[1]
-
-    assert line.startswith("quadruped,,break:front_left_knee,0.05,0,bank,a,1,intact,true,0.3000000")
-
-
 def test_every_format_has_its_file():
     files = {name: table_files([TABLE], name) for name in FORMATS}
-    markdown = files["markdown"]["made.md"].decode().splitlines()
     latex = files["latex"]["made.tex"].decode()
     parquet = pd.read_parquet(io.BytesIO(files["parquet"]["made.parquet"]))
 
-    assert (
-        files["csv"]["made.csv"]
-        == b"name,n,share,share_low,share_high,ok\na|b_1,3,0.5,0.25,,true\n"
-    )
-    assert markdown == [
+    head, values = files["csv"]["made.csv"].decode().splitlines()
+    assert (head, values) == ("name,n,share,share_low,share_high,ok", "a|b_1,3,0.5,0.25,,true")
+    assert files["markdown"]["made.md"].decode().splitlines() == [
         "| name | n | share |",
         "| --- | ---: | ---: |",
         r"| a\|b_1 | 3 | 0.5 ÷ 50 % |",
@@ -85,13 +78,9 @@ def test_every_format_has_its_file():
     assert r"a|b\_1 & 3 & 0.5 ÷ 50 \%" in latex
     assert all(rule in latex for rule in (r"\toprule", r"\midrule", r"\bottomrule", "{lrr}"))
     assert parquet["share_low"].tolist() == [0.25]
-    assert table_files([summary_table("none", [], [], 0)], "csv") == {}
-
-
-def test_an_unknown_format_is_refused_before_the_work():
-    check_format(None)
-    for name in FORMATS:
-        check_format(name)
+    assert table_files([table_of("none", [])], "csv") == {}
+    exact = diagnosis("a", distance=0.1 + 0.2, case=None)
+    assert b"0.30000000000000004" in csv_bytes(frame_of([exact], KINDS["ablate"].columns))
     with pytest.raises(InputError, match="unknown table format 'xls'"):
         check_format("xls")
 
@@ -100,3 +89,42 @@ def test_what_is_unknown_is_null_in_json():
     assert as_json({"a": [math.nan, Interval(1.0, math.nan, 2.0)]}) == {
         "a": [None, {"estimate": 1.0, "low": None, "high": 2.0}]
     }
+
+
+def test_the_figures_of_an_ablation_have_the_numbers_of_diagnoses_and_one_look_a_comparator():
+    rows = [
+        diagnosis(name, robot=robot, gap=gap, case=case, truth=str(case), seed=seed)
+        for name, robot, gap, case, seed in itertools.product(
+            "ab", ("quadruped", "hexapod"), (0.0, 0.1), (1, 2), range(3)
+        )
+        if (name, robot) != ("b", "hexapod") and (name == "a" or seed == 0)
+    ]
+    scores = ablation_scores(rows)
+    gap = figures.by_gap(scores)
+    cases = figures.by_case("quadruped", 1, [r for r in rows if r["robot"] == "quadruped"])
+    hexapod, quadruped = ([bar[0].get_color() for bar in axes.containers] for axes in gap.axes)
+
+    names = {"gap", "cases-hexapod-1", "cases-quadruped-1"}
+    files = figures.of_ablation(rows, scores)
+    assert set(files) == {f"{name}.{end}" for name in names for end in ("png", "pdf", "svg")}
+    assert files["gap.png"].startswith(b"\x89PNG")
+    assert figures.of_ablation([], []) == {}
+    assert [text.get_text() for text in gap.legends[0].get_texts()] == ["a (n = 6)", "b (n = 2)"]
+    labels = [text.get_text() for text in cases.axes[0].get_yticklabels()]
+    assert labels == ["a (n = 3)", "b (n = 1)"]
+    assert hexapod == quadruped[:1] != quadruped[1:]
+
+
+def test_a_pair_of_methods_has_its_difference_its_runs_and_a_filled_marker_if_it_is_better():
+    rows = [diagnosis(n, seed=seed, correct=n == "a") for n in "a$^{" for seed in range(12)]
+    found = compare(outcomes_of("ablate", rows))
+    (axes,) = figures.paired_differences(found).axes
+    markers = [line for line in axes.get_lines() if line.get_marker() == "o"]
+
+    assert all("n = 12" in label.get_text() for label in axes.get_yticklabels())
+    filled = sum(marker.get_markerfacecolor() != "white" for marker in markers)
+    assert filled == found["better"].notna().sum() == 3
+    ends = {tuple(map(float, line.get_xdata())) for line in axes.get_lines()}
+    assert set(zip(found["difference_low"], found["difference_high"], strict=True)) <= ends
+    assert all(figures.of_comparisons(found).values())  # "$^{" is no formula
+    assert np.isfinite([marker.get_xdata() for marker in markers]).all()

@@ -1,1 +1,0 @@
-"""Recoveries of simulated physical robots, measured against an oracle."""

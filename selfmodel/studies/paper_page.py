@@ -1,0 +1,296 @@
+"""The paper's experiment beside what the paper reports: tables, and a page in Markdown.
+
+Source: J. C. Bongard and H. Lipson, *Automated Damage Diagnosis and Recovery for Remote Robotics*
+(ICRA 2004): its abstract, and the part of its text that survives. Its figures and the numbers of
+its Table II are not available, so nothing here is read from them.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from selfmodel.settings import Settings
+from selfmodel.studies import figures
+from selfmodel.studies.cells import finished
+from selfmodel.studies.plans import TABLE_ONE
+from selfmodel.studies.recoveries import ON_ROBOT
+from selfmodel.studies.rows import study_rows
+from selfmodel.studies.study import RUNS, SHARED, Row, grouped
+from selfmodel.studies.tables import Table, markdown_of, table_files, table_of, write_files
+from selfmodel.tasks import ROBOTS
+
+NOT_RESTORED: Mapping[str, tuple[int, ...]] = MappingProxyType(
+    {"quadruped": (7, 8), "hexapod": (4, 7, 10)}
+)
+"""Cases in which the paper reports that the function was not restored, by robot."""
+
+REPORTED = (3000, 0.7, "the paper: over 3,000 on the robot, about 70 %")
+"""The abstract has more evaluations than these for evolution on the physical robot, which restores
+about this part of the function."""
+
+UNKNOWN = (
+    "the content of Figures 1, 5 and 6 and their numbers",
+    "the layout and the numbers of Table II",
+    "the number of runs of each case, and the displacements in metres",
+    "the share of the function from which the paper counts it as restored",
+)
+"""What could not be established."""
+
+RESTORED_FROM = 0.8
+"""Share of the displacement before the failure from which a function counts as restored here."""
+
+RUN = ("robot", "case", "seed")
+
+COSTS = """\
+![Displacement over that before the failure, by number of physical trials](figure-6.png)
+
+Medians and quartiles over the cases and seeds of a robot that all ways have, after the most trials
+of each way. *{on_robot}* is the paper's control: the repair EA with every evaluation on the damaged
+robot, from the gait before the failure and random controllers. It has the evaluations of one
+repair; the paper's own control, the star, has over 3,000. The paper itself reports almost complete
+restoration after 3 trials. The data are in [costs.csv](costs.csv).
+
+{table}"""
+
+
+@dataclass(frozen=True)
+class PaperResults:
+    """Results of the experiment.
+
+    Attributes:
+        settings: Parameters of all runs; None without a finished run.
+        recoveries: Rows of all recoveries in the folder.
+        trials: Rows of their physical trials.
+        evolution: Rows of the generations of the evolutions on the robot.
+    """
+
+    settings: Settings | None
+    recoveries: list[Row]
+    trials: list[Row]
+    evolution: list[Row]
+
+    def failures(self) -> list[Row]:
+        """Returns Table I for the robots and cases of the rows."""
+        truths = {(row["case"], row["robot"]): row["truth"] for row in self.recoveries}
+        return [
+            {"case": case, "failure": TABLE_ONE[case], "robot": robot, "truth": truth}
+            for (case, robot), truth in sorted(truths.items(), key=lambda item: item[0][0])
+        ]
+
+    def summaries(self) -> list[Row]:
+        """Returns Table II: a row per robot, case and comparator, in the order of the rows."""
+        groups = grouped(self.recoveries, "robot", "case", "comparator")
+        return [_summary(group) for group in groups.values()]
+
+    def costs(self) -> list[Row]:
+        """Returns the restored function by way and number of physical trials: quartiles.
+
+        Only runs that all ways of a robot have count, so that the ways are paired, and only those
+        with a displacement above 0 before the failure.
+        """
+        points = [
+            (robot, case, seed, way, trials, share)
+            for (robot, case, seed, way), rows in grouped(self.trials, *RUN, "comparator").items()
+            for trials, share in enumerate(best_so_far(rows))
+            if trials
+        ] + [
+            (*(row[name] for name in RUN), ON_ROBOT, row["evaluations"], _ratio(row))
+            for row in self.evolution
+        ]
+        frame = pd.DataFrame(points, columns=[*RUN, "way", "physical_trials", "recovery"])
+        ways_of_robot = frame.groupby("robot")["way"].transform("nunique")
+        ways_of_run = frame.groupby(list(RUN))["way"].transform("nunique")
+        paired = frame[ways_of_run == ways_of_robot].dropna()
+        groups = paired.groupby(["robot", "way", "physical_trials"], sort=False)["recovery"]
+        rows = []
+        for (robot, way, trials), shares in groups:
+            low, middle, high = np.quantile(shares, (0.25, 0.5, 0.75)).tolist()
+            key = {"robot": robot, "way": way, "physical_trials": trials, "runs": len(shares)}
+            rows.append({**key, "low": low, "recovery": middle, "high": high})
+        return rows
+
+    def last_costs(self) -> list[Row]:
+        """Returns the costs with the most physical trials, one per robot and way."""
+        ways = grouped(self.costs(), "robot", "way").values()
+        return [max(costs, key=lambda cost: cost["physical_trials"]) for costs in ways]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns the tables and their rows as JSON."""
+        return {
+            "settings": None if self.settings is None else vars(self.settings),
+            "table_1": self.failures(),
+            "table_2": self.summaries(),
+            "costs": self.last_costs(),
+            "recoveries": self.recoveries,
+            "trials": self.trials,
+        }
+
+
+def collect(folder: Path) -> PaperResults:
+    """Returns all results in the folder of an experiment.
+
+    Raises:
+        InputError: A cell in the folder is damaged.
+    """
+    first = next(finished(folder / RUNS), None)
+
+    def rows(table: str, *columns: str) -> list[Row]:
+        every = study_rows("paper", folder, table)
+        return [{name: row[name] for name in (*RUN, *columns)} for row in every]
+
+    return PaperResults(
+        None if first is None else Settings(**first.parameters[SHARED]["settings"]),
+        study_rows("paper", folder),
+        rows("trials", "comparator", "number", "stage", "hypothesis", "displacement"),
+        rows("evolution", "evaluations", "before", "best"),
+    )
+
+
+def write_results(folder: Path) -> tuple[PaperResults, tuple[Path, ...]]:
+    """Writes page, tables and figures of all finished runs in the folder of an experiment.
+
+    Without a finished recovery, nothing is written.
+
+    Raises:
+        InputError: A cell in the folder is damaged.
+        OSError: The results cannot be written.
+    """
+    results = collect(folder)
+    if not results.recoveries:
+        return results, ()
+    robots = dict.fromkeys(row["robot"] for row in results.recoveries)
+    drawn = {
+        "figure-1": figures.robots([ROBOTS[name].robot() for name in robots]),
+        "figure-5": figures.by_trial(results.trials, NOT_RESTORED, best_so_far),
+    }
+    if costs := results.costs():  # comparators that have no run in common cannot be compared
+        drawn["figure-6"] = figures.by_cost(costs, ON_ROBOT, REPORTED)
+    rows = {name: getattr(results, name) for name in ("recoveries", "trials", "evolution")}
+    tables = [*tables_of(results), *(table_of(name, one) for name, one in rows.items())]
+    text = json.dumps(results.as_dict(), indent=1, allow_nan=False)
+    files = {
+        **{name: data for one in drawn.items() for name, data in figures.files_of(*one).items()},
+        **table_files(tables, "csv"),
+        "results.json": f"{text}\n".encode(),
+        "paper.md": page(results).encode(),
+    }
+    return results, write_files(folder, files)
+
+
+def tables_of(results: PaperResults) -> list[Table]:
+    """Returns Table I, Table II and the costs, for programs and for readers."""
+    second = [
+        {
+            **{name: str(row[name]) for name in ("robot", "case", "comparator")},
+            "the paper": "restored" if row["restored_in_paper"] else "not restored",
+            "restored": f"{row['restored']} of {row['runs']}",
+            "right": f"{row['right']} of {row['runs']}",
+            **{name: _short(row[name]) for name in ("before", "after", "recovered")},
+            "÷ before": _between(row["recovery"], row["lowest"], row["highest"], row["runs"]),
+        }
+        for row in results.summaries()
+    ]
+    return [
+        table_of("table-1", results.failures()),
+        table_of("table-2", results.summaries(), second, texts=4),
+        _cost_table(results.costs()),
+    ]
+
+
+def _cost_table(costs: Sequence[Row]) -> Table:
+    shown = [
+        {
+            **{name: row[name] for name in ("robot", "way")},
+            "physical trials": str(row["physical_trials"]),
+            "n": str(row["runs"]),
+            "÷ before (quartiles)": _between(row["recovery"], row["low"], row["high"], row["runs"]),
+        }
+        for row in costs
+    ]
+    return table_of("costs", costs, shown, texts=2)
+
+
+def page(results: PaperResults) -> str:
+    """Returns the page of the experiment in Markdown."""
+    first, second, _ = tables_of(results)
+    settings, last = results.settings or Settings(), results.last_costs()
+    costs = COSTS.format(on_robot=ON_ROBOT, table=markdown_of(_cost_table(last)))
+    return (
+        Path(__file__)
+        .with_suffix(".md")
+        .read_text(encoding="utf-8")
+        .format(
+            not_restored="; ".join(
+                f"{', '.join(map(str, cases))} of the {robot}"
+                for robot, cases in NOT_RESTORED.items()
+            ),
+            unknown="; ".join(UNKNOWN),
+            size=f"Search budget: population {settings.population}, {settings.generations} "
+            f"generations, {settings.steps} control steps, trials after the failing one: "
+            f"{settings.trials}; {'the' if settings == Settings() else 'not the'} paper's.\n",
+            failures=markdown_of(first),
+            restored_from=RESTORED_FROM,
+            summaries=markdown_of(second),
+            costs=costs if last else "No run has all ways, so that they could be compared.\n",
+        )
+    )
+
+
+def best_so_far(trials: Sequence[Row]) -> list[float]:
+    """Returns the share of the displacement before the failure that trials restored.
+
+    Args:
+        trials: All trials of one recovery, in order.
+
+    Returns:
+        First that of the failing trial, then that of the best recovery trial so far.
+    """
+    before, after, *recovery = (trial["displacement"] for trial in trials)
+    largest = np.maximum.accumulate(recovery).tolist()
+    return [_ratio({"best": one, "before": before}) for one in (after, *largest)]
+
+
+def _ratio(row: Row) -> float:
+    return row["best"] / row["before"] if row["before"] > 0 else math.nan
+
+
+def _summary(rows: Sequence[Row]) -> Row:
+    first = rows[0]
+    ratios = [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
+    middle = {
+        name: median(row[name] for row in rows)
+        for name in ("before", "after", "recovered", "distinct_hypotheses", "seconds")
+    }
+    return {
+        **{name: first[name] for name in ("robot", "case", "truth", "comparator")},
+        "runs": len(rows),
+        "right": sum(row["correct"] for row in rows),
+        **{name: middle[name] for name in ("before", "after", "recovered")},
+        "recovery": median(ratios) if ratios else None,
+        "lowest": min(ratios, default=None),
+        "highest": max(ratios, default=None),
+        "restored": sum(value >= RESTORED_FROM for value in ratios),
+        "restored_in_paper": first["case"] not in NOT_RESTORED[first["robot"]],
+        "best": " ".join(sorted({row["best"] for row in rows if not row["correct"]})),
+        "distinct_hypotheses": middle["distinct_hypotheses"],
+        "diverged": sum(row["diverged"] for row in rows),
+        "seconds": middle["seconds"],
+    }
+
+
+def _between(middle: float | None, low: float | None, high: float | None, count: int) -> str:
+    if middle is None or low is None or high is None:
+        return "-"
+    return _short(middle) + (f" ({_short(low)} to {_short(high)})" if count > 1 else "")
+
+
+def _short(number: float) -> str:
+    return f"{round(number, 2) + 0.0:.2f}"  # -0.001 is 0.00, not -0.00
