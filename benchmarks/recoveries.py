@@ -110,8 +110,10 @@ def _line(
     robot: str, case: object, gap: float, rows: Sequence[Row], best: dict[tuple[object, ...], float]
 ) -> str:
     right = proportion(sum(row["correct"] for row in rows), len(rows))
-    healthy, first, largest, transfer = {}, [], [], []
-    befores = {}
+    befores, healthy = {}, {}
+    first: list[float] = []
+    largest: list[float] = []
+    transfer: list[float] = []
     for row in rows:
         # One gait before the failure per seed, whatever the case.
         cell = (row["robot"], NOTHING_BREAKS, row["gap"], row["seed"])
