@@ -1,38 +1,27 @@
-"""One recovery through the Python API: your robot, your comparator, your journal.
+"""One recovery through the Python API: your robots, your comparator, your folder.
 
 Usage: python examples/recover_in_python.py RUN_FOLDER
 """
 
 import sys
-from pathlib import Path
 
-from selfmodel.arguments import comparator_choice
-from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.faults.notation import parse
-from selfmodel.logs.journal import create_journal
-from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import RecoveryLoop
-from selfmodel.settings import Settings
-from selfmodel.simulation.simulator import Simulator
-from selfmodel.tasks import ROBOTS
+import selfmodel
 
 
-def main(folder: Path) -> None:
+def main(folder: str) -> None:
     """Recovers a quadruped that lost a leg, with a small budget."""
-    robot = ROBOTS["quadruped"].robot()
-    truth = parse("break:back_left_shoulder", robot.anatomy)
-    settings = Settings(steps=300, trials=2, generations=5).scaled(20)
-    journal = create_journal(folder, robot.anatomy, calibrated=False)
-    recovery = RecoveryLoop(
-        simulator=Simulator(robot, threads=2),
-        choose_comparator=comparator_choice(FORWARD_DISPLACEMENT),
-        run_trial=TrialRunner(journal.trials, robot, settings),
-        journal=journal,
-        settings=settings,
-        seed=0,
-        on_event=lambda _event: None,
-    ).run(SimulatedRobot(robot), SimulatedRobot(robot, truth))  # or any PhysicalRobot
+    robot = selfmodel.load_robot("quadruped")
+    truth = selfmodel.parse_hypothesis("break:back_left_shoulder", robot)
+    recovery = selfmodel.recover(
+        healthy=selfmodel.simulated_robot(robot),  # or any PhysicalRobot
+        damaged=selfmodel.simulated_robot(robot, truth),
+        robot=robot,
+        folder=folder,
+        comparator="forward-displacement",  # or your own object
+        settings=selfmodel.Settings(steps=200, trials=2, generations=3).scaled(10),
+        calibrate=False,
+        on_event=print,
+    )
     print(f"best explanation: {recovery.diagnosis.best} (the truth: {truth})")
     print(f"{recovery.before:.2f} m, {recovery.after:.2f} m, {recovery.recovered:.2f} m")
 
@@ -40,4 +29,4 @@ def main(folder: Path) -> None:
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit(__doc__)
-    main(Path(sys.argv[1]))
+    main(sys.argv[1])

@@ -1,136 +1,194 @@
 """The cases: each draws its faults for a robot and a seed."""
 
+import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.foreign.faults import Fault
 from benchmarks.foreign.robots import Robot
-from benchmarks.foreign.seeds import stream
 
-Draw = Callable[[Robot, np.random.Generator], tuple[Fault, ...]]
-PartDraw = Callable[[Robot, np.random.Generator], str]
-SeverityDraw = Callable[[np.random.Generator], float]
+NOTATION = {
+    "lost": "break:{part}",
+    "jam": "jam:{part}={value:.4f}",
+    "motor": "motor:{part}={value:.3f}",
+    "dead-sensor": "sensor:{part}",
+    "friction": "friction={value:.3f}",
+    "slope": "slope={value:.3f}",
+    "wind": "wind={value:.2f}",
+    "payload": "payload:{part}={value:.3f}",
+    "damping": "damping:{part}={value:.2f}",
+    "joint-friction": "joint-friction:{part}={value:.3f}",
+    "delay": "delay={value:.2f}",
+    "encoder-offset": "encoder-offset:{part}={value:.3f}",
+    "encoder-slip": "encoder-offset:{part}=slip{value:.3f}",
+    "grip": "grip:{part}={value:.3f}",
+    "backlash": "backlash:{part}={value:.3f}",
+}
+"""Notation of each kind of fault that selfmodel has, or is to have. With ``encoder-slip``, the
+servo uses the encoder with the offset; with ``encoder-offset``, it has another one."""
+
+UNKNOWN = ("crossed", "tether", "heavy-limb", "soft-ground", "side-slope", "short-range")
+"""Kinds of faults that no kind of selfmodel expresses."""
+
+SILENT = ("encoder",)
+"""Kinds that change the record and not the robot: no diagnosis has to name them."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of a robot, of its environment, or of its recorder."""
+
+    kind: str
+    part: str = ""
+    """Name of a part, hinge, sensor or body; empty for the environment."""
+    value: float = 0.0
+    """Severity in the unit of its notation; for the kinds of ``UNKNOWN`` as in ``model``."""
+    encoders: str = "freezes"
+    """Encoders of a lost limb: ``freezes``, ``follows`` the commands, ``nan``, or ``none``."""
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Position of a payload on the root body, m."""
+    debris: bool = False
+    """Whether a lost limb stays on the ground."""
+
+    @property
+    def notation(self) -> str:
+        """The fault in selfmodel's notation; a kind that it does not have as ``outside:kind``."""
+        if self.kind in UNKNOWN:
+            return f"outside:{self.kind}"
+        text = NOTATION[self.kind].format(part=self.part, value=self.value)
+        return text.removesuffix("=0.0000").replace(":=", "=")
+
+
+Faults = tuple[Fault, ...]
+Draw = Callable[[Robot, np.random.Generator], Faults]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A case.
-
-    Attributes:
-        name: Its name.
-        group: Its group in the tables.
-        draw: Draws the faults.
-        onset: Whether the faults begin in mid-trial.
-        network: Whether a network has to control the robot, because sensors are wrong.
-    """
+    """A case: those with the name ``onset-...`` begin in mid-trial."""
 
     name: str
     group: str
     draw: Draw
-    onset: bool = False
-    network: bool = False
 
 
-def faults_of(case: Case, robot: Robot, seed: int) -> tuple[Fault, ...]:
+def stream(seed: int, *words: str) -> np.random.Generator:
+    """Returns the generator of a random stream, named by words such as robot, case and purpose."""
+    key = [zlib.crc32(word.encode()) for word in words]
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+def notation(faults: Faults) -> list[str]:
+    """Returns the truth of a case: the notation of each fault that a diagnosis has to name."""
+    return [fault.notation for fault in faults if fault.kind not in SILENT]
+
+
+def faults_of(case: Case, robot: Robot, seed: int) -> Faults:
     """Returns the faults of a case; they do not depend on the gap."""
     return case.draw(robot, stream(seed, robot.name, case.name, "faults"))
 
 
 def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
     """Returns the time at which the faults begin, s; None if they hold from the start."""
-    if not case.onset:
+    if case.group != "onset":
         return None
     drawn = stream(seed, robot.name, case.name, "onset").uniform(3, 7)
     return round(round(drawn / robot.control_timestep) * robot.control_timestep, 6)
 
 
-def _single(kind: str, part: PartDraw, severity: SeverityDraw) -> Draw:
-    """Returns a draw of one fault: its part, and then its severity."""
+def _one_of(rng: np.random.Generator, names: list[str]) -> str:
+    return names[rng.integers(len(names))]
 
-    def draw(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-        return (Fault(kind, part(robot, rng), severity(rng)),)
+
+def _part(robot: Robot, rng: np.random.Generator) -> str:
+    return _one_of(rng, [part.name for part in robot.parts])
+
+
+def _hinge_part(robot: Robot, rng: np.random.Generator) -> str:
+    return _one_of(rng, [part.name for part in robot.parts if len(part.hinges) == 1])
+
+
+def _hinge(robot: Robot, rng: np.random.Generator) -> str:
+    return robot.part(_hinge_part(robot, rng)).hinges[0]
+
+
+def _nowhere(_robot: Robot, _rng: np.random.Generator) -> str:
+    return ""
+
+
+Severity = Callable[[np.random.Generator], float]
+
+
+def _between(low: float, high: float, digits: int | None = 3) -> Severity:
+    return lambda rng: _rounded(rng.uniform(low, high), digits)
+
+
+def _either_sign(low: float, high: float, digits: int | None = 3) -> Severity:
+    return lambda rng: _rounded(float(rng.choice((-1, 1)) * rng.uniform(low, high)), digits)
+
+
+def _rounded(value: float, digits: int | None) -> float:
+    return value if digits is None else round(value, digits)
+
+
+def _single(
+    kind: str, part: Callable[[Robot, np.random.Generator], str], severity: Severity
+) -> Draw:
+    """Returns a draw of one fault: its part, and then its severity."""
+    return lambda robot, rng: (Fault(kind, part(robot, rng), severity(rng)),)
+
+
+def _limb(*encoders: str, debris: bool = False) -> Draw:
+    def draw(robot: Robot, rng: np.random.Generator) -> Faults:
+        part = _part(robot, rng)
+        return (Fault("lost", part, encoders=str(rng.choice(encoders)), debris=debris),)
 
     return draw
 
 
-def _lost(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return _limb(robot, rng, ("freezes", "follows"))
+def _together(*draws: Draw) -> Draw:
+    return lambda robot, rng: tuple(fault for draw in draws for fault in draw(robot, rng))
 
 
-def _lost_with_debris(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    (fault,) = _lost(robot, rng)
-    return (replace(fault, debris=True),)
+def _range(robot: Robot, part: str) -> tuple[float, float]:
+    low, high = robot.spec().compile().joint(robot.part(part).hinges[0]).range
+    return float(low), float(high)
 
 
-def _limb(robot: Robot, rng: np.random.Generator, modes: tuple[str, ...]) -> tuple[Fault, ...]:
-    return (Fault("lost", _part(robot, rng), encoders=str(rng.choice(modes))),)
-
-
-def _part(robot: Robot, rng: np.random.Generator) -> str:
-    return robot.parts[rng.integers(len(robot.parts))].name
-
-
-def _hinge_part(robot: Robot, rng: np.random.Generator) -> str:
-    """Draws a part of one hinge."""
-    single = [part.name for part in robot.parts if len(part.hinges) == 1]
-    return single[rng.integers(len(single))]
-
-
-def _environment(robot: Robot, rng: np.random.Generator) -> str:
-    """Returns the part of a fault of the environment, or of the whole robot."""
-    del robot, rng
-    return ""
-
-
-def _signed(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(rng.choice((-1, 1)) * rng.uniform(low, high))
-
-
-def _between(low: float, high: float, digits: int = 3) -> SeverityDraw:
-    return lambda rng: round(rng.uniform(low, high), digits)
-
-
-def _either_sign(low: float, high: float, digits: int = 3) -> SeverityDraw:
-    return lambda rng: round(_signed(rng, low, high), digits)
-
-
-def _jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _jam(robot: Robot, rng: np.random.Generator) -> Faults:
     """A jam at 0, or at the end of the range nearest to 0."""
-    name = _part(robot, rng)
-    model = robot.spec().compile()
-    low, high = model.joint(robot.part(name).hinges[0]).range
-    return (Fault("jam", name, float(min(max(low, 0.0), high))),)
+    part = _part(robot, rng)
+    low, high = _range(robot, part)
+    return (Fault("jam", part, min(max(low, 0.0), high)),)
 
 
-def _jam_angle(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    name = _hinge_part(robot, rng)
-    model = robot.spec().compile()
-    low, high = model.joint(robot.part(name).hinges[0]).range
+def _jam_angle(robot: Robot, rng: np.random.Generator) -> Faults:
+    part = _hinge_part(robot, rng)
+    low, high = _range(robot, part)
     side = rng.choice((0.2, 0.8)) + rng.uniform(-0.1, 0.1)
-    return (Fault("jam", name, round(float(low + side * (high - low)), 3)),)
+    return (Fault("jam", part, round(float(low + side * (high - low)), 3)),)
 
 
-def _sensor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return (Fault("dead-sensor", list(robot.touches)[rng.integers(len(robot.touches))]),)
+def _sensor(robot: Robot, rng: np.random.Generator) -> Faults:
+    return (Fault("dead-sensor", _one_of(rng, list(robot.touches))),)
 
 
-def _lost_and_sensor(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    (limb,) = _lost(robot, rng)
+def _lost_and_sensor(robot: Robot, rng: np.random.Generator) -> Faults:
+    (limb,) = _LOST(robot, rng)
     others = [name for name in robot.touches if name not in robot.part(limb.part).touches]
-    return limb, Fault("dead-sensor", others[rng.integers(len(others))])
+    return limb, Fault("dead-sensor", _one_of(rng, others))
 
 
-def _lost_and_jam(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    (limb,) = _lost(robot, rng)
+def _lost_and_jam(robot: Robot, rng: np.random.Generator) -> Faults:
+    (limb,) = _LOST(robot, rng)
     while True:
         (jam,) = _jam(robot, rng)
         if set(robot.part(jam.part).touches) != set(robot.part(limb.part).touches):
             return limb, jam
 
 
-def _payload(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _payload(robot: Robot, rng: np.random.Generator) -> Faults:
     """A payload above the middle of the root body, or near its front or back end."""
     end = ("back", "", "front")[rng.integers(3)]
     model = robot.spec().compile()
@@ -140,137 +198,104 @@ def _payload(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
     return (Fault("payload", end, round(rng.uniform(0.2, 0.5), 3), place=place),)
 
 
-def _heavier(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _heavier(robot: Robot, _rng: np.random.Generator) -> Faults:
     """A torso that is 30 % heavier, as a payload at its centre."""
-    del rng
     model = robot.spec().compile()
     part = 0.3 * model.body(robot.root).mass[0] / model.body_mass.sum()
     return (Fault("payload", value=round(float(part), 3)),)
 
 
-def _grip(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _grip(robot: Robot, rng: np.random.Generator) -> Faults:
     feet = [part.name for part in robot.parts if part.body in robot.touches.values()]
-    return (Fault("grip", feet[rng.integers(len(feet))], 0.1),)
+    return (Fault("grip", _one_of(rng, feet), 0.1),)
 
 
-def _backlash(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    hinge = robot.part(_hinge_part(robot, rng)).hinges[0]
-    return (Fault("backlash", hinge, round(rng.uniform(0.1, 0.3), 3)),)
-
-
-def _encoder(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _encoder(robot: Robot, rng: np.random.Generator) -> Faults:
     """An encoder that is not recorded; nothing else is wrong."""
-    hinge = robot.hinges[rng.integers(len(robot.hinges))]
+    hinge = _one_of(rng, list(robot.hinges))
     return (Fault("encoder", hinge, encoders=str(rng.choice(("nan", "none")))),)
 
 
-def _crossed(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _crossed(robot: Robot, rng: np.random.Generator) -> Faults:
     first, second = rng.choice(list(robot.motors), 2, replace=False)
     return (Fault("crossed", f"{first} {second}"),)
 
 
-def _tether(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _tether(robot: Robot, rng: np.random.Generator) -> Faults:
     weight = robot.spec().compile().body_mass.sum() * 9.81
     return (Fault("tether", value=float(weight * rng.uniform(0.3, 0.8))),)
 
 
-def _heavy_limb(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    feet = list(robot.touches.values())
-    return (Fault("heavy-limb", feet[rng.integers(len(feet))], float(rng.uniform(4, 7))),)
-
-
-def _soft_ground(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("soft-ground", value=float(rng.uniform(150, 400))),)
-
-
-def _side_slope(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot
-    return (Fault("side-slope", value=_signed(rng, 0.12, 0.25)),)
-
-
-def _short_range(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    hinge = robot.part(_hinge_part(robot, rng)).hinges[0]
-    return (Fault("short-range", hinge, float(rng.uniform(0.1, 0.2))),)
-
-
-def _with(*draws: Draw) -> Draw:
-    def draw(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-        return tuple(fault for one in draws for fault in one(robot, rng))
-
-    return draw
-
-
-def _nothing(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    del robot, rng
-    return ()
-
-
-def _lost_nan(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return _limb(robot, rng, ("nan",))
-
-
-def _lost_none(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
-    return _limb(robot, rng, ("none",))
-
-
-def _jam_there(robot: Robot, rng: np.random.Generator) -> tuple[Fault, ...]:
+def _jam_there(robot: Robot, rng: np.random.Generator) -> Faults:
     """A jam at the angle at which the joint is at the onset."""
     return (Fault("jam", _hinge_part(robot, rng), float("nan")),)
 
 
-_FRICTION = _single("friction", _environment, _between(0.35, 0.6))
+def _foot(robot: Robot, rng: np.random.Generator) -> str:
+    return _one_of(rng, list(robot.touches.values()))
+
+
+_LOST = _limb("freezes", "follows")
+_FRICTION = _single("friction", _nowhere, _between(0.35, 0.6))
 _MOTOR = _single("motor", _part, _between(0.05, 0.5))
-_SLOPE = _single("slope", _environment, _either_sign(0.1, 0.2))
-_WIND = _single("wind", _environment, _either_sign(12, 25, digits=2))
+_SLOPE = _single("slope", _nowhere, _either_sign(0.1, 0.2))
+_WIND = _single("wind", _nowhere, _either_sign(12, 25, digits=2))
+_OFFSET = _either_sign(0.1, 0.25)
+
+_GROUPS: dict[str, dict[str, Draw]] = {
+    "paper": {
+        "break": _LOST,
+        "jam": _jam,
+        "sensor": _sensor,
+        "break-debris": _limb("freezes", "follows", debris=True),
+        "break+sensor": _lost_and_sensor,
+        "break+jam": _lost_and_jam,
+    },
+    "healthy": {"healthy": _together()},
+    "wide": {
+        "jam-angle": _jam_angle,
+        "motor": _MOTOR,
+        "heavier": _heavier,
+        "damping": _single("damping", _hinge_part, lambda _rng: 8.0),
+        "joint-friction": _single("joint-friction", _hinge_part, _between(0.15, 0.4)),
+        "delay": _single("delay", _nowhere, _between(2, 3, digits=2)),
+        "encoder-offset": _single("encoder-offset", _hinge_part, _OFFSET),
+        "encoder-slip": _single("encoder-slip", _hinge_part, _OFFSET),
+        "grip": _grip,
+        "backlash": _single("backlash", _hinge, _between(0.1, 0.3)),
+    },
+    "default": {
+        "friction": _FRICTION,
+        "slope": _SLOPE,
+        "wind": _WIND,
+        "payload": _payload,
+        "break+friction": _together(_LOST, _FRICTION),
+        "jam+slope": _together(_jam, _SLOPE),
+        "motor+wind": _together(_MOTOR, _WIND),
+        "break+payload": _together(_LOST, _payload),
+    },
+    "onset": {
+        "onset-jam": _jam_there,
+        "onset-motor": _single("motor", _part, _between(0.01, 0.3)),
+        "onset-break": _LOST,
+    },
+    "lost-encoder": {"break-nan": _limb("nan"), "break-none": _limb("none"), "encoder": _encoder},
+    "outside": {
+        "crossed": _crossed,
+        "tether": _tether,
+        "heavy-limb": _single("heavy-limb", _foot, _between(4, 7, digits=None)),
+        "soft-ground": _single("soft-ground", _nowhere, _between(150, 400, digits=None)),
+        "side-slope": _single("side-slope", _nowhere, _either_sign(0.12, 0.25, digits=None)),
+        "short-range": _single("short-range", _hinge, _between(0.1, 0.2, digits=None)),
+    },
+}
+
+GROUPS = tuple(_GROUPS)
+"""The groups in the order of the tables."""
 
 CASES = {
-    case.name: case
-    for case in (
-        Case("break", "paper", _lost),
-        Case("jam", "paper", _jam),
-        Case("sensor", "paper", _sensor, network=True),
-        Case("break-debris", "paper", _lost_with_debris),
-        Case("break+sensor", "paper", _lost_and_sensor, network=True),
-        Case("break+jam", "paper", _lost_and_jam),
-        Case("healthy", "healthy", _nothing),
-        Case("jam-angle", "wide", _jam_angle),
-        Case("motor", "wide", _MOTOR),
-        Case("heavier", "wide", _heavier),
-        Case("damping", "wide", _single("damping", _hinge_part, lambda _: 8.0)),
-        Case("joint-friction", "wide", _single("joint-friction", _hinge_part, _between(0.15, 0.4))),
-        Case("delay", "wide", _single("delay", _environment, _between(2, 3, digits=2))),
-        Case(
-            "encoder-offset",
-            "wide",
-            _single("encoder-offset", _hinge_part, _either_sign(0.1, 0.25)),
-        ),
-        Case("encoder-slip", "wide", _single("encoder-slip", _hinge_part, _either_sign(0.1, 0.25))),
-        Case("grip", "wide", _grip),
-        Case("backlash", "wide", _backlash),
-        Case("friction", "default", _FRICTION),
-        Case("slope", "default", _SLOPE),
-        Case("wind", "default", _WIND),
-        Case("payload", "default", _payload),
-        Case("break+friction", "default", _with(_lost, _FRICTION)),
-        Case("jam+slope", "default", _with(_jam, _SLOPE)),
-        Case("motor+wind", "default", _with(_MOTOR, _WIND)),
-        Case("break+payload", "default", _with(_lost, _payload)),
-        Case("onset-jam", "onset", _jam_there, onset=True),
-        Case("onset-motor", "onset", _single("motor", _part, _between(0.01, 0.3)), onset=True),
-        Case("onset-break", "onset", _lost, onset=True),
-        Case("break-nan", "lost-encoder", _lost_nan),
-        Case("break-none", "lost-encoder", _lost_none),
-        Case("encoder", "lost-encoder", _encoder),
-        Case("crossed", "outside", _crossed),
-        Case("tether", "outside", _tether),
-        Case("heavy-limb", "outside", _heavy_limb),
-        Case("soft-ground", "outside", _soft_ground),
-        Case("side-slope", "outside", _side_slope),
-        Case("short-range", "outside", _short_range),
-    )
+    name: Case(name, group, draw)
+    for group, draws in _GROUPS.items()
+    for name, draw in draws.items()
 }
 """The cases by name."""
-
-GROUPS = tuple(dict.fromkeys(case.group for case in CASES.values()))
-"""The groups in the order of the tables."""

@@ -11,38 +11,22 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from benchmarks.foreign.cases import CASES, Case, faults_of, onset_of
-from benchmarks.foreign.faults import Fault, notation
-from benchmarks.foreign.recorder.bag import Noise, recorded_items, write_bag
-from benchmarks.foreign.recorder.encoders import encoders_of
-from benchmarks.foreign.recorder.mapping import mapping
+from benchmarks.foreign.cases import CASES, Case, Faults, faults_of, notation, onset_of, stream
+from benchmarks.foreign.model import LEVELS, Gap, compiled, draw_gap
+from benchmarks.foreign.motion import Gait, Motion, Phase, draw_gait, simulate
+from benchmarks.foreign.recorder import Noise, encoders_of, mapping, recorded, write_bag
 from benchmarks.foreign.robots import SERVO_GAINS, Robot, robot
-from benchmarks.foreign.seeds import stream
-from benchmarks.foreign.world.body import compiled
-from benchmarks.foreign.world.gaits import Gait, command_ranges, draw_gait, upright
-from benchmarks.foreign.world.gap import LEVELS, Gap, draw_gap
-from benchmarks.foreign.world.motion import Motion, Phase, simulate
 
 CANDIDATES, GAITS = 16, 3
 """Drawn gaits, and gaits of a recording: those with the largest displacements."""
 
-NO_GAP = 0.0
 MATTERS = 0.1
 """Smallest change of the displacement by a fault outside all kinds, relative to the healthy one."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record.
-
-    Attributes:
-        robot: Name of the robot.
-        case: Name of the case.
-        seed: Seed.
-        gap: Name of the gap.
-        duration: Duration of each trial, s.
-        trials: Number of trials of the robot with its faults.
-    """
+    """What to record: robot, case and gap by name, and the trials of the robot with its faults."""
 
     robot: str
     case: str
@@ -56,22 +40,9 @@ class Plan:
         """Name of the folder of the recording."""
         return f"{self.robot}-{self.case}-{self.seed}-{self.gap}"
 
-
-@dataclass(frozen=True)
-class Trial:
-    """One trial of a recording.
-
-    Attributes:
-        name: Name of its bag.
-        faults: The faults.
-        onset: Time at which they begin, s; None if they hold from the start.
-        gait: The gait.
-    """
-
-    name: str
-    faults: tuple[Fault, ...]
-    onset: float | None
-    gait: Gait
+    def stream(self, *words: str) -> np.random.Generator:
+        """Returns a random stream of this robot and case."""
+        return stream(self.seed, self.robot, self.case, *words)
 
 
 def generate(out: Path, plan: Plan) -> Path:
@@ -81,29 +52,31 @@ def generate(out: Path, plan: Plan) -> Path:
         Its folder.
     """
     folder = out / plan.name
-    made, asked = folder / "truth.json", dataclasses.asdict(plan)
-    if made.exists() and asked.items() <= json.loads(made.read_text()).items():
+    written, asked = folder / "truth.json", dataclasses.asdict(plan)
+    if written.exists() and asked.items() <= json.loads(written.read_text()).items():
         return folder
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     machine, case = robot(plan.robot), CASES[plan.case]
-    faults = faults_of(case, machine, plan.seed)
-    onset = onset_of(case, machine, plan.seed)
-    gap = draw_gap(machine, LEVELS[plan.gap], _stream(plan, "gap"))
+    faults, onset = faults_of(case, machine, plan.seed), onset_of(case, machine, plan.seed)
+    gap = draw_gap(machine, LEVELS[plan.gap], plan.stream("gap"))
     gaits = _gaits(machine, case, plan, faults)
     record = partial(_record, folder, machine, plan, gap)
-    before = record(Trial("before", (), None, gaits[0]))
+    before = record(name="before", faults=(), onset=None, gait=gaits[0])
     moved: list[Motion] = []
     for k in range(plan.trials):
         # Trials after the onset have the faults from their start.
-        start = onset if k == 0 else None
         present = _stated(machine, faults, moved) if moved else faults
-        moved.append(record(Trial(f"after-{k + 1}", present, start, gaits[k])))
-    if machine.mapped_as != machine.name:
-        _write_files(machine, folder)
+        start = None if k else onset
+        moved.append(record(name=f"after-{k + 1}", faults=present, onset=start, gait=gaits[k]))
+    if machine.mapped_as != machine.name:  # the MJCF beside the mappings, with its settings
+        shutil.copyfile(machine.path, folder / machine.mapped_as)
+        stiffness, damping = SERVO_GAINS
+        settings = f"kp = {stiffness}\nkd = {damping}\n"
+        (folder / machine.mapped_as).with_suffix(".toml").write_text(settings)
     stated = _stated(machine, faults, moved)
     truth = {
-        **dataclasses.asdict(plan),
+        **asked,
         "group": case.group,
         "truth": notation(stated),
         "faults": [dataclasses.asdict(fault) for fault in stated],
@@ -111,15 +84,11 @@ def generate(out: Path, plan: Plan) -> Path:
         "displacement_healthy": before.displacement(plan.duration).tolist(),
         "displacement_after": moved[0].displacement(plan.duration).tolist(),
     }
-    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+    written.write_text(json.dumps(truth, indent=1) + "\n")
     return folder
 
 
-def _stream(plan: Plan, *words: str) -> np.random.Generator:
-    return stream(plan.seed, plan.robot, plan.case, *words)
-
-
-def _stated(machine: Robot, faults: tuple[Fault, ...], motions: list[Motion]) -> tuple[Fault, ...]:
+def _stated(machine: Robot, faults: Faults, motions: list[Motion]) -> Faults:
     """Returns the faults, a jam where the joint was at the onset with its angle."""
 
     def angle(part: str) -> float:
@@ -135,101 +104,82 @@ def _stated(machine: Robot, faults: tuple[Fault, ...], motions: list[Motion]) ->
 
 
 def _phase(
-    start: float, machine: Robot, faults: tuple[Fault, ...], model: Callable[..., mujoco.MjModel]
+    start: float, machine: Robot, faults: Faults, model: Callable[..., mujoco.MjModel]
 ) -> Phase:
     """Returns a phase of a trial with the effects of the faults outside the model."""
+
+    def of_kind(kind: str) -> Faults:
+        return tuple(fault for fault in faults if fault.kind == kind)
+
     return Phase(
         start=start,
         model=model,
-        offsets={
-            machine.part(fault.part).hinges[0]: fault.value
-            for fault in faults
-            if fault.kind == "encoder-slip"
-        },
-        fixed={
-            hinge: fault.value
-            for fault in faults
-            if fault.kind == "jam"
-            for hinge in machine.part(fault.part).hinges
-        },
-        dead=frozenset(fault.part for fault in faults if fault.kind == "dead-sensor"),
-        swapped=next((tuple(f.part.split()) for f in faults if f.kind == "crossed"), ()),
-        delay=machine.control_timestep * sum(f.value for f in faults if f.kind == "delay"),
+        offsets={machine.part(f.part).hinges[0]: f.value for f in of_kind("encoder-slip")},
+        fixed={h: f.value for f in of_kind("jam") for h in machine.part(f.part).hinges},
+        dead=frozenset(fault.part for fault in of_kind("dead-sensor")),
+        swapped=tuple(name for fault in of_kind("crossed") for name in fault.part.split()),
+        delay=machine.control_timestep * sum(fault.value for fault in of_kind("delay")),
     )
 
 
-def _write_files(machine: Robot, folder: Path) -> None:
-    """Writes the MJCF beside the mappings, with its settings."""
-    shutil.copyfile(machine.path, folder / machine.mapped_as)
-    stiffness, damping = SERVO_GAINS
-    settings = f"kp = {stiffness}\nkd = {damping}\n"
-    (folder / machine.mapped_as).with_suffix(".toml").write_text(settings)
-
-
-def _gaits(machine: Robot, case: Case, plan: Plan, faults: tuple[Fault, ...]) -> list[Gait]:
+def _gaits(machine: Robot, case: Case, plan: Plan, faults: Faults) -> list[Gait]:
     """Returns the gaits with the largest displacements of the robot without gap and faults."""
-    rng, ranges = _stream(plan, "gaits"), command_ranges(machine)
-    kind = "network" if case.network or rng.random() < 1 / 3 else "playback"
-    drawn = [draw_gait(machine, ranges, kind, rng) for _ in range(CANDIDATES)]
-    perfect = draw_gap(machine, NO_GAP, _stream(plan, "gap"))
+    rng = plan.stream("gaits")
+    wrong = "sensor" in case.name  # so that a network has to control the robot
+    kind = "network" if wrong or rng.random() < 1 / 3 else "playback"
+    gaits = [draw_gait(machine, kind, rng) for _ in range(CANDIDATES)]
+    perfect = draw_gap(machine, 0.0, plan.stream("gap"))
+
+    def moved(model: mujoco.MjModel, gait: Gait, present: Faults) -> Motion:
+        phase = _phase(0.0, machine, present, lambda _angles: model)
+        return simulate(machine, [phase], gait, plan.duration)
+
     model = compiled(machine, perfect, ())
-    motions = [_rehearsal(machine, model, gait, (), plan.duration) for gait in drawn]
+    motions = [moved(model, gait, ()) for gait in gaits]
+    ways = [motion.displacement(plan.duration) for motion in motions]
     distances = [
-        float(np.linalg.norm(motion.displacement(plan.duration)))
-        * (1.0 if upright(motion.pose[-1, 3:]) else 0.01)
-        for motion in motions
+        float(np.linalg.norm(way)) * (1.0 if motion.is_upright() else 0.01)
+        for way, motion in zip(ways, motions, strict=True)
     ]
     best = sorted(range(CANDIDATES), key=lambda k: -distances[k])
     if case.group == "outside":
         other = compiled(machine, perfect, faults)
-        best = sorted(
-            best[: 2 * GAITS],
-            key=lambda k: (
-                _change(
-                    motions[k], _rehearsal(machine, other, drawn[k], faults, plan.duration), plan
-                )
-                < MATTERS
-            ),
-        )
-    return [drawn[k] for k in best[:GAITS]]
+
+        def is_unaffected(k: int) -> bool:
+            after = moved(other, gaits[k], faults).displacement(plan.duration)
+            return bool(np.linalg.norm(after - ways[k]) / np.linalg.norm(ways[k]) < MATTERS)
+
+        best = sorted(best[: 2 * GAITS], key=is_unaffected)
+    return [gaits[k] for k in best[:GAITS]]
 
 
-def _change(before: Motion, after: Motion, plan: Plan) -> float:
-    healthy = before.displacement(plan.duration)
-    return float(
-        np.linalg.norm(after.displacement(plan.duration) - healthy) / np.linalg.norm(healthy)
-    )
-
-
-def _rehearsal(
-    machine: Robot, model: mujoco.MjModel, gait: Gait, faults: tuple[Fault, ...], duration: float
+def _record(
+    folder: Path,
+    machine: Robot,
+    plan: Plan,
+    gap: Gap,
+    *,
+    name: str,
+    faults: Faults,
+    onset: float | None,
+    gait: Gait,
 ) -> Motion:
-    return simulate(machine, [_phase(0.0, machine, faults, lambda _angles: model)], gait, duration)
-
-
-def _record(folder: Path, machine: Robot, plan: Plan, gap: Gap, trial: Trial) -> Motion:
     """Simulates and records one trial, and writes its mapping."""
-    rng = _stream(plan, plan.gap, trial.name)
-
-    def latency() -> float:
-        return gap.latency + gap.latency_spread * rng.uniform(-1, 1)
-
+    rng = plan.stream(plan.gap, name)
+    delay, spread = gap.latency
     models = partial(compiled, machine, gap)
-    start = trial.onset or 0.0
-    phases = [_phase(start, machine, trial.faults, partial(models, trial.faults))]
-    if trial.onset is not None:
+    phases = [_phase(onset or 0.0, machine, faults, partial(models, faults))]
+    if onset is not None:
         phases = [_phase(0.0, machine, (), partial(models, ())), *phases]
-    motion = simulate(machine, phases, trial.gait, plan.duration, latency)
-    turned = _stream(plan, "signs").choice((-1, 1), len(machine.hinges))
-    signs = {hinge: int(sign) for hinge, sign in zip(machine.hinges, turned, strict=True)}
-    encoders = encoders_of(machine, trial.faults, trial.onset or -1.0, signs)
-    write_bag(
-        folder / trial.name,
-        recorded_items(machine, motion, encoders, Noise().scaled(gap.size), rng),
-        rng,
-        lost=Noise().lost * gap.size,
-        mcap=plan.seed % 2 == 0,
+    motion = simulate(
+        machine, phases, gait, plan.duration, lambda: delay + spread * rng.uniform(-1, 1)
     )
-    text = mapping(machine, encoders, plan.duration, healthy=not trial.name.startswith("after"))
-    (folder / f"{trial.name}.toml").write_text(text)
+    turned = plan.stream("signs").choice((-1, 1), len(machine.hinges))
+    signs = {hinge: int(sign) for hinge, sign in zip(machine.hinges, turned, strict=True)}
+    encoders = encoders_of(machine, faults, onset or -1.0, signs)
+    noise = Noise().scaled(gap.size)
+    items = recorded(machine, motion, encoders, noise, rng)
+    write_bag(folder / name, items, noise.lost, rng, mcap=plan.seed % 2 == 0)
+    text = mapping(machine, encoders, plan.duration, healthy=name == "before")
+    (folder / f"{name}.toml").write_text(text)
     return motion

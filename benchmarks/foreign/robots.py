@@ -2,7 +2,7 @@
 
 import importlib.util
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,56 +11,40 @@ import mujoco
 SERVO_GAINS = (150.0, 15.0)
 """Stiffness, N m/rad, and damping, N m s/rad, of the position servos of the ant."""
 
-
 TOUCH_REACH = 0.02
 """Distance by which the touch sites of the ant extend beyond its feet, m: a contact at rest lies up
 to the margin of a geom beyond it, 0.01 m."""
 
+NAMES = ("quadruped", "hexapod", "ant")
+
 
 @dataclass(frozen=True)
 class Part:
-    """A joint in the sense of a diagnosis: all hinges of one body.
-
-    Attributes:
-        name: Name of the part; that of its hinge, or the common beginning of its hinges' names.
-        body: Name of the body that it moves.
-        hinges: Names of the hinges.
-        beyond: Names of the hinges of the body and of the bodies beyond it.
-        touches: Names of the touch sensors beyond it.
-    """
+    """A joint in the sense of a diagnosis: the hinges of one body, and what is beyond them."""
 
     name: str
     body: str
     hinges: tuple[str, ...]
     beyond: tuple[str, ...]
+    """Hinges of the body and of the bodies beyond it."""
     touches: tuple[str, ...]
+    """Touch sensors beyond it."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot.
-
-    Attributes:
-        name: Name of the robot.
-        path: Its MJCF file.
-        mapped_as: Value of ``robot`` in a mapping.
-        root: Name of the root body.
-        hinges: Names of the hinges in the order of the model.
-        motors: Hinge of each motor.
-        touches: Body of each touch sensor.
-        parts: The parts, in the order of the model.
-        control_timestep: Time between commands, s.
-        frequencies: Lowest and highest frequency of drawn gaits, Hz.
-        amplitudes: Smallest and largest amplitude of drawn gaits, as parts of half the range.
-    """
+    """A robot: names in the order of its model, and the ranges of drawn gaits."""
 
     name: str
     path: Path
     mapped_as: str
+    """Value of ``robot`` in a mapping."""
     root: str
     hinges: tuple[str, ...]
     motors: dict[str, str]
+    """Hinge of each motor."""
     touches: dict[str, str]
+    """Body of each touch sensor."""
     parts: tuple[Part, ...]
     control_timestep: float = 0.01
     frequencies: tuple[float, float] = (0.8, 1.8)
@@ -75,24 +59,15 @@ class Robot:
         return _spec(self.name, self.path)
 
 
-NAMES = ("quadruped", "hexapod", "ant")
-
-
 def robot(name: str) -> Robot:
     """Returns a robot by name, one of ``NAMES``."""
     path = _path(name)
-    spec = _spec(name, path)
-    model = spec.compile()
-    root = model.body(1).name
+    model = _spec(name, path).compile()
     hinges = tuple(
         model.joint(k).name
         for k in range(model.njnt)
         if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE
     )
-    motors = {
-        model.actuator(k).name: model.joint(model.actuator_trnid[k, 0]).name
-        for k in range(model.nu)
-    }
     touches = {
         model.sensor(k).name: model.body(model.site_bodyid[model.sensor_objid[k]]).name
         for k in range(model.nsensor)
@@ -102,11 +77,14 @@ def robot(name: str) -> Robot:
         name=name,
         path=path,
         mapped_as="ant.xml" if name == "ant" else name,
-        root=root,
+        root=model.body(1).name,
         hinges=hinges,
-        motors=motors,
+        motors={
+            model.actuator(k).name: model.joint(model.actuator_trnid[k, 0]).name
+            for k in range(model.nu)
+        },
         touches=touches,
-        parts=_parts(model, hinges, touches),
+        parts=tuple(_parts(model, hinges, touches)),
     )
 
 
@@ -119,9 +97,7 @@ def _path(name: str) -> Path:
     )
     found = importlib.util.find_spec(package)
     if found is None or found.origin is None:
-        raise ModuleNotFoundError(
-            f"the robot {name} is a file of {package}, which is not installed"
-        )
+        raise ModuleNotFoundError(f"the robot {name} is a file of {package}: install it")
     return Path(found.origin).parent / inside
 
 
@@ -130,22 +106,15 @@ def _spec(name: str, path: Path) -> mujoco.MjSpec:
     return _ant(spec) if name == "ant" else spec
 
 
-def radians(spec: mujoco.MjSpec, angles: Sequence[float]) -> list[float]:
-    """Returns angles of a specification, which may be in degrees, in radians."""
-    return [float(math.radians(angle) if spec.compiler.degree else angle) for angle in angles]
-
-
 def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Adds names, touch sensors and position servos, as ``ant.toml`` requests them."""
     for motor in spec.actuators:
         motor.name = motor.target
-        joint = spec.joint(motor.target)
         stiffness, damping = SERVO_GAINS
         motor.gear = [1, 0, 0, 0, 0, 0]
         motor.set_to_position(kp=stiffness, kv=damping)
-        motor.ctrlrange = radians(spec, joint.range)
-        motor.forcerange = [-150, 150]
-        motor.forcelimited = 1
+        motor.ctrlrange = radians(spec, spec.joint(motor.target).range)
+        motor.forcerange, motor.forcelimited = [-150, 150], 1
     for joint in spec.joints:
         body = joint.parent
         if joint.type != mujoco.mjtJoint.mjJNT_HINGE:
@@ -168,37 +137,28 @@ def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     return spec
 
 
+def radians(spec: mujoco.MjSpec, angles: Sequence[float]) -> list[float]:
+    """Returns angles of a specification, which may be in degrees, in radians."""
+    return [float(math.radians(angle) if spec.compiler.degree else angle) for angle in angles]
+
+
 def _parts(
     model: mujoco.MjModel, hinges: tuple[str, ...], touches: dict[str, str]
-) -> tuple[Part, ...]:
+) -> Iterator[Part]:
     by_body: dict[str, list[str]] = {}
     for hinge in hinges:
         by_body.setdefault(model.body(model.joint(hinge).bodyid[0]).name, []).append(hinge)
-    parts = []
-    for body, own in by_body.items():
-        beyond = _beyond(model, body)
-        parts.append(
-            Part(
-                name=own[0] if len(own) == 1 else _common(own),
-                body=body,
-                hinges=tuple(own),
-                beyond=tuple(h for b in beyond for h in by_body.get(b, ())),
-                touches=tuple(name for name, foot in touches.items() if foot in beyond),
-            )
+    for body, names in by_body.items():
+        beyond = [model.body(body).id]
+        for child in range(1, model.nbody):
+            if model.body_parentid[child] in beyond and child not in beyond:
+                beyond.append(child)
+        bodies = [model.body(k).name for k in beyond]
+        words = zip(*(name.split("_") for name in names), strict=False)
+        yield Part(
+            name="_".join(first for first, *rest in words if all(w == first for w in rest)),
+            body=body,
+            hinges=tuple(names),
+            beyond=tuple(hinge for b in bodies for hinge in by_body.get(b, ())),
+            touches=tuple(name for name, foot in touches.items() if foot in bodies),
         )
-    return tuple(parts)
-
-
-def _beyond(model: mujoco.MjModel, body: str) -> list[str]:
-    """Returns the names of a body and of the bodies beyond it."""
-    found = [model.body(body).id]
-    for child in range(1, model.nbody):
-        if model.body_parentid[child] in found and child not in found:
-            found.append(child)
-    return [model.body(k).name for k in found]
-
-
-def _common(names: list[str]) -> str:
-    """Returns the common first words of some names."""
-    words = zip(*(name.split("_") for name in names), strict=False)
-    return "_".join(first for first, *rest in words if all(word == first for word in rest))

@@ -28,12 +28,11 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from benchmarks.golden.log_digest import bytes_digest, log_digests
-from benchmarks.golden.plan import ROOT, Scenario, scenarios
+from benchmarks.golden.plan import ROOT, Commands, scenarios
 
 Items = dict[str, Any]
 """Results by ``SCENARIO:COMMAND``."""
@@ -90,12 +89,12 @@ def record(options: argparse.Namespace) -> None:
     items = _read(options.out) if options.resume and options.out.exists() else {}
     done = {name.partition(":")[0] for name in items}
     chosen = [
-        scenario
-        for scenario in scenarios(options.material)
-        if scenario.name.startswith(options.only) and scenario.name not in done
+        (name, commands)
+        for name, commands in scenarios(options.material)
+        if name.startswith(options.only) and name not in done
     ]
     with ThreadPoolExecutor(options.jobs) as pool:
-        for results in pool.map(partial(_run, environment), chosen):
+        for results in pool.map(lambda scenario: _run(environment, *scenario), chosen):
             print(*results, sep="\n", flush=True)
             items |= results
             _write(options.out, items)
@@ -124,14 +123,14 @@ def compare(options: argparse.Namespace) -> None:
     sys.exit(1 if bad or not old else 0)
 
 
-def _run(environment: dict[str, str], scenario: Scenario) -> Items:
+def _run(environment: dict[str, str], name: str, commands: Commands) -> Items:
     """Runs a scenario in a folder of its own and returns its results; a refusal is a result."""
     results: Items = {}
-    with tempfile.TemporaryDirectory() as name:
-        folder, seen = Path(name), set[Path]()
-        for command, arguments in scenario.commands.items():
+    with tempfile.TemporaryDirectory() as place:
+        folder, seen = Path(place), set[Path]()
+        for command, arguments in commands.items():
             done = subprocess.run(
-                (sys.executable, "-m", "selfmodel", *arguments),
+                (sys.executable, "-m", "selfmodel", *arguments.split()),
                 cwd=folder,
                 env=environment,
                 capture_output=True,
@@ -140,7 +139,7 @@ def _run(environment: dict[str, str], scenario: Scenario) -> Items:
             )
             written = {path for path in folder.rglob("*") if path.is_file()} - seen
             seen |= written
-            results[f"{scenario.name}:{command}"] = {
+            results[f"{name}:{command}"] = {
                 "exit": done.returncode,
                 "output": _output(done.stdout) if not done.returncode else done.stderr[-500:],
                 "files": {

@@ -21,82 +21,71 @@ LEFT_OUT = ("/timing", "/provenance")
 RECORDS = ("selfmodel.trial", "selfmodel.hidden", "selfmodel.result", "selfmodel.import")
 """Metadata records with results; ``selfmodel.software`` has versions."""
 
-LENGTH = 12
-"""Hexadecimal digits of a digest: 48 bits are enough where equal places are compared."""
-
 
 def log_digests(path: Path) -> dict[str, str]:
     """Returns the digests of one log.
 
-    Args:
-        path: A trial log.
-
-    Returns:
-        By topic, the digest of all decoded messages with their log times; ``attachments``, the
-        digest of the names, and of the bytes, of the arrays of an ``.npz``, or of the fields of a
-        compiled MJCF; ``metadata``, the digest of the records' fields, without those that are
-        digests of whole files.
+    By topic, of all decoded messages with their log times; ``attachments``, of the names and bytes,
+    the arrays of an ``.npz``, or the fields of a compiled MJCF; ``metadata``, of the records'
+    fields, without those that are digests of whole files.
     """
-    hashes: dict[str, hashlib._Hash] = {}
+    contents: dict[str, list[bytes]] = {}
     store = get_typestore(Stores.EMPTY)
-    found: dict[str, str] = {}
     with path.open("rb") as file:
         reader = make_reader(file)
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             if channel.topic in LEFT_OUT or schema is None:
                 continue
-            if channel.topic not in hashes:
-                hashes[channel.topic] = hashlib.sha256()
+            if channel.topic not in contents:
                 types = get_types_from_msg(schema.data.decode(), schema.name)
                 store.register({n: t for n, t in types.items() if n not in store.fielddefs})
-            content = store.deserialize_cdr(message.data, schema.name)
-            hashes[channel.topic].update(str(message.log_time).encode())
-            for part in _flat(content):
-                hashes[channel.topic].update(part)
-        found |= {topic: _short(digest) for topic, digest in sorted(hashes.items())}
+            decoded = store.deserialize_cdr(message.data, schema.name)
+            parts = contents.setdefault(channel.topic, [])
+            parts += (str(message.log_time).encode(), *_flat(decoded))
         attached = {a.name: _attachment(a.name, a.data) for a in reader.iter_attachments()}
-        found["attachments"] = bytes_digest(repr(sorted(attached.items())).encode())
-        records: dict[str, str] = {}
-        for record in reader.iter_metadata():
-            if record.name in RECORDS:
-                fields = sorted(
-                    item
-                    for item in record.metadata.items()
-                    if not item[0].endswith(("sha256", "nonce"))
-                )
-                records[record.name] = bytes_digest(repr(fields).encode())
-        found["metadata"] = bytes_digest(repr(sorted(records.items())).encode())
-    return found
+        records = {
+            record.name: bytes_digest(
+                repr(
+                    sorted(
+                        item
+                        for item in record.metadata.items()
+                        if not item[0].endswith(("sha256", "nonce"))
+                    )
+                ).encode()
+            )
+            for record in reader.iter_metadata()
+            if record.name in RECORDS
+        }
+    return {
+        **{topic: bytes_digest(*parts) for topic, parts in sorted(contents.items())},
+        "attachments": bytes_digest(repr(sorted(attached.items())).encode()),
+        "metadata": bytes_digest(repr(sorted(records.items())).encode()),
+    }
 
 
-def bytes_digest(data: bytes) -> str:
-    """Returns the digest of some bytes."""
-    return _short(hashlib.sha256(data))
+def bytes_digest(*parts: bytes) -> str:
+    """Returns 12 digits of a digest: 48 bits are enough where equal places are compared."""
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:12]
 
 
 def _attachment(name: str, data: bytes) -> str:
-    digest = hashlib.sha256()
     if name.endswith(".npz"):
         # An archive's bytes depend on the version of zlib; its arrays do not.
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            for array in sorted(arrays.files):
-                digest.update(f"{array} {arrays[array].dtype} {arrays[array].shape}".encode())
-                digest.update(np.ascontiguousarray(arrays[array]).tobytes())
+            named = [(f"{key} {arrays[key].dtype}", arrays[key]) for key in sorted(arrays.files)]
     elif name.endswith(".xml"):
         # The text of a model may differ where its compiled fields are the same.
         try:
             model = mujoco.MjModel.from_xml_string(data.decode())
         except ValueError:  # it names assets of its own
-            digest.update(data)
-        else:
-            for field in sorted(dir(model)):
-                value = getattr(model, field)
-                if isinstance(value, np.ndarray):
-                    digest.update(f"{field} {value.shape}".encode())
-                    digest.update(np.ascontiguousarray(value).tobytes())
+            return bytes_digest(data)
+        fields = ((field, getattr(model, field)) for field in sorted(dir(model)))
+        named = [(field, value) for field, value in fields if isinstance(value, np.ndarray)]
     else:
-        digest.update(data)
-    return _short(digest)
+        return bytes_digest(data)
+    return bytes_digest(
+        *(part for key, v in named for part in (f"{key} {v.shape}".encode(), v.tobytes()))
+    )
 
 
 def _flat(value: object) -> Iterator[bytes]:
@@ -115,7 +104,3 @@ def _flat(value: object) -> Iterator[bytes]:
         yield np.float64(value).tobytes()
     else:
         yield repr(value).encode()
-
-
-def _short(digest: "hashlib._Hash") -> str:
-    return digest.hexdigest()[:LENGTH]

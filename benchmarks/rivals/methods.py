@@ -216,7 +216,7 @@ def t_resilience(problem: Problem) -> None:
     Source: S. Koos, A. Cully and J.-B. Mouret, *Fast damage recovery in robotics with the
     T-Resilience algorithm* (International Journal of Robotics Research 32:1700, 2013). The
     surrogate is the Gaussian process of ``trial_and_error`` instead of a support vector machine.
-    All differences are listed in ``docs/results/rivals.md``.
+    All differences are listed in ``docs/results/other-methods.md``.
     """
     size, rng = problem.settings.population, problem.rng
     genomes = draw_genomes(rng, (size, problem.design.weights))

@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from benchmarks.foreign.cases import CASES, faults_of
-from benchmarks.foreign.faults import NOTATION, UNKNOWN, Fault
+from benchmarks.foreign.cases import CASES, NOTATION, UNKNOWN, Fault, faults_of, stream
 from benchmarks.foreign.generate import Plan, generate
+from benchmarks.foreign.model import compiled, draw_gap
 from benchmarks.foreign.robots import NAMES, Robot, robot
-from benchmarks.foreign.scoring.judge import is_expressible, judged, terms
-from benchmarks.foreign.seeds import stream
-from benchmarks.foreign.world.body import compiled
-from benchmarks.foreign.world.gap import draw_gap
+from benchmarks.foreign.scoring import is_expressible, judged, terms
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS
@@ -33,9 +30,7 @@ def imported(path: Path) -> set[str]:
 
 
 GENERATOR = [
-    path
-    for path in sorted(FOLDER.rglob("*.py"))
-    if path.stem != "__main__" and path.parent.stem != "scoring"
+    path for path in sorted(FOLDER.rglob("*.py")) if path.stem not in ("__main__", "scoring")
 ]
 
 

@@ -12,10 +12,14 @@ pytest.importorskip("pybullet", reason="PyBullet is in the dependency group othe
 import pybullet
 
 from benchmarks.other_engine.bullet import Bullet
-from benchmarks.other_engine.damage import Damage, damage_of
-from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
-from benchmarks.other_engine.reality import Reality, draw_reality, ideal_reality
-from benchmarks.other_engine.servos import Servos, motors_of
+from benchmarks.other_engine.environment import BulletEnvironment, Servos, physical_robot
+from benchmarks.other_engine.reality import (
+    Damage,
+    Reality,
+    damage_of,
+    draw_reality,
+    ideal_reality,
+)
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
@@ -226,19 +230,16 @@ def test_a_robot_stands_for_a_second_at_the_height_that_it_has_in_mujoco(robot: 
 def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
     robot: Robot, number: int, bullet: Callable[..., Bullet]
 ):
-    body, motors, hinges = (
-        bullet(robot),
-        motors_of(robot, ideal_reality(robot)),
-        robot.anatomy.hinges,
-    )
-    driven = [hinges.index(name) for name in motors.hinges]
+    body, hinges = bullet(robot), robot.anatomy.hinges
     model = robot.specification().compile()
     model.opt.gravity[:] = 0
-    data, servos = mujoco.MjData(model), Servos(motors, np.zeros(model.nu))
+    data = mujoco.MjData(model)
+    servos = Servos(robot, ideal_reality(robot), np.zeros(len(hinges)))
     data.qpos[2] = 2.0
     pybullet.setGravity(0, 0, 0, physicsClientId=body.client)
     body.place(data.qpos[:3], data.qpos[3:7], np.zeros(len(hinges)))
-    motor, found, expected = motors.hinges.index(hinges[number]), [], []
+    driven = [model.joint(joint).name for joint in model.actuator_trnid[:, 0]]
+    motor, found, expected = driven.index(hinges[number]), [], []
     for substep in range(500):
         targets = np.zeros(model.nu)
         targets[motor] = 0.4 * np.sin(4 * np.pi * 0.001 * substep)
@@ -247,10 +248,7 @@ def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
             found.append(body.hinges()[0][number])
             expected.append(data.joint(hinges[number]).qpos[0])
             mujoco.mj_step(model, data)
-        angles, speeds = body.hinges()
-        torques = np.zeros(len(hinges))
-        torques[driven] = servos.step(targets, angles[driven], speeds[driven])
-        body.step(torques)
+        body.step(servos.step(targets, *body.hinges()))
 
     assert np.ptp(expected) > 0.5
     np.testing.assert_allclose(found, expected, atol=0.02)

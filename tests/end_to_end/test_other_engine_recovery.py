@@ -10,9 +10,7 @@ pytest.importorskip("pybullet", reason="PyBullet is in the dependency group othe
 
 from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
 from benchmarks.other_engine.reality import draw_reality
-from benchmarks.other_engine.recovery import Plan, recovered
-from benchmarks.other_engine.table import table
-from benchmarks.other_engine.transfer import transfer_lines
+from benchmarks.other_engine.recovery import recovered, table, transfer_lines
 from selfmodel import read_log, run_trial
 from selfmodel.logs import load_controller
 from selfmodel.robot.robot import Robot
@@ -41,7 +39,7 @@ def test_a_trial_is_logged_and_read_back(quadruped: Robot, tmp_path: Path):
 def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
     settings = Settings(steps=60, trials=1, generations=1).scaled(4)
 
-    row = recovered(Plan("quadruped", 1, 0, settings, threads=1), tmp_path / "run")
+    row = recovered("quadruped", 1, 0, tmp_path / "run", settings=settings, threads=1)
 
     row = json.loads(json.dumps(row))
     assert row["truth"] == "break:front_left_knee"

@@ -1,1 +1,0 @@
-"""The recorder: encoders, messages, bags and mappings."""

@@ -1,0 +1,366 @@
+"""Diagnoses of recordings by the command line of selfmodel, and the rates of right answers."""
+
+import csv
+import dataclasses
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.foreign.cases import CASES, GROUPS
+from benchmarks.foreign.generate import MATTERS
+from benchmarks.foreign.model import LEVELS
+from selfmodel.studies.statistics import proportion
+
+LIMIT = 1800
+"""Longest time of one command, s."""
+
+JAM_TOLERANCE = 0.1
+"""Largest error of the angle of a jam that counts as right, rad."""
+
+ANGLES = ("jam", "slope", "encoder-offset", "encoder-slip")
+"""Names in ``Terms`` of the kinds whose severities are angles."""
+
+Row = dict[str, Any]
+"""Name and truth of a recording, how it was diagnosed (``asked``), the answer of ``diagnose`` or
+None, the error, and the seconds."""
+
+Terms = dict[tuple[str, str], float | None]
+"""Severity of each fault by name and part; None without a severity. The name is that of the kind,
+and ``jam`` for a jam at any angle."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """How a recording is diagnosed: ``--kinds``, trials with the faults, further options."""
+
+    kinds: str = ""
+    trials: int = 1
+    options: tuple[str, ...] = ()
+
+
+QUESTIONS = {
+    "paper": Question("break,jam,sensor"),
+    "healthy": Question(),
+    "wide": Question("all"),
+    "default": Question(trials=3),
+    "onset": Question(),
+    "lost-encoder": Question("break,jam,sensor"),
+    "outside": Question(),
+}
+"""Question of each group."""
+
+
+def score(
+    out: Path, rows: Path, question_of: Callable[[str], Question], jobs: int
+) -> Iterator[Row]:
+    """Diagnoses every recording of a folder that has no row yet, and appends the rows.
+
+    The order is that of the names' digests, so that the rows of an interrupted run are a sample.
+
+    Args:
+        out: Folder of the recordings.
+        rows: File with a JSON object per line; created if it does not exist.
+        question_of: Returns how the recordings of a group are diagnosed.
+        jobs: Number of commands at a time.
+    """
+
+    def key(name: str, asked: Row) -> str:
+        return name + json.dumps(asked, sort_keys=True)
+
+    def digest(path: Path) -> str:
+        return hashlib.sha256(path.parent.name.encode()).hexdigest()
+
+    done = {key(row["name"], row["asked"]) for row in read_rows(rows)}
+    left = []
+    for path in sorted(out.glob("*/truth.json"), key=digest):
+        question = question_of(json.loads(path.read_text())["group"])
+        if key(path.parent.name, dataclasses.asdict(question)) not in done:
+            left.append((path.parent, question))
+    with ThreadPoolExecutor(jobs) as pool, rows.open("a") as file:
+        for future in as_completed([pool.submit(_diagnosed, *asked) for asked in left]):
+            file.write(json.dumps(future.result()) + "\n")
+            file.flush()
+            yield future.result()
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Returns the rows of a file; none if it does not exist."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines if line.strip()]
+
+
+def _diagnosed(folder: Path, question: Question) -> Row:
+    """Imports and diagnoses one recording; the seconds are those of the diagnosis."""
+    row: Row = {
+        "name": folder.name,
+        "truth": json.loads((folder / "truth.json").read_text()),
+        "asked": dataclasses.asdict(question),
+        "answer": None,
+        "error": "",
+    }
+    with tempfile.TemporaryDirectory() as logs:
+        names = ["before", *(f"after-{k + 1}" for k in range(question.trials))]
+        for name in names:
+            log = str(Path(logs, f"{name}.mcap"))
+            command = ("logs", "import", name, "--mapping", f"{name}.toml", "--out", log)
+            done = _selfmodel(*command, cwd=folder)
+            if done.returncode:
+                return {**row, "error": done.stderr[-2000:], "seconds": 0.0}
+        start = time.perf_counter()
+        kinds = ("--kinds", question.kinds) if question.kinds else ()
+        options = (*kinds, *question.options, "--json", "--threads", "1")
+        done = _selfmodel("diagnose", *(f"{name}.mcap" for name in names), *options, cwd=Path(logs))
+        row["seconds"] = time.perf_counter() - start
+    if done.returncode:
+        return {**row, "error": done.stderr[-2000:]}
+    return {**row, "answer": json.loads(done.stdout)}
+
+
+def _selfmodel(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Runs the command line of the selfmodel that is importable here."""
+    here = str(Path(__file__).resolve().parents[2])
+    command = [sys.executable, "-m", "selfmodel", *arguments]
+    environment = {**os.environ, "PYTHONPATH": here, "OMP_NUM_THREADS": "1"}
+    try:
+        return subprocess.run(
+            command,
+            cwd=cwd,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 1, "", f"more than {LIMIT} s")
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Properties of one answer; those that do not apply are None."""
+
+    right: bool | None = False
+    """Whether the first hypothesis has the true kinds and parts."""
+    verdict_right: bool = False
+    """``intact`` or ``explained`` for a healthy robot; ``explained`` with the truth first or
+    ``ambiguous`` with the truth named for faults of the considered kinds; else ``unexplained``."""
+    false_alarm: bool | None = None
+    """Whether a healthy robot is called damaged or unexplained."""
+    called_intact: bool | None = None
+    """Whether a damaged robot is called intact."""
+    invented: bool = False
+    """Whether the first hypothesis contains a fault that is not there."""
+    severity_error: float | None = None
+    """Largest error of a severity, relative to the true one; rad for angles."""
+    onset_error: float | None = None
+    onset_found: bool | None = None
+    seconds: float = 0.0
+
+
+def judged(row: Row) -> Judgement:
+    """Returns the judgement of a row; an error counts as wrong."""
+    truth, answer = row["truth"], row["answer"]
+    real, healthy = terms(truth["truth"]), not truth["truth"]
+    if answer is None:
+        return Judgement(
+            false_alarm=True if healthy else None,
+            called_intact=None if healthy else False,
+            onset_found=False if truth["onset"] else None,
+            seconds=row["seconds"],
+        )
+    verdict, best = answer["verdict"], terms(answer["diagnosis"][0]["hypothesis"].split("+"))
+    expressible, right = is_expressible(real, answer["kinds"]), agrees(best, real)
+    onset = (answer.get("change") or {}).get("time")
+    if healthy:
+        verdict_right = not best and verdict in ("explained", "intact")
+    elif expressible:
+        named = [best, *(terms(rival.split("+")) for rival in _rivals(answer))]
+        among = any(agrees(one, real) for one in named)
+        verdict_right = right if verdict == "explained" else verdict == "ambiguous" and among
+    else:
+        verdict_right = verdict == "unexplained"
+    return Judgement(
+        right=right if expressible else None,
+        verdict_right=verdict_right,
+        false_alarm=(bool(best) or verdict == "unexplained") if healthy else None,
+        called_intact=None if healthy else not best and verdict != "unexplained",
+        invented=bool(set(best) - set(real)),
+        severity_error=_severity_error(best, real) if right else None,
+        onset_error=abs(onset - truth["onset"]) if truth["onset"] and onset is not None else None,
+        onset_found=onset is not None if truth["onset"] else None,
+        seconds=row["seconds"],
+    )
+
+
+def terms(faults: Iterable[str]) -> Terms:
+    """Returns the terms of a notation; the place of a payload is no part of its kind."""
+    found: Terms = {}
+    for fault in faults:
+        head, _, value = fault.partition("=")
+        keyword, _, part = head.partition(":")
+        number = re.search(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", value)
+        if keyword != "intact":
+            prefix = re.match("[a-z]+", value)  # sensor:NAME=gain0.5 is of the kind sensor-gain
+            name = f"{keyword}-{prefix[0]}" if prefix else keyword
+            name = "encoder-slip" if name == "encoder-offset-slip" else name
+            found[name, "" if keyword == "payload" else part] = float(number[0]) if number else None
+    return found
+
+
+def agrees(guess: Terms, real: Terms) -> bool:
+    """Returns whether kinds and parts are equal, and the angles of jams within the tolerance."""
+    return guess.keys() == real.keys() and all(
+        abs((guess[key] or 0.0) - (real[key] or 0.0)) <= JAM_TOLERANCE
+        for key in real
+        if key[0] == "jam"
+    )
+
+
+def is_expressible(real: Terms, kinds: Iterable[str]) -> bool:
+    """Returns whether the considered kinds have the faults."""
+    considered = set(kinds)
+    return all(
+        ("jam-angle" if name == "jam" and severity else name) in considered
+        for (name, _), severity in real.items()
+    )
+
+
+def _severity_error(best: Terms, real: Terms) -> float | None:
+    errors = [
+        abs(guess - severity) / (1.0 if key[0] in ANGLES else abs(severity))
+        for key, severity in real.items()
+        if severity is not None and (guess := best[key]) is not None
+    ]
+    return max(errors, default=None)
+
+
+def _rivals(answer: Row) -> list[str]:
+    return [
+        rival["hypothesis"] if isinstance(rival, dict) else rival
+        for rival in answer.get("indistinguishable", [])
+    ]
+
+
+def _matters(truth: Row) -> bool:
+    """Returns whether the faults changed the displacement by a tenth or more."""
+    healthy, after = map(np.array, (truth["displacement_healthy"], truth["displacement_after"]))
+    return bool(np.linalg.norm(after - healthy) >= MATTERS * np.linalg.norm(healthy))
+
+
+def summary(row: Row) -> str:
+    """Returns a row as one line: its name, the truth, and the answer."""
+    truth = "+".join(row["truth"]["truth"]) or "intact"
+    if row["answer"] is None:
+        return f"{row['name']}: {truth}: error: {row['error'].strip()[-200:]}"
+    best = row["answer"]["diagnosis"][0]
+    mark = "right" if judged(row).verdict_right else "WRONG"
+    return (
+        f"{row['name']}: {truth}: {best['hypothesis']} ({best['distance']:.4g}), "
+        f"{row['answer']['verdict']}, {mark}, {row['seconds']:.0f} s"
+    )
+
+
+HEADINGS = {
+    "right": "right first",
+    "verdict_right": "verdict right",
+    "false_alarm": "false alarms",
+    "called_intact": "called intact",
+    "invented": "invented",
+    "severity_error": "severity error",
+    "onset_found": "onset found",
+    "onset_error": "onset error, s",
+    "seconds": "seconds",
+}
+"""Columns of the table: rates of truth values, medians of numbers."""
+
+MEDIANS = ("severity_error", "onset_error", "seconds")
+
+
+def table(rows: Sequence[Row], by: str) -> str:
+    """Returns rates with Wilson's 95 % intervals as Markdown, by ``group`` or ``case``, and gap.
+
+    Faults outside all kinds that change the displacement by less than a tenth are left out.
+    """
+    used = [row for row in rows if row["truth"]["group"] != "outside" or _matters(row["truth"])]
+    headings = (by, "gap", "recordings", *HEADINGS.values())
+    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
+    for name in GROUPS if by == "group" else CASES:
+        for gap in (*LEVELS, "all"):
+            chosen = [
+                judged(row)
+                for row in used
+                if row["truth"][by] == name and gap in (row["truth"]["gap"], "all")
+            ]
+            if chosen:
+                values = (
+                    [v for one in chosen if (v := getattr(one, key)) is not None]
+                    for key in HEADINGS
+                )
+                cells = (
+                    _median(found) if key in MEDIANS else _rate(found)
+                    for key, found in zip(HEADINGS, values, strict=True)
+                )
+                lines.append(f"| {' | '.join((name, gap, str(len(chosen)), *cells))} |")
+    return "\n".join(lines)
+
+
+def _rate(values: Sequence[bool]) -> str:
+    if not values:
+        return ""
+    found = proportion(sum(values), len(values))
+    return (
+        f"{sum(values)}/{len(values)}, {100 * found.estimate:.0f} % "
+        f"({100 * found.low:.0f} to {100 * found.high:.0f})"
+    )
+
+
+def _median(values: Sequence[float]) -> str:
+    return f"{np.median(values):.3g}" if values else ""
+
+
+def write_csv(rows: Iterable[Row], path: Path) -> None:
+    """Writes the judged answers, a line per recording."""
+    lines = sorted(map(_line, rows), key=lambda line: str(line["recording"]))
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(lines)
+
+
+def _line(row: Row) -> Row:
+    truth, answer, found = row["truth"], row["answer"] or {}, judged(row)
+    fit = answer.get("fit") or {}
+
+    def loss(key: str) -> float | None:
+        return None if fit.get(key) is None else float(f"{fit[key]:.3g}")
+
+    return {
+        "recording": row["name"],
+        "group": truth["group"],
+        "kinds": row["asked"]["kinds"] or "default",
+        "trials": row["asked"]["trials"],
+        "truth": "+".join(truth["truth"]) or "intact",
+        "onset": truth["onset"],
+        "best": answer["diagnosis"][0]["hypothesis"] if answer else row["error"][-200:],
+        "verdict": answer.get("verdict", "error"),
+        "rivals": len(answer.get("indistinguishable", ())),
+        "outside": (answer.get("unsearched") or {}).get("hypothesis"),
+        "change": (answer.get("change") or {}).get("time"),
+        "loss": loss("loss"),
+        "healthy_loss": loss("healthy_loss"),
+        "right": found.right,
+        "verdict_right": found.verdict_right,
+        "seconds": round(row.get("seconds", 0.0), 1),
+    }

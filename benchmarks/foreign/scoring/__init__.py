@@ -1,1 +1,0 @@
-"""Diagnoses of recordings by the command line of selfmodel, and the rates of right answers."""

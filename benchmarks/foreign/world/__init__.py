@@ -1,1 +1,0 @@
-"""The robot and its environment: model, faults, gap, gait and motion."""
