@@ -94,12 +94,7 @@ def controller_bytes(controller: Controller) -> bytes:
 
 
 def parse_controller(data: bytes, source: str) -> Controller:
-    """Returns the controller of bytes that ``controller_bytes`` made.
-
-    Args:
-        data: The bytes of an ``.npz`` file.
-        source: Name of the file, for the error message.
-    """
+    """Returns the controller of bytes that ``controller_bytes`` made; errors name the source."""
     what = "a controller (.npz with the arrays kind, sensors, motors, genome and a design's own)"
     with npz_errors(source, what):
         arrays = read_arrays(data, MAX_CONTROLLER_BYTES)
@@ -124,13 +119,7 @@ def parse_controller(data: bytes, source: str) -> Controller:
 
 @contextmanager
 def npz_errors(source: str, what: str, advice: str = "") -> Iterator[None]:
-    """Makes the errors of malformed bytes one sentence, and warnings errors.
-
-    Args:
-        source: Name of the file.
-        what: Expected content.
-        advice: Remedy.
-    """
+    """Makes the errors of malformed bytes one sentence, and warnings errors."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # Python's, for a header that is a damaged literal
@@ -141,12 +130,7 @@ def npz_errors(source: str, what: str, advice: str = "") -> Iterator[None]:
 
 
 def read_arrays(data: bytes, limit: int) -> dict[str, NDArray[Any]]:
-    """Returns the arrays of an ``.npz`` file, whose sizes are checked before memory is allocated.
-
-    Args:
-        data: The bytes of the file.
-        limit: Largest size of the arrays, bytes.
-    """
+    """Returns the arrays of an ``.npz`` file, whose sizes are checked before memory is taken."""
     if len(data) > limit:
         raise ValueError(f"it has more than {limit} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:

@@ -245,12 +245,7 @@ class Contents:
 
 
 def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
-    """Returns the contents of a file after all its checksums have been verified.
-
-    Args:
-        path: The file.
-        unread: Names of metadata records to ignore.
-    """
+    """Returns the contents of a file, all verified, without the unread metadata records."""
     contents, error = read_undamaged(path, unread)
     if error is not None:
         raise error
@@ -258,12 +253,7 @@ def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
 
 
 def read_undamaged(path: Path, unread: Collection[str] = ()) -> tuple[Contents, LogError | None]:
-    """Returns the contents of a file before its first damage, and the error of that damage.
-
-    Args:
-        path: The file.
-        unread: Names of metadata records to ignore.
-    """
+    """Returns the contents of a file before its first damage, and the error of that damage."""
     data, contents = read_file(path, "a log file", MAX_BYTES), Contents(path)
     try:
         _gather(data, contents, unread)

@@ -19,42 +19,39 @@ from selfmodel.trials.signals import Names, Signal
 
 IntArray = NDArray[np.int64]
 
+_FIELDS = {
+    "builtin_interfaces/Time": "int32 sec, uint32 nanosec",
+    "std_msgs/Header": "builtin_interfaces/Time stamp, string frame_id",
+    "std_msgs/String": "string data",
+    "geometry_msgs/Point": "float64 x, float64 y, float64 z",
+    "geometry_msgs/Vector3": "float64 x, float64 y, float64 z",
+    "geometry_msgs/Quaternion": "float64 x, float64 y, float64 z, float64 w",
+    "geometry_msgs/Pose": "geometry_msgs/Point position, geometry_msgs/Quaternion orientation",
+    "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose, float64[36] covariance",
+    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular",
+    "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist, float64[36] covariance",
+    "geometry_msgs/Transform": (
+        "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation"
+    ),
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform"
+    ),
+    "geometry_msgs/Vector3Stamped": "std_msgs/Header header, geometry_msgs/Vector3 vector",
+    "nav_msgs/Odometry": (
+        "std_msgs/Header header, string child_frame_id, "
+        "geometry_msgs/PoseWithCovariance pose, geometry_msgs/TwistWithCovariance twist"
+    ),
+    "selfmodel_msgs/SensorReadings": "std_msgs/Header header, string[] name, float64[] value",
+    "sensor_msgs/JointState": (
+        "std_msgs/Header header, string[] name, "
+        "float64[] position, float64[] velocity, float64[] effort"
+    ),
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
+}
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
-    {
-        "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
-        "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
-        "std_msgs/String": "string data\n",
-        "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
-        "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
-        "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
-        "geometry_msgs/Pose": (
-            "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"
-        ),
-        "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose\nfloat64[36] covariance\n",
-        "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
-        "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist\nfloat64[36] covariance\n",
-        "geometry_msgs/Transform": (
-            "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
-        ),
-        "geometry_msgs/TransformStamped": (
-            "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
-        ),
-        "geometry_msgs/Vector3Stamped": "std_msgs/Header header\ngeometry_msgs/Vector3 vector\n",
-        "nav_msgs/Odometry": (
-            "std_msgs/Header header\nstring child_frame_id\n"
-            "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"
-        ),
-        "selfmodel_msgs/SensorReadings": (
-            "std_msgs/Header header\nstring[] name\nfloat64[] value\n"
-        ),
-        "sensor_msgs/JointState": (
-            "std_msgs/Header header\nstring[] name\n"
-            "float64[] position\nfloat64[] velocity\nfloat64[] effort\n"
-        ),
-        "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
-    }
+    {kind: fields.replace(", ", "\n") + "\n" for kind, fields in _FIELDS.items()}
 )
-"""Fields of each message type; only those of ``selfmodel_msgs`` are selfmodel's own."""
+"""Lines of each message type in ROS; only those of ``selfmodel_msgs`` are selfmodel's own."""
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _BILLION = 1_000_000_000

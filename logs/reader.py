@@ -263,14 +263,7 @@ def read_controller(contents: Contents, record: TrialRecord) -> Controller | Non
 def read_behaviour(
     contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
 ) -> Behaviour:
-    """Returns the behaviour in the messages of a log.
-
-    Args:
-        contents: Contents of the log.
-        record: Record of the trial.
-        steps: Number of steps in the log's result.
-        controller: Controller of the robot, if known; the messages must have its names.
-    """
+    """Returns the behaviour in the messages of a log; they must have the names of a controller."""
     names = read_names(contents)
     ends = controller.design if controller else names
     if (names.sensors, names.motors) != (ends.sensors, ends.motors):

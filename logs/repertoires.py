@@ -89,13 +89,7 @@ def load_repertoire(path: Path, robot: Robot | None = None) -> Repertoire:
 
 
 def check_model(repertoire: Repertoire, robot: Robot, source: str) -> None:
-    """Checks that a repertoire is of a robot.
-
-    Args:
-        repertoire: The repertoire.
-        robot: The robot.
-        source: Name of the file, for the error message.
-    """
+    """Checks that a repertoire, of a file ``source``, is of the model of a robot."""
     if repertoire.origin.model != model_digest(robot):
         raise InputError(
             f"{source}: expected a repertoire of {robot.name} with the model "
@@ -106,12 +100,7 @@ def check_model(repertoire: Repertoire, robot: Robot, source: str) -> None:
 
 
 def parse_repertoire(data: bytes, source: str) -> Repertoire:
-    """Returns the repertoire of bytes that ``repertoire_bytes`` made.
-
-    Args:
-        data: The bytes of an ``.npz`` file.
-        source: Name of the file, for the error message.
-    """
+    """Returns the repertoire of bytes that ``repertoire_bytes`` made; errors name the source."""
     what = f"a repertoire (.npz with the arrays {', '.join(_TYPES)})"
     with npz_errors(source, what, "; make it anew with `selfmodel repertoire make`"):
         arrays = read_arrays(data, MAX_BYTES)

@@ -18,9 +18,6 @@ def robot_of(log: TrialLog) -> Robot:
     MuJoCo can read no files but the log's attachments. A child process compiles and steps the model
     before this process compiles it.
 
-    Args:
-        log: The log.
-
     Raises:
         LogError: The model is invalid, names other files, or is of another
             robot than the messages.
@@ -73,9 +70,6 @@ def describe_difference(names: Names, logged: Names) -> str:
 
 def common_robot(logs: Sequence[TrialLog]) -> Robot:
     """Returns the common robot of logs; see ``robot_of``.
-
-    Args:
-        logs: The logs.
 
     Raises:
         InputError: There is no log, or two logs are of different robots.

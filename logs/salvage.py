@@ -54,11 +54,7 @@ class Salvaged:
 
 
 def salvage(path: Path, out: Path) -> Salvaged:
-    """Writes the steps before the first damage of a log into a new, valid one.
-
-    Args:
-        path: The log; it is only read.
-        out: The new log, whose status is ``interrupted``.
+    """Writes the steps before the first damage of a log into a new one, of status ``interrupted``.
 
     Raises:
         LogError: No step is complete before the first damage.

@@ -210,12 +210,7 @@ def to_micrometres(values: FloatArray) -> FloatArray:
 
 
 def to_body_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns vectors in the frame of a body, as nav_msgs/Odometry requires for velocities.
-
-    Args:
-        velocity: Vectors in the world frame, ``(..., 3)``.
-        orientation: Quaternion of the body, ``(..., 4)``, w x y z.
-    """
+    """Returns velocities in the frame of a body, as nav_msgs/Odometry requires."""
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.concatenate([orientation[..., :1], -orientation[..., 1:]], axis=-1)
         return rotated(velocity, inverse)

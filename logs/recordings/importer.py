@@ -315,15 +315,7 @@ def _lasting(needed: Tracks) -> list[Track]:
 def _signals(
     trial: Trial, tracks: Tracks, robot: Robot, origin: int, steps: IntArray
 ) -> dict[str, FloatArray]:
-    """Signals of a trial; NaN where nothing was observed.
-
-    Args:
-        trial: Mapping of the recording.
-        tracks: Tracks of the recording.
-        robot: The robot.
-        origin: Time of the first control step, ns.
-        steps: Times after the first step, ``(steps,)`` ns.
-    """
+    """Signals of a trial at steps after the first one, the origin, ns; NaN where not observed."""
     anatomy = robot.anatomy
 
     def at(quantity: str, part: str, method: Method, width: int = 1) -> FloatArray:

@@ -39,12 +39,7 @@ class RecordingMapping:
         return dict(self.trial.places())
 
     def error(self, path: Keys, sentence: str) -> InputError:
-        """Returns an error that names the line of an entry.
-
-        Args:
-            path: Path of the entry; for an entry without its own line, the line of its table.
-            sentence: Expected value, given value, and remedy.
-        """
+        """Returns an error that names the line of an entry, or that of its table."""
         return _error(self.name, self.text, path, sentence)
 
     def unknown(self, path: Keys, what: str, name: str, known: Iterable[str]) -> InputError:
@@ -66,12 +61,7 @@ def read_mapping(path: Path) -> RecordingMapping:
 
 
 def parse_mapping(text: str, name: str) -> RecordingMapping:
-    """Returns the mapping in a text; see ``read_mapping``.
-
-    Args:
-        text: Text, as TOML.
-        name: Name of the text in errors.
-    """
+    """Returns the mapping in a text, which has a name in errors; see ``read_mapping``."""
     try:
         tables = load_toml(text)
     except ValueError as failure:

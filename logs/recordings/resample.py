@@ -115,6 +115,8 @@ def track(clock: Clocked, columns: Sequence[Column], numbers: slice) -> Track:
 # ---------------------------------------------------------------- interpolation
 
 Method = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
+"""Interpolation of samples at ``(m,)`` times, ``(m, width)``, at the times of the steps, within a
+limit (``reach``): ``(steps, width)``."""
 
 
 def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: int) -> FloatArray:
@@ -135,26 +137,12 @@ def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: 
 
 
 def reach(times: FloatArray | IntArray) -> float:
-    """Returns the maximum distance of two samples between which a series is interpolated.
-
-    Args:
-        times: Times of the samples, ``(m,)``, increasing.
-    """
+    """Returns the maximum distance of two samples between which a series is interpolated."""
     return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
 def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns linearly interpolated values.
-
-    Args:
-        times: Times of the samples, ``(m,)``, strictly increasing; in any unit, as ``at``.
-        values: Samples, ``(m, width)``.
-        at: Times of the steps, ``(steps,)``.
-        limit: See ``reach``.
-
-    Returns:
-        Values, ``(steps, width)``; exactly the sample at the time of a sample.
-    """
+    """Returns linearly interpolated values; exactly the sample at the time of a sample."""
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), values.shape[1]), np.nan)
     low, high = values[before[valid]], values[after[valid]]
@@ -164,21 +152,12 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
 
 
 def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns angles interpolated along the shorter arc; a jump by more than pi is a wrap-around.
-
-    The arguments are those of ``linear``; angles in rad.
-    """
+    """Returns angles interpolated along the shorter arc; a jump above pi is a wrap-around."""
     return linear(times, np.unwrap(values, axis=0), at, limit)
 
 
 def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns orientations interpolated along the shortest arc.
-
-    The arguments are those of ``linear``; unit quaternions of either sign, ``(m, 4)``.
-
-    Returns:
-        Unit quaternions, ``(steps, 4)``; the sample to rounding at the time of a sample.
-    """
+    """Returns unit quaternions interpolated along the shortest arc, of either sign."""
     before, after, share, valid = _bracket(times, at, limit)
     result = np.full((len(at), 4), np.nan)
     low, high = values[before[valid]], values[after[valid]]
@@ -210,10 +189,7 @@ def slerp_or_sample(
 
 
 def hold(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns the last sample before each step (zero-order hold), of an age up to the limit.
-
-    The arguments are those of ``linear``.
-    """
+    """Returns the last sample before each step (zero-order hold), of an age up to the limit."""
     before = np.searchsorted(times, at, side="right") - 1
     result = np.full((len(at), values.shape[1]), np.nan)
     held = before >= 0
