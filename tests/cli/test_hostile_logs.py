@@ -139,4 +139,5 @@ def test_a_negative_seed_is_refused_by_every_command(make: Make):
     for command in (["diagnose"], ["replay"]):
         done = run(log, *command)
         assert done.returncode == 2
-        assert "seed must be a whole number from 0 to" in done.stderr
+        assert "selfmodel.trial is wrong" in done.stderr
+        assert "seed" in done.stderr
