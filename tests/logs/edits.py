@@ -13,11 +13,6 @@ from selfmodel.logs.records import TRIAL, sha256, with_digest, without_digest
 Change = Callable[[McapRecord], McapRecord | None]
 
 
-def records_of(data: bytes) -> list[McapRecord]:
-    """Returns the records of a log, those of its chunks in their place."""
-    return list(verified_records(data))
-
-
 def rewritten(path: Path, change: Change, *, more: Sequence[McapRecord] = ()) -> None:
     """Writes a log again.
 
@@ -31,7 +26,7 @@ def rewritten(path: Path, change: Change, *, more: Sequence[McapRecord] = ()) ->
     writer.start("ros2")
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
-    for original in [*more, *records_of(path.read_bytes())]:
+    for original in [*more, *verified_records(path.read_bytes())]:
         match change(original):
             case Schema() as schema if schema.id not in schemas:
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)

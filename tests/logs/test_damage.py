@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
-from mcap.records import Attachment, Channel, Message, Metadata
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, Writer
 
 from selfmodel.errors import InputError
 from selfmodel.logs import (
@@ -21,7 +20,6 @@ from selfmodel.logs import (
 )
 from selfmodel.logs.salvage import salvage
 from tests.helpers.damage import damaged
-from tests.logs.edits import records_of
 
 
 def content(log: TrialLog) -> tuple[object, ...]:
@@ -123,38 +121,3 @@ def test_a_file_without_checksums_is_refused(
     log.write_bytes(output.getvalue())
     with pytest.raises(UnsupportedError, match=r"no checksum.* logs import"):
         read_log(log)
-
-
-@pytest.mark.parametrize("compression", CompressionType)
-@pytest.mark.parametrize("chunks", [True, False])
-@pytest.mark.parametrize("indexes", [IndexType.ALL, IndexType.NONE])
-def test_records_of_every_kind_are_read_as_written(
-    compression: CompressionType, indexes: IndexType, *, chunks: bool
-):
-    output = io.BytesIO()
-    writer = Writer(
-        output,
-        chunk_size=60,
-        compression=compression,
-        index_types=indexes,
-        use_chunking=chunks,
-        enable_data_crcs=True,
-    )
-    writer.start("", "a library")
-    schema = writer.register_schema("type", "ros2msg", b"float64 x")
-    topics = [writer.register_channel(name, "cdr", schema) for name in ("/a", "/b")]
-    told = [(topics[k % 2], k, bytes([k] * k), k + 1, k) for k in range(9)]
-    for message in told:
-        writer.add_message(*message)
-    writer.add_attachment(1, 2, "name", "text/plain", b"data")
-    writer.add_metadata("note", {"key": "text"})
-    writer.finish()
-    read = records_of(output.getvalue())
-
-    messages = [record for record in read if isinstance(record, Message)]
-    assert [
-        (m.channel_id, m.log_time, m.data, m.publish_time, m.sequence) for m in messages
-    ] == told
-    assert Attachment(1, 2, "name", "text/plain", b"data") in read
-    assert Metadata("note", {"key": "text"}) in read
-    assert {record.topic for record in read if isinstance(record, Channel)} == {"/a", "/b"}
