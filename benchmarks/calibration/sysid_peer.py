@@ -16,7 +16,7 @@ import numpy as np
 from absl import logging
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields, state_writer
 from selfmodel.simulation.model_factors import (

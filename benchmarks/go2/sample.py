@@ -16,7 +16,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.playback import played_back
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.robot.control_delay import split_delay
+from selfmodel.robot.anatomy import split_delay
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot

@@ -17,8 +17,8 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.rotation import directions

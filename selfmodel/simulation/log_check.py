@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import Parameters, joint_of_motor
 from selfmodel.simulation.segments import ObservedSegments, SegmentErrors, is_better

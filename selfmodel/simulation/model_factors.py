@@ -15,7 +15,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.actuators import motor_joints
-from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
+from selfmodel.robot.anatomy import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_contacts, scale_model
 

@@ -6,12 +6,11 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, held
-from selfmodel.robot.control_delay import added_steps, split_delay
+from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state import state_writer
+from selfmodel.robot.state import SensorReader, state_writer
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.rollout import (
     RobotBatch,

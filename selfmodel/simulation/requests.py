@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, median_of_known
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY
+from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
 

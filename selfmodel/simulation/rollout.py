@@ -16,13 +16,11 @@ from mujoco.batch import Batch, SimulationError
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.isolation import available_memory
-from selfmodel.robot.base import Bind, Reader
-from selfmodel.robot.control_delay import added_steps, split_delay
+from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state import observed_fields
+from selfmodel.robot.state import Bind, Reader, SensorReader, observed_fields
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal

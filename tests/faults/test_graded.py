@@ -17,7 +17,7 @@ from selfmodel.faults.world import (
     unit_heights,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
+from selfmodel.robot.state import SensorReader
 from selfmodel.simulation.simulator import Simulator
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_controllers, random_motion

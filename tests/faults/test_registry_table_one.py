@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import cases_of
-from selfmodel.robot.legs import reaches_ground
+from selfmodel.robot.contacts import reaches_ground
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS, entry
 from tests.helpers.robots.bodies import BODIES

@@ -10,7 +10,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.faults.world import PAYLOAD
-from selfmodel.robot.control_delay import added_steps
+from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import cut_segments

@@ -30,8 +30,8 @@ from selfmodel.recovery.scores import (
     joint_work,
     upright_within,
 )
+from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.self_collision import penetration_depths
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Names

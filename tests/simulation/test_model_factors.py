@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.robot.control_delay import CONTROL_DELAY, FITTED_CONTACTS
+from selfmodel.robot.anatomy import CONTROL_DELAY, FITTED_CONTACTS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import (
     JOINT_FIELDS,

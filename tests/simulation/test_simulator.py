@@ -12,7 +12,7 @@ from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.isolation import available_memory
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorNoise
+from selfmodel.robot.state import SensorNoise
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import batch_bytes, hypothesis_bytes, largest_batch
 from selfmodel.simulation.simulator import Cache, Run, Simulator

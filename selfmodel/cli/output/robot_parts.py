@@ -7,8 +7,8 @@ import mujoco
 from selfmodel.cli.output.tables import folding, print_tables
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.actuators import command_ranges, motor_joints
-from selfmodel.robot.base import FixedBase, FreeBase, read_base
 from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import FixedBase, FreeBase, read_base
 
 
 def parts(robot: Robot) -> dict[str, Any]:

@@ -16,8 +16,7 @@ from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.sensing import SensorReader
-from selfmodel.robot.state import signal_fields
+from selfmodel.robot.state import SensorReader, signal_fields
 from tests.logs.recordings.bags import T0, Item, joint_state, odometry, wrench, write_bag
 
 JOINT_PERIOD, JITTER, JOINT_LATENCY = 0.005, 0.0004, 0.002
