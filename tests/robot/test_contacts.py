@@ -52,26 +52,6 @@ def test_a_raised_limb_is_lowered_over_the_range_of_its_joint(
 
 
 @pytest.mark.parametrize(
-    "shape",
-    [
-        'type="sphere" size=".03" pos="0 0 -.4"',
-        'type="capsule" size=".03 .2" pos="0 0 -.2"',
-        'type="cylinder" size=".03 .22" pos="0 0 -.2"',
-        'type="ellipsoid" size=".03 .03 .22" pos="0 0 -.2"',
-        'type="box" size=".03 .03 .22" pos="0 0 -.2"',
-    ],
-)
-@pytest.mark.parametrize(("height", "reaches"), [(0.09, True), (0.2, False)])
-def test_the_lowest_point_is_that_of_the_shape(
-    *, shape: str, height: float, reaches: bool, tmp_path: Path
-):
-    # The ends are 0.42 or 0.43 m below the joint, and the feet 0.33 m below the torso.
-    robot = with_extra(tmp_path, shape, height, ends="-20 20")
-
-    assert reaches_ground(robot, limb(robot, "pitch")) == reaches
-
-
-@pytest.mark.parametrize(
     ("shape", "extent"),
     [
         ('type="capsule" size=".03 .1"', 0.03 + 0.1 * HALF),

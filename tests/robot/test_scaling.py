@@ -71,3 +71,20 @@ def test_contact_pairs_are_scaled_too():
     scale_contacts(model, 2.0, 0.5)
 
     np.testing.assert_allclose(model.pair_solref, [[-2000, -10]])
+
+
+@pytest.mark.parametrize(
+    ("solref", "scaled"),
+    [
+        ("-2000 -50", (-4000, -100)),
+        ("-30000 -150", (-40000, -200)),
+        ("-90000 -500", (-90000, -500)),
+    ],
+)
+def test_stated_parameters_grow_to_what_a_step_can_integrate(
+    solref: str, scaled: tuple[float, float]
+):
+    model = ball(solref)
+    scale_contacts(model, 2.0, 2.0)
+
+    np.testing.assert_allclose(model.geom("ball").solref, scaled)

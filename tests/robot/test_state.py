@@ -211,16 +211,6 @@ def test_a_physical_robot_without_a_gap_is_simulated_to_the_bit():
             assert np.array_equal(logged[signal], simulated[signal][0]), signal
 
 
-def test_a_slope_tilts_a_fixed_base():
-    robot = arm()
-    hypothesis = parse("slope=0.2", robot.anatomy)
-    runs = [(INTACT, driver_of(robot)), (hypothesis, driver_of(robot))]
-    behaviour = Simulator(robot, 1).run(runs, 5, SIGNALS).behaviour
-    level, tilted = behaviour["base_orientation"][:, -1]
-    assert 2 * np.arccos(level @ tilted) == pytest.approx(0.2)
-    assert not np.array_equal(*behaviour["joint_positions"])
-
-
 def trial_of(robot: Robot, steps: int = 200) -> Trial:
     (driver,) = random_cpgs(robot, 1)
     behaviour = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, steps))

@@ -61,18 +61,6 @@ def test_every_case_of_table_one_is_a_hypothesis_about_it(robot: Robot):
     assert [len(parsed[number]) for number in sorted(parsed)] == [1, 1, 1, 2, 1, 1, 2, 3, 0, 1]
 
 
-def test_every_single_fault_builds_and_runs(robot: Robot):
-    parts = [f"{kind}:{j.name}" for kind in ("break", "jam") for j in robot.anatomy.joints]
-    parts += [f"sensor:{sensor.name}" for sensor in robot.anatomy.sensors]
-    (controller,) = random_controllers(robot, 1)
-    runs = [(parse(text, robot.anatomy), controller) for text in parts]
-    outcome = Simulator(robot, 2).run(runs, 200, ["base_position"])
-
-    assert not outcome.diverged.any()
-    assert np.isfinite(outcome.behaviour["base_position"]).all()
-    assert len(np.unique(forward_displacement(outcome.behaviour))) > len(runs) / 2
-
-
 @pytest.mark.parametrize(("domain", "task"), OWN_TASKS)
 @pytest.mark.parametrize("case", [2, 5, 7, 9])
 def test_an_environment_moves_like_the_simulator_to_the_bit(domain: str, task: str, case: int):

@@ -11,7 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.load import adapt, load_mjcf
 from selfmodel.robot.mjcf.pose import STAND_CLEARANCE
 from selfmodel.robot.mjcf.settings import MjcfSettings, checked_settings
-from tests.helpers.robots.arms import PEDESTAL, arm, arm_mjcf, robot_of
+from tests.helpers.robots.arms import PEDESTAL, arm_mjcf, robot_of
 from tests.robot.mjcf.awkward import GROUND, LEGS, mjcf
 from tests.robot.mjcf.motion import moved, theirs, written
 
@@ -108,7 +108,6 @@ def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):
 
 
 TWO_ARMS = '<body name="left" pos="0 1 0">{arm}</body><body name="table"><geom size=".1"/></body>'
-HOME = '<keyframe><key name="home" qpos="0 0 .4 1 0 0 0 .2 -.2"/></keyframe>'
 
 
 def touches_floor(model: mujoco.MjModel, qpos: np.ndarray) -> bool:
@@ -129,10 +128,6 @@ def test_an_arm_directly_on_the_world_gets_a_base_and_moves_as_before():
             mujoco.mj_step(model, data)
         states.append(data.qpos.copy())
     assert np.array_equal(*states)
-
-
-def test_an_arm_gets_no_ground():
-    assert not (arm().model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).any()
 
 
 def test_two_arms_on_two_bodies_of_the_world_are_one_robot():
@@ -177,11 +172,6 @@ def test_the_height_of_a_stand_can_be_set():
         assert robot_of(text, base="fixed", base_height=2.5).standing_height == 2.5
 
 
-def test_a_stand_holds_the_robot_in_the_pose_of_its_keyframe():
-    robot = robot_of(mjcf(more=HOME), base="fixed")
-    assert robot.model.qpos0.tolist() == pytest.approx([0.2, -0.2])
-
-
 def test_hips_that_overlap_the_base_do_not_touch_it_when_it_is_fixed():
     torso = '<geom type="box" size=".2 .1 .1"/>'
     for root in ("<freejoint/>", '<joint type="slide" axis="1 0 0"/>'):
@@ -196,11 +186,6 @@ def test_a_fixed_robot_can_be_freed_with_its_keyframe():
     robot = robot_of(mjcf(root="", more=key), base="free")
     assert not robot.has_fixed_base
     assert robot.model.qpos0.tolist() == pytest.approx([0, 0, 0.35, 1, 0, 0, 0, 0.2, -0.2])
-
-
-def test_an_arm_that_turns_on_the_world_cannot_be_freed():
-    with pytest.raises(InputError, match="put the joints into one <body>"):
-        robot_of(arm_mjcf("{arm}"), base="free")
 
 
 @pytest.mark.parametrize(

@@ -100,18 +100,6 @@ def test_one_gain_alone_is_refused(tmp_path: Path):
         loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp=30")
 
 
-def test_a_gain_for_no_joint_is_refused_with_the_nearest_name(tmp_path: Path):
-    with pytest.raises(InputError, match="left_hip"):
-        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "kp={left_hop=30}", "kd=1")
-
-
-def test_a_model_without_torque_motors_is_refused(tmp_path: Path):
-    motors = TORQUE_MOTORS.replace("<motor", '<position kp="5"')
-
-    with pytest.raises(InputError, match="servos already"):
-        loaded(tmp_path, mjcf(motors=motors), *GAINS)
-
-
 SERVOS = """<position name="left" joint="left_hip" kp="5" inheritrange="1"/>
 <position name="right" joint="right_hip" kp="5" ctrlrange="-.2 .6"/>"""
 END = math.radians(40)
@@ -136,11 +124,6 @@ def test_only_joints_that_the_patterns_fit_are_limited(tmp_path: Path):
     model = loaded(tmp_path, mjcf(motors=SERVOS), "reach={left_hip=0.1}")
 
     assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
-
-
-def test_torques_have_no_reach(tmp_path: Path):
-    with pytest.raises(InputError, match="expected a position servo of a hinge for reach"):
-        loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), "reach=0.5")
 
 
 def test_a_servo_with_a_gear_has_no_reach_because_its_command_is_no_angle(tmp_path: Path):
