@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -213,28 +213,15 @@ def forward_displacement(behaviour: Behaviour) -> FloatArray:
         return np.asarray(x[..., -1] - x[..., 0])
 
 
-class Parts(Protocol):
-    """Anatomy of a robot."""
-
-    @property
-    def names(self) -> Names:
-        """Column names of the signals."""
-
-
 class Described(Protocol):
-    """Robot of a trial; ``selfmodel.Robot`` is one."""
+    """Robot of a trial: its name, control time step (s) and parts; see ``selfmodel.Robot``."""
 
     @property
-    def name(self) -> str:
-        """Name of the robot."""
-
+    def name(self) -> str: ...  # noqa: D102
     @property
-    def control_timestep(self) -> float:
-        """Duration of a control step, s."""
-
+    def control_timestep(self) -> float: ...  # noqa: D102
     @property
-    def anatomy(self) -> Parts:
-        """Parts of the robot."""
+    def anatomy(self) -> Any: ...  # noqa: ANN401, D102  # its class belongs to the robots
 
 
 def behaviour_of_arrays(
@@ -259,56 +246,64 @@ def behaviour_of_arrays(
         raise InputError(
             f"expected a robot, got its name {robot!r}: use selfmodel.load_robot({robot!r})"
         )
-    names = robot.anatomy.names
-    given = {signal: _numbers(signal, values) for signal, values in arrays.items()}
-    lengths = {len(values) for values in given.values() if values is not None and values.ndim}
-    steps = max(lengths, default=0)
+    names: Names = robot.anatomy.names
+    given = {
+        signal: _numbers(signal, values) for signal, values in arrays.items() if values is not None
+    }
+    steps = max((len(values) for values in given.values() if values.ndim), default=0)
     if steps < 2:
         raise InputError("a trial needs at least two rows of joint_positions and of commands")
-    found: dict[Signal, FloatArray] = {}
-    for signal in SIGNALS:
-        values, width = given.get(signal), names.width(signal)
-        if values is None:
-            found[signal] = frozen(np.full((steps, width), np.nan))
-            continue
-        if values.shape != (steps, width):
-            raise InputError(
-                f"{signal} must have the shape (steps, {_columns(signal)}) = ({steps}, {width}), "
-                f"got {values.shape}: its columns are {', '.join(names.columns(signal))}"
-            )
-        _check_finite(signal, values)
-        found[signal] = frozen(_ordered(values, signal, names, orders.get(signal)))
-    _check_unit_length(found["base_orientation"])
-    _check_time(time, steps, robot.control_timestep)
+    found = {
+        signal: frozen(_checked(given[signal], signal, steps, names, orders.get(signal)))
+        if signal in given
+        else frozen(np.full((steps, names.width(signal)), np.nan))
+        for signal in SIGNALS
+    }
+    lengths = np.linalg.norm(found["base_orientation"], axis=1)
+    wrong = np.flatnonzero(np.abs(lengths - 1) > MAX_LENGTH_ERROR)
+    if len(wrong):
+        raise InputError(
+            f"base_orientation must have unit quaternions, w x y z, got one of length "
+            f"{lengths[wrong[0]]:g} in row {wrong[0]}: normalise it, or set it to NaN"
+        )
     scheduled = np.arange(steps, dtype=np.float64) * robot.control_timestep
+    if time is not None:
+        _check_time(_numbers("time", time), scheduled, robot.control_timestep)
     return Behaviour(names, frozen(scheduled), found)
 
 
-def _numbers(signal: str, values: ArrayLike | None) -> FloatArray | None:
+def _numbers(signal: str, values: ArrayLike) -> FloatArray:
     try:
-        return None if values is None else np.array(values, dtype=np.float64)
+        return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{signal} must be an array of numbers, got {type(values).__name__}: {error}"
         ) from error
 
 
-def _columns(signal: Signal) -> str:
-    return {"sensors": "sensors", "commands": "motors"}.get(
-        signal, "hinges" if signal.startswith("joint_") else "numbers"
-    )
-
-
-def _ordered(
-    values: FloatArray, signal: Signal, names: Names, order: Sequence[str] | None
+def _checked(
+    values: FloatArray, signal: Signal, steps: int, names: Names, order: Sequence[str] | None
 ) -> FloatArray:
-    """Columns in the robot's order."""
+    """Returns an array whose shape and numbers are right, with its columns in the robot's order."""
     known = names.columns(signal)
+    kind = {"sensors": "sensors", "commands": "motors"}.get(signal, "numbers")
+    kind = "hinges" if signal.startswith("joint_") else kind
+    if values.shape != (steps, len(known)):
+        raise InputError(
+            f"{signal} must have the shape (steps, {kind}) = ({steps}, {len(known)}), "
+            f"got {values.shape}: its columns are {', '.join(known)}"
+        )
+    infinite = np.argwhere(np.isinf(values)).tolist()
+    if infinite:
+        raise InputError(
+            f"{signal} has an infinite number in row {infinite[0][0]}, column {infinite[0][1]}: "
+            f"set what was not measured to NaN"
+        )
     if order is None:
         return values
-    for name in order:
-        if name not in known:
-            raise unknown_name(f"column of {signal}", name, known)
+    unknown = [name for name in order if name not in known]
+    if unknown:
+        raise unknown_name(f"column of {signal}", unknown[0], known)
     if sorted(order) != sorted(known):
         raise InputError(
             f"the names of the columns of {signal} must be each of {', '.join(known)} once, got "
@@ -317,40 +312,18 @@ def _ordered(
     return values[:, [list(order).index(name) for name in known]]
 
 
-def _check_time(time: ArrayLike | None, steps: int, timestep: float) -> None:
-    values = _numbers("time", time)
-    if values is None:
-        return
-    if values.shape != (steps,):
-        raise InputError(f"time must have the shape (steps,) = ({steps},), got {values.shape}")
-    expected = timestep * np.arange(steps)
-    wrong = np.flatnonzero(~(np.abs(values - values[0] - expected) <= MAX_TIME_ERROR * timestep))
+def _check_time(time: FloatArray, scheduled: FloatArray, timestep: float) -> None:
+    steps = len(scheduled)
+    if time.shape != (steps,):
+        raise InputError(f"time must have the shape (steps,) = ({steps},), got {time.shape}")
+    wrong = np.flatnonzero(~(np.abs(time - time[0] - scheduled) <= MAX_TIME_ERROR * timestep))
     if len(wrong):
         k = int(wrong[0])
         raise InputError(
             f"the rows must be one control time step apart, {timestep:g} s, and row {k} is "
-            f"{values[k] - values[0]:g} s after row 0, not {expected[k]:g} s: load the robot with "
+            f"{time[k] - time[0]:g} s after row 0, not {scheduled[k]:g} s: load the robot with "
             f"the time step of the rows, resample them, or import a file of them with `selfmodel "
             f"logs import`, which resamples"
-        )
-
-
-def _check_finite(signal: str, values: FloatArray) -> None:
-    infinite = np.argwhere(np.isinf(values)).tolist()
-    if infinite:
-        raise InputError(
-            f"{signal} has an infinite number in row {infinite[0][0]}, column {infinite[0][1]}: "
-            f"set what was not measured to NaN"
-        )
-
-
-def _check_unit_length(orientations: FloatArray) -> None:
-    lengths = np.linalg.norm(orientations, axis=1)
-    wrong = np.flatnonzero(np.abs(lengths - 1) > MAX_LENGTH_ERROR)
-    if len(wrong):
-        raise InputError(
-            f"base_orientation must have unit quaternions, w x y z, got one of length "
-            f"{lengths[wrong[0]]:g} in row {wrong[0]}: normalise it, or set it to NaN"
         )
 
 
@@ -364,10 +337,7 @@ PREFIXES: Mapping[Signal, str] = MappingProxyType(
         "joint_efforts": "effort",
         "commands": "command",
         "sensors": "sensor",
-        "base_position": "base_position",
-        "base_orientation": "base_orientation",
-        "base_linear_velocity": "base_linear_velocity",
-        "base_angular_velocity": "base_angular_velocity",
+        **{signal: signal for signal in SIGNALS if signal.startswith("base_")},
     }
 )
 """First part of the name of each signal's columns: ``position.front_left_knee``."""

@@ -195,8 +195,7 @@ def with_joint_velocities(behaviour: Behaviour) -> Behaviour:
     """
     if not lacks_joint_velocities(behaviour):
         return behaviour
-    velocities = _slopes(behaviour)
-    signals = {**behaviour.signals, "joint_velocities": velocities}
+    signals = {**behaviour.signals, "joint_velocities": _slopes(behaviour)}
     return dataclasses.replace(behaviour, signals=signals)
 
 

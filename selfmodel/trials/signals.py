@@ -1,7 +1,7 @@
 """The signals of a run: their names and columns, their differences, and their scales.
 
-The tables of scales differ on purpose; the comment before each gives the reason. Their units are
-those of ``SIGNALS``; an orientation is compared as a rotation angle, rad, or as directions.
+The scales differ on purpose, for the reason that each gives. Their units are those of ``SIGNALS``;
+an orientation is compared as a rotation angle, rad, or as directions.
 """
 
 from collections.abc import Mapping
@@ -97,109 +97,64 @@ def comparable(signal: Signal, values: FloatArray) -> FloatArray:
     return directions(values) if signal == "base_orientation" else values
 
 
-# About three times the scales of calibration: the robot is damaged, and the loss of the true
-# hypothesis must stay small in spite of the reality gap.
-PREDICTION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "joint_positions": 0.1,
-        "joint_velocities": 3.0,
-        "base_position": 0.03,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.3,
-        "base_angular_velocity": 1.0,
-        "sensors": 0.3,
-        "commands": 0.05,
-    }
-)
+_SCALES: Mapping[Signal, tuple[float | None, ...]] = {
+    # prediction, hinge, calibration, disagreement, ensemble, full scale
+    "sensors": (0.3, None, None, 1.0, 0.1, None),
+    "commands": (0.05, None, None, None, None, None),
+    "joint_positions": (0.1, 0.03, 0.03, 0.3, 0.05, None),
+    "joint_velocities": (3.0, 0.5, 1.0, None, None, 2.0),
+    "joint_efforts": (None, None, None, None, None, 5.0),
+    "base_position": (0.03, None, 0.01, 0.1, None, 0.1),
+    "base_orientation": (0.1, None, 0.03, 0.3, 0.1, 0.1),
+    "base_linear_velocity": (0.3, None, 0.1, 0.3, 0.1, 0.5),
+    "base_angular_velocity": (1.0, None, 0.3, 1.0, None, 0.5),
+}
+
+
+def _column(number: int) -> Mapping[Signal, float]:
+    rows = ((signal, scales[number]) for signal, scales in _SCALES.items())
+    return MappingProxyType({signal: scale for signal, scale in rows if scale is not None})
+
+
+PREDICTION_ERROR_SCALES = _column(0)
 """Error of a short prediction that counts as large (``segment-prediction``).
 
-The scale of commands is for the paper's command range, and is multiplied by a motor's own range
-over the paper's."""
+About three times the scales of calibration: the robot is damaged, and the loss of the true
+hypothesis must stay small in spite of the reality gap. The scale of commands is for the paper's
+command range, and is multiplied by a motor's own range over the paper's."""
 
-# Those of the angles and velocities of calibration or smaller: losses are compared between
-# hypotheses about one joint, and with the losses of the same joint in healthy trials, so the error
-# of the model is on both sides.
-HINGE_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "joint_positions": 0.03,
-        "joint_velocities": 0.5,
-    }
-)
-"""Error of a short prediction of one hinge that counts as large (``hinge_errors``)."""
+HINGE_ERROR_SCALES = _column(1)
+"""Error of a short prediction of one hinge that counts as large (``hinge_errors``).
 
-# Smaller than the scales of diagnosis: a healthy robot differs from its model by parameters only,
-# and the fit is to find small differences.
-CALIBRATION_ERROR_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "joint_positions": 0.03,
-        "joint_velocities": 1.0,
-        "base_position": 0.01,
-        "base_orientation": 0.03,
-        "base_linear_velocity": 0.1,
-        "base_angular_velocity": 0.3,
-    }
-)
+Those of calibration or smaller: losses are compared between hypotheses about one joint, and with
+those of the same joint in healthy trials, so the error of the model is on both sides."""
+
+CALIBRATION_ERROR_SCALES = _column(2)
 """Error of a short prediction above which calibration counts it linearly, below quadratically.
 
-An impact that is predicted a step early or late has a large error and contains no information
-about masses."""
+Smaller than the scales of diagnosis: a healthy robot differs from its model by parameters only, and
+the fit is to find small differences. An impact that is predicted a step early or late has a large
+error and contains no information about masses."""
 
-# As large as the scales of diagnosis or larger, because two predictions are compared over 100 steps
-# instead of 12: a difference must exceed the effect of the reality gap.
-DISAGREEMENT_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 1.0,
-        "joint_positions": 0.3,
-        "base_position": 0.1,
-        "base_orientation": 0.3,
-        "base_linear_velocity": 0.3,
-        "base_angular_velocity": 1.0,
-    }
-)
-"""Difference of two predictions that counts as full disagreement.
+DISAGREEMENT_SCALES = _column(3)
+"""Difference of two predictions that counts as full disagreement; larger ones count no more.
 
-Larger differences count no more, so that a single outlier does not decide."""
+As large as the scales of diagnosis or larger, because two predictions are compared over 100 steps
+instead of 12: a difference must exceed the effect of the reality gap."""
 
-# Lower bounds of a spread measured in the trial, and not scales of errors: a column that hardly
-# moves in the trial must not make a small difference infinite.
-SERIES_SPREAD_FLOORS: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 0.1,
-        "joint_positions": 0.05,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.1,
-        "base_position": 0.05,
-    }
-)
-"""Lower bound of the standard deviation that scales a column (``sensor-series``)."""
-
-# Equal to the floors of the series where both have the signal. The base's position is left out: the
-# position is a sum over the trial, so early differences of the members remain until its end.
-ENSEMBLE_DEVIATION_FLOORS: Mapping[Signal, float] = MappingProxyType(
-    {
-        "sensors": 0.1,
-        "joint_positions": 0.05,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.1,
-    }
-)
+ENSEMBLE_DEVIATION_FLOORS = _column(4)
 """Standard deviation added in squares to that of the members (``noisy-transfer``).
 
-It represents variation that the members do not have, such as measurement noise."""
+It represents variation that the members do not have, such as measurement noise. The base's position
+is left out: it is a sum over the trial, so early differences of the members remain until its end.
+"""
 
-# Amplitudes of the signals of a walking robot, not errors of predictions: measurement noise is
-# proportional to the amplitude.
-MEASUREMENT_FULL_SCALES: Mapping[Signal, float] = MappingProxyType(
-    {
-        "joint_velocities": 2.0,
-        "joint_efforts": 5.0,
-        "base_position": 0.1,
-        "base_orientation": 0.1,
-        "base_linear_velocity": 0.5,
-        "base_angular_velocity": 0.5,
-    }
-)
+SERIES_SPREAD_FLOORS = MappingProxyType({**ENSEMBLE_DEVIATION_FLOORS, "base_position": 0.05})
+"""Lower bound of the standard deviation that scales a column (``sensor-series``): a column that
+hardly moves in the trial must not make a small difference infinite."""
+
+MEASUREMENT_FULL_SCALES = _column(5)
 """Full scale of each logged signal; the level of measurement noise is a fraction of it.
 
-The full scale of a joint position is half the range of its hinge. Commands have no noise: they
-are not measured."""
+Amplitudes of the signals of a walking robot. The full scale of a joint position is half the range
+of its hinge. Commands have no noise: they are not measured."""

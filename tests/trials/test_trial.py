@@ -39,27 +39,19 @@ def arrays(robot: Robot, steps: int = 6) -> dict[str, Any]:
     }
 
 
-def test_signals_that_were_not_measured_are_nan(biped: Robot):  # noqa: F811
-    given = arrays(biped)
-
-    trial = Trial.from_arrays(biped, **given, stage="before")
+def test_signals_that_were_not_measured_are_nan_and_columns_may_be_in_another_order(
+    biped: Robot,  # noqa: F811
+):
+    given, order = arrays(biped), biped.anatomy.hinges[::-1]
+    trial = Trial.from_arrays(biped, **given, stage="before", joint_names=order)
+    reversed_angles = given["joint_positions"][:, ::-1]
 
     np.testing.assert_array_equal(trial.behaviour["commands"], given["commands"])
+    np.testing.assert_array_equal(trial.behaviour["joint_positions"], reversed_angles)
     assert np.isnan(trial.behaviour["base_position"]).all()
     assert np.isnan(trial.displacement)
     assert trial.plan.stage == "before"
     assert isinstance(trial.plan.controller, Playback)
-
-
-def test_columns_may_be_in_another_order(biped: Robot):  # noqa: F811
-    given, hinges = arrays(biped), biped.anatomy.hinges
-    order = hinges[::-1]
-
-    trial = Trial.from_arrays(biped, **given, joint_names=order)
-
-    np.testing.assert_array_equal(
-        trial.behaviour["joint_positions"], given["joint_positions"][:, ::-1]
-    )
 
 
 def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
@@ -67,7 +59,6 @@ def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
     second["commands"] = second["commands"] + 1
 
     paths = [Trial.from_arrays(biped, **given).path for given in (first, first, second)]
-
     assert paths[0] == paths[1] != paths[2]
 
 
@@ -96,6 +87,10 @@ def test_trials_of_other_numbers_have_other_paths(biped: Robot):  # noqa: F811
         ({"time": np.arange(5) * 0.01}, r"time must have the shape \(steps,\) = \(6,\)"),
         ({"joint_names": ("a", "b", "c", "d")}, "unknown column of joint_positions 'a'"),
         ({"joint_names": ("left_hip_x",) * 4}, "must be each of left_hip_x, .* once, got"),
+        (
+            {"joint_positions": np.zeros((0, 4)), "commands": np.zeros((0, 4))},
+            "a trial needs at least two rows",
+        ),
     ],
 )
 def test_an_error_has_the_expected_shape_and_the_remedy(
@@ -107,26 +102,16 @@ def test_an_error_has_the_expected_shape_and_the_remedy(
         Trial.from_arrays(**{"robot": biped, **arrays(biped), **change})
 
 
-def test_times_may_begin_anywhere_and_jitter(biped: Robot):  # noqa: F811
+def test_times_may_begin_anywhere_and_jitter_and_orientations_be_rounded_or_missing(
+    biped: Robot,  # noqa: F811
+):
     time = 1.7e9 + 0.01 * np.arange(6) + [0, 0.004, -0.004, 0.004, 0, 0]
-
-    trial = Trial.from_arrays(biped, **arrays(biped), time=time)
-
-    np.testing.assert_allclose(trial.behaviour.time, 0.01 * np.arange(6))
-
-
-def test_orientations_may_be_rounded_or_missing(biped: Robot):  # noqa: F811
     given = np.tile([0.7071, 0, 0, 0.7071], (6, 1))
     given[2] = np.nan
+    trial = Trial.from_arrays(biped, **arrays(biped), time=time, base_orientation=given)
 
-    trial = Trial.from_arrays(biped, **arrays(biped), base_orientation=given)
-
+    np.testing.assert_allclose(trial.behaviour.time, 0.01 * np.arange(6))
     np.testing.assert_array_equal(trial.behaviour["base_orientation"], given)
-
-
-def test_fewer_than_two_rows_are_no_trial(biped: Robot):  # noqa: F811
-    with pytest.raises(InputError, match="a trial needs at least two rows"):
-        Trial.from_arrays(biped, np.zeros((0, 4)), np.zeros((0, 4)))
 
 
 def test_a_trial_is_a_table_of_pandas(biped: Robot):  # noqa: F811
