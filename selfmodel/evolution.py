@@ -132,11 +132,7 @@ class Evolution:
 
 
 def first_generation(
-    size: int,
-    length: int,
-    draw: Draw,
-    rng: np.random.Generator,
-    seeds: Sequence[FloatArray],
+    size: int, length: int, draw: Draw, rng: np.random.Generator, seeds: Sequence[FloatArray]
 ) -> FloatArray:
     """Returns seeds, then random genomes, ``(size, length)``; no more than ``size`` seeds.
 

@@ -48,7 +48,7 @@ def calibrate(options: Calibrate) -> None:
         "set": fit.chosen,
         "held_out_gain": fit.held_out_gain,
         "suspicion": fit.suspicion.to_dict() if fit.suspicion else None,
-        "joints": fit.joints.to_dict() if fit.joints else None,
+        "joints": fit.joints,
         "seconds": perf_counter() - start,
     }
     if fit.suspicion is not None:
@@ -80,7 +80,7 @@ def _print(result: dict[str, Any], contacts: Sequence[str]) -> None:
 
 
 def _print_joints(fit: dict[str, Any]) -> None:
-    """Prints the fit of the joints of a robot with a fixed base; see ``JointCalibration``."""
+    """Prints the fit of the joints of a robot with a fixed base; see ``Calibration.joints``."""
     rows = [
         (
             f"{one['quantity']} of {one['name']}",

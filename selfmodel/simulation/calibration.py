@@ -40,42 +40,6 @@ UNDETERMINED = "not determined by these trials"
 
 
 @dataclass(frozen=True, eq=False)
-class JointCalibration:
-    """Fit of the joints of a robot with a fixed base: their values, and the errors of the sets.
-
-    Attributes:
-        rows: Name, quantity, value in the model, fitted value, standard deviation of its logarithm,
-            and whether the trials determine it, of the gain of each motor and the damping, dry
-            friction and armature of each hinge, each in its unit (N m s/rad, N m, kg m^2).
-        chosen: The set of parameters.
-        delay: Control delay, in control steps.
-        errors: Root mean square error of the nominal and of the chosen set.
-        held_out_errors: The same in segments that were left out of the fit.
-        worst_joint: Name of the hinge with the largest error after the fit, and the error, rad.
-    """
-
-    rows: tuple[dict[str, Any], ...]
-    chosen: str
-    delay: float
-    errors: tuple[float, float]
-    held_out_errors: tuple[float, float]
-    worst_joint: tuple[str, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON values."""
-        pairs = {"error": self.errors, "held_out_error": self.held_out_errors}
-        return {
-            "set": self.chosen,
-            "delay": self.delay,
-            **{f"{name}_before": before for name, (before, _) in pairs.items()},
-            **{name: after for name, (_, after) in pairs.items()},
-            "worst_joint": self.worst_joint[0],
-            "worst_joint_error": self.worst_joint[1],
-            "parameters": list(self.rows),
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class Calibration:
     """Result of a calibration.
 
@@ -88,7 +52,12 @@ class Calibration:
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
-        joints: Fit of the joints of a robot with a fixed base; None for other robots.
+        joints: JSON values of the fit of the joints of a robot with a fixed base: its set of
+            parameters, delay and errors, the hinge with the largest error (rad) after the fit, and
+            the ``parameters``: of the gain of each motor and the damping, dry friction and armature
+            of each hinge, in its unit (N m s/rad, N m, kg m^2), the value in the model, the fitted
+            value, the standard deviation of its logarithm, and whether the trials determine it.
+            None for other robots.
         chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
             ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
             or ``joints``.
@@ -102,7 +71,7 @@ class Calibration:
     deviations: FloatArray
     error_before: float
     error: float
-    joints: JointCalibration | None = None
+    joints: dict[str, Any] | None = None
     chosen: str = FACTORS
     determined: tuple[bool, ...] = ()
     held_out_gain: float = 0.0
@@ -128,7 +97,7 @@ class Calibration:
         parts = (*JOINT_FIELDS, "body_mass", "body_inertia")
         factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
         return {
-            **({} if self.joints is None else {"joints": self.joints.to_dict()}),
+            **({} if self.joints is None else {"joints": self.joints}),
             **factors,
             "deviations": self.deviations.tolist(),
             "error_before": self.error_before,
@@ -264,7 +233,7 @@ _QUANTITY_NAMES = {
 """Names of quantities in JSON."""
 
 
-def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> JointCalibration:
+def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
     robot, rows = segments.robot, list[dict[str, Any]]()
     for quantity, prior in JOINT_PRIOR_DEVIATIONS.items():
         if quantity in JOINT_FIELDS:
@@ -290,11 +259,14 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> JointCalibration:
         ]
     sizes = np.sqrt((segments.joint_errors(best.errors) ** 2).mean(axis=0))
     worst = int(np.argmax(sizes))
-    return JointCalibration(
-        rows=tuple(rows),
-        chosen=best.name,
-        delay=best.parameters.delay,
-        errors=(root_mean_square(first.errors), root_mean_square(best.errors)),
-        held_out_errors=(root_mean_square(first.held_out), root_mean_square(best.held_out)),
-        worst_joint=(robot.anatomy.hinges[worst], float(sizes[worst])),
-    )
+    return {
+        "set": best.name,
+        "delay": best.parameters.delay,
+        "error_before": root_mean_square(first.errors),
+        "error": root_mean_square(best.errors),
+        "held_out_error_before": root_mean_square(first.held_out),
+        "held_out_error": root_mean_square(best.held_out),
+        "worst_joint": robot.anatomy.hinges[worst],
+        "worst_joint_error": float(sizes[worst]),
+        "parameters": rows,
+    }

@@ -20,11 +20,7 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
-from selfmodel.simulation.model_factors import (
-    ModelDistribution,
-    Parameters,
-    model_with_parameters,
-)
+from selfmodel.simulation.model_factors import ModelDistribution, Parameters, model_with_parameters
 
 ANGLE_DEVIATION = 0.2
 """Standard deviation of the initial joint angles, rad, at a gap level of 1."""

@@ -20,13 +20,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, as_delay
-from selfmodel.simulation.model_factors import (
-    Basis,
-    Parameters,
-    bases,
-    nominal,
-    prior_deviations,
-)
+from selfmodel.simulation.model_factors import Basis, Parameters, bases, nominal, prior_deviations
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
 

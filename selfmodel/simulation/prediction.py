@@ -12,12 +12,7 @@ from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, state_writer
 from selfmodel.simulation.requests import Segments
-from selfmodel.simulation.rollout import (
-    RobotBatch,
-    SimulationResult,
-    SimulationStats,
-    live_signals,
-)
+from selfmodel.simulation.rollout import RobotBatch, SimulationResult, SimulationStats, live_signals
 from selfmodel.trials.behaviour import Behaviour
 
 CHUNK_BYTES = 2**25

@@ -73,10 +73,7 @@ class Simulator:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        threads: int = 0,
-        stats: SimulationStats | None = None,
+        self, robot: Robot, threads: int = 0, stats: SimulationStats | None = None
     ) -> None:
         self.robot = robot
         self.threads = thread_count(threads)

@@ -15,12 +15,7 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import fit
-from selfmodel.simulation.calibration import (
-    EXACT_ERROR,
-    Calibration,
-    calibrate,
-    prediction_error,
-)
+from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
 from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
     FACTORS,
@@ -335,14 +330,14 @@ def test_joints_and_delay_of_an_arm_are_found_with_the_same_bits_on_any_number_o
     assert found.to_dict() == again.to_dict()
     assert parameters.delay == found.robot.control_delay == ARM_DELAY
     assert joints is not None
-    assert found.chosen == joints.chosen == "kinds"  # as many as joints: the two differ
-    deviations = iter([row["deviation"] for row in joints.rows])
+    assert found.chosen == joints["set"] == "kinds"  # as many as joints: the two differ
+    deviations = iter([row["deviation"] for row in joints["parameters"]])
     for quantity, true in JOINTS_TRUE.items():
         for value, factor in zip(getattr(parameters, quantity), true, strict=True):
             assert abs(np.log(value / factor)) < 3 * next(deviations) + 0.02, quantity
-    assert joints.worst_joint[1] < 3 * ARM_NOISE  # the prior is felt
-    assert joints.held_out_errors[1] < 0.2 * joints.held_out_errors[0]
-    assert found.to_dict()["joints"]["parameters"] == list(joints.rows)
+    assert joints["worst_joint_error"] < 3 * ARM_NOISE  # the prior is felt
+    assert joints["held_out_error"] < 0.2 * joints["held_out_error_before"]
+    assert found.to_dict()["joints"] == joints
 
 
 @search
@@ -356,8 +351,8 @@ def test_an_arm_whose_truth_is_nominal_stays_nominal_and_as_uncertain_as_before(
     assert (found.deviations > 0).all()
     assert found.undetermined == ()
     assert found.joints is not None
-    assert not any(row["determined"] for row in found.joints.rows)
-    assert all(row["value"] == row["before"] for row in found.joints.rows)
+    assert not any(row["determined"] for row in found.joints["parameters"])
+    assert all(row["value"] == row["before"] for row in found.joints["parameters"])
 
 
 def test_slopes_without_their_noise_are_fisher_information():

@@ -96,8 +96,7 @@ def test_feet_feel_the_ground_where_they_are(
 
 
 @pytest.mark.parametrize(
-    ("truth", "slope"),
-    [("intact", ""), ("roughness=0.01", "+slope=0.1"), ("roughness=0.04", "")],
+    ("truth", "slope"), [("intact", ""), ("roughness=0.01", "+slope=0.1"), ("roughness=0.04", "")]
 )
 def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
     quadruped: Robot, walk: Controller, observed: Observed, truth: str, slope: str
