@@ -39,12 +39,7 @@ class ControllerBatch(Protocol):
     readings: FloatArray
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the commands of the next control step from ``readings``.
-
-        Args:
-            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
-        """
-        ...
+        """Writes the commands of the next control step, ``(n, motors)``, given ``readings``."""
 
 
 class Design(Protocol):
@@ -56,41 +51,33 @@ class Design(Protocol):
     @property
     def name(self) -> str:
         """Name of the kind of design in options and controller files, such as ``network``."""
-        ...
 
     @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the inputs, in order."""
-        ...
 
     @property
     def motors(self) -> tuple[str, ...]:
         """Names of the outputs, in order."""
-        ...
 
     @property
     def ranges(self) -> Ranges:
         """Command range of each motor."""
-        ...
 
     @property
     def hidden(self) -> int:
         """Number of hidden neurons; 0 for a design without neurons."""
-        ...
 
     @property
     def weights(self) -> int:
         """Length of a genome."""
-        ...
 
     @property
     def description(self) -> str:
         """Sizes of the design as text, for error messages."""
-        ...
 
     def summary(self, genome: FloatArray) -> str:
         """Returns a short description of the controller with that genome, ``(weights,)``."""
-        ...
 
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> ControllerBatch:
         """Returns the batch of the controllers of some genomes, in their initial state.
@@ -99,7 +86,6 @@ class Design(Protocol):
             genomes: ``(n, weights)``, each value in [-1, 1].
             silent: Indices of the silent hidden neurons per robot, each below ``hidden``.
         """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,28 +136,22 @@ def draw_genomes(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray
 
 
 def check_silent_neurons(design: Design, silent: AbstractSet[int]) -> None:
-    """Checks that a design has the hidden neurons that are to be silent.
-
-    Args:
-        design: The structure of the controller.
-        silent: Indices of the silent hidden neurons.
+    """Checks that a design has the hidden neurons that are to be silent, given by index.
 
     Raises:
-        InputError: A neuron does not exist in the design; the message contains its index.
+        InputError: A neuron does not exist in the design.
     """
     missing = [neuron for neuron in sorted(silent) if neuron >= design.hidden]
-    if not missing:
-        return
-    fault = f"neuron:{missing[0]}"
-    if not design.hidden:
+    if missing:
+        fault = f"neuron:{missing[0]}"
+        neurons, network = "which has no hidden neurons", "choose a network as the controller"
+        if design.hidden:
+            neurons = f"whose hidden neurons are 0 to {design.hidden - 1}"
+            network = "choose a larger network"
         raise InputError(
-            f"{fault} does not apply to {design.description}, which has no hidden neurons: leave "
-            f"{fault} out, or choose a network as the controller"
+            f"{fault} does not apply to {design.description}, {neurons}: leave {fault} out, or "
+            f"{network}"
         )
-    raise InputError(
-        f"{fault} does not apply to {design.description}, whose hidden neurons are 0 to "
-        f"{design.hidden - 1}: leave {fault} out, or choose a larger network"
-    )
 
 
 CommandSource = Controller | Playback

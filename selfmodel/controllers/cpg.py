@@ -151,11 +151,7 @@ class CpgBatch:
         self.readings = np.zeros((len(decoded), len(cpg.sensors)))
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the commands of the next control step from ``readings``.
-
-        Args:
-            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
-        """
+        """Writes the commands of the next control step; see ``ControllerBatch``."""
         phases = self._phase[:, np.newaxis] + self._phases
         phases -= np.floor(phases)
         outputs = np.cos(2 * np.pi * phases)

@@ -44,7 +44,9 @@ class Network:
     @property
     def weights(self) -> int:
         """Number of weights: 68 for the paper's quadruped, 120 for its hexapod."""
-        return sum(rows * columns for rows, columns in self._shapes())
+        return self.hidden * (len(self.sensors) + 1 + self.hidden) + len(self.motors) * (
+            self.hidden + 1
+        )
 
     @property
     def description(self) -> str:
@@ -72,24 +74,17 @@ class Network:
         Returns:
             ``(n, hidden, sensors + hidden + 1)`` and ``(n, motors, hidden + 1)``, the bias last.
         """
-        blocks = []
-        start = 0
-        for rows, columns in self._shapes():
-            block = genomes[:, start : start + rows * columns]
-            blocks.append(block.reshape(-1, rows, columns))
-            start += rows * columns
-        from_input, from_hidden, to_motor = blocks
+        sensors, motors, hidden = len(self.sensors), len(self.motors), self.hidden
+        shapes = ((hidden, sensors + 1), (hidden, hidden), (motors, hidden + 1))
+        ends = np.cumsum([rows * columns for rows, columns in shapes])
+        from_input, from_hidden, to_motor = (
+            block.reshape(-1, *shape)
+            for block, shape in zip(np.split(genomes, ends[:-1], axis=1), shapes, strict=True)
+        )
         to_hidden = np.concatenate(
             [from_input[..., :-1], from_hidden, from_input[..., -1:]], axis=2
         )
         return to_hidden, np.ascontiguousarray(to_motor)
-
-    def _shapes(self) -> tuple[tuple[int, int], ...]:
-        return (
-            (self.hidden, len(self.sensors) + 1),
-            (self.hidden, self.hidden),
-            (len(self.motors), self.hidden + 1),
-        )
 
 
 class NetworkBatch:
@@ -116,11 +111,7 @@ class NetworkBatch:
         self._outputs = self._inputs[:, sensors:]
 
     def step(self, targets: FloatArray) -> None:
-        """Computes the commands of the next control step from ``readings``.
-
-        Args:
-            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
-        """
+        """Writes the commands of the next control step; see ``ControllerBatch``."""
         # einsum sums each row by itself, in an order that the number of rows does not change.
         hidden = np.einsum("nij,nj->ni", self._to_hidden, self._inputs)
         np.tanh(hidden, out=self._hidden)

@@ -81,11 +81,7 @@ class PlaybackBatch:
         self.readings = np.zeros((len(playbacks), sensors))
 
     def step(self, targets: FloatArray) -> None:
-        """Writes the commands of the next control step.
-
-        Args:
-            targets: Commands, ``(n, motors)``, each in its motor's unit; written in place.
-        """
+        """Writes the commands of the next control step; see ``ControllerBatch``."""
         for target, commands in zip(targets, self._commands, strict=True):
             target[:] = commands[min(self._step, len(commands) - 1)]
         self._step += 1

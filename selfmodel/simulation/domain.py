@@ -110,14 +110,7 @@ def draw_samples(
     count: int,
     rng: np.random.Generator,
 ) -> tuple[DomainSample, ...]:
-    """Returns random conditions, with the hypotheses in turn from a random one.
-
-    Args:
-        hypotheses: Indistinguishable hypotheses, at least one.
-        uncertainty: Distribution of the conditions.
-        count: Number of conditions.
-        rng: Random number generator of the draws.
-    """
+    """Returns random conditions, with indistinguishable hypotheses in turn from a random one."""
     first = int(rng.integers(len(hypotheses)))
     certain = uncertainty.is_none
     return tuple(
@@ -137,14 +130,7 @@ def initial_positions(
     conditions: Sequence[DomainSample],
     spread: StartSpread,
 ) -> FloatArray:
-    """Returns the initial generalised positions of a robot, ``(conditions, nq)``.
-
-    Args:
-        robot: The robot as its model describes it.
-        embodiments: Model of the robot under each condition.
-        conditions: The conditions.
-        spread: Spread of the initial poses.
-    """
+    """Returns the initial generalised positions of a robot, ``(conditions, nq)``."""
     poses = []
     for embodiment, condition in zip(embodiments, conditions, strict=True):
         data = mujoco.MjData(embodiment.model)
@@ -172,7 +158,7 @@ def randomize_initial_pose(
         model: Compiled model of the robot, with its faults.
         data: State of the model in the reference pose; it is changed.
         spread: Standard deviations of the pose.
-        rng: Random numbers of the pose.
+        rng: Random numbers.
     """
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, model, data)
@@ -193,14 +179,9 @@ def randomize_joint_angles(
     deviation: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds normal noise to the joint angles of a robot, within their limits.
+    """Adds normal noise (rad) to the joint angles in ``data``, within their limits.
 
-    Args:
-        anatomy: Parts of the robot.
-        model: Compiled model of the robot; its welded joints keep their angles.
-        data: State of the model; it is changed.
-        deviation: Standard deviation of the angles, rad.
-        rng: Random numbers of the angles.
+    Welded joints keep their angles.
     """
     angles = deviation * rng.standard_normal(len(anatomy.hinges))
     for name, angle in zip(anatomy.hinges, angles, strict=True):

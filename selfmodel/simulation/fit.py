@@ -116,15 +116,12 @@ def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
 
 
 def nested_fits(segments: SegmentErrors, before: FloatArray, stats: SimulationStats) -> list[Fit]:
-    """Fits the nested sets of parameters.
+    """Returns the nominal set, then each nested set that was chosen; the last is the best.
 
     Args:
         segments: Segments of the healthy trials.
         before: Errors of the nominal model, ``(errors,)``.
         stats: Statistics that are updated by the predictions of fitted factors.
-
-    Returns:
-        The nominal set, then each set that was chosen; the last is the best.
     """
     robot, folds = segments.robot, segments.folds(FOLDS)
     best, prior = nominal(robot), prior_deviations(robot)
@@ -338,9 +335,6 @@ class _Slopes:
         """Returns the coordinates of the fit without some residuals, by one Gauss-Newton step.
 
         The step of the whole fit, which the solver left, is subtracted.
-
-        Args:
-            left_out: Mask of the residuals, ``(residuals,)``.
         """
         bounds = self.fitter.basis.bounds
         step = self._step(~left_out) - self._step(np.ones_like(left_out))

@@ -64,10 +64,7 @@ def suspicion(
 ) -> Suspicion | None:
     """Returns the probable error in the recording of healthy trials; None if there is none.
 
-    Args:
-        segments: Errors of segments of the healthy trials.
-        parameters: The calibrated parameters.
-        errors: Errors of their predictions, ``(errors,)``.
+    The errors are those of the predictions with the calibrated parameters, ``(errors,)``.
     """
     hinges = segments.robot.anatomy.hinges
     predicted = segments.joint_errors(errors)

@@ -139,13 +139,7 @@ def perturbed_models(
     """Returns models of one robot, each perturbed by a different reality gap.
 
     The gaps do not depend on the hypothesis, so hypotheses are compared on common random numbers.
-
-    Args:
-        robot: The robot as its model describes it.
-        spec_part: The faults that edit the model's specification; ``apply_faults`` applies the
-            other faults of a hypothesis.
-        members: Number of models.
-        level: Level of the gaps.
+    Only the faults that edit the model's specification are applied.
     """
     rng, model = np.random.default_rng(members), compile_model(robot, spec_part)
     return tuple(

@@ -103,14 +103,9 @@ def recordable(request: Request) -> tuple[Signal, ...]:
 
 
 def command_steps(starts: IndexArray, horizon: int) -> IndexArray:
-    """Returns the steps whose commands may take effect in each segment.
+    """Returns the steps whose commands may take effect in each segment; negative before the trial.
 
-    Args:
-        starts: Step at which each segment begins, ``(segments,)``.
-        horizon: Control steps of a segment.
-
-    Returns:
-        ``(segments, LEAD + horizon)``; negative for steps before the trial.
+    The shape is ``(segments, LEAD + horizon)``.
     """
     return starts[:, np.newaxis] + np.arange(-LEAD, horizon)
 
@@ -122,14 +117,6 @@ def cut_segments(
     horizon: int,
     record: tuple[Signal, ...],
 ) -> Segments:
-    """Returns segments of a trial.
-
-    Args:
-        behaviour: The logged behaviour of the trial.
-        states: State at each step, ``(steps, width)`` for each signal.
-        starts: Step at which each segment begins, ``(segments,)``.
-        horizon: Control steps of a segment.
-        record: The signals to record.
-    """
+    """Returns segments of a trial, given the state at each of its steps, ``(steps, width)``."""
     at_starts = {signal: values[starts] for signal, values in states.items()}
     return Segments(at_starts, behaviour["commands"], starts, horizon, record)

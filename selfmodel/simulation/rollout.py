@@ -126,14 +126,10 @@ class RobotBatch:
             self._batch.step(self._ids, nstep=substeps)
 
     def rollout(self, commands: FloatArray, fields: Sequence[str]) -> dict[str, FloatArray]:
-        """Advances the running simulations by physics steps under known commands.
-
-        Args:
-            commands: ``(simulations, physics steps, motors)``.
-            fields: Names of the bound fields of MjData to record.
+        """Advances the running simulations, ``(simulations, physics steps, motors)``.
 
         Returns:
-            Values of each field after each physics step, ``(running, physics steps, width)``.
+            Values of bound fields after each physics step, ``(running, physics steps, width)``.
         """
         ids, steps = self.running, commands.shape[1]
         out = {name: np.zeros((len(ids), steps, self.bind(name).shape[1])) for name in fields}
@@ -312,13 +308,7 @@ def batch_bytes() -> int:
 
 
 def largest_batch(robot: Robot, request: Request, steps: int) -> int:
-    """Returns the largest number of hypotheses to simulate together; at least one.
-
-    Args:
-        robot: The robot.
-        request: Simulation of each hypothesis.
-        steps: Control steps of the trial.
-    """
+    """Returns the largest number of hypotheses to simulate together; at least one."""
     return max(1, batch_bytes() // hypothesis_bytes(robot, request, steps))
 
 

@@ -109,10 +109,6 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     With a fixed base, segments of up to a second follow each other, and joint positions are
     compared, and joint velocities if they were measured.
 
-    Args:
-        robot: The robot of the trial.
-        trial: A trial of the healthy robot.
-
     Raises:
         InputError: Too few states and commands are known for any segments, or a value is infinite
             or absurdly large.
@@ -262,13 +258,7 @@ def _unusable(trial: Trial, reason: str, *, fixed: bool = False) -> InputError:
 
 
 def is_better(one: FloatArray, other: FloatArray, min_z: float) -> bool:
-    """Returns whether the losses of segments are significantly lower, paired over the segments.
-
-    Args:
-        one: Losses of the segments, ``(segments,)``.
-        other: Losses of the same segments, to be undercut.
-        min_z: Smallest mean difference, in standard errors.
-    """
+    """Returns whether one's losses of segments are lower by ``min_z`` standard errors, paired."""
     gains = other - one
     error = float(gains.std(ddof=1)) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     return bool(gains.mean() > min_z * error and gains.mean() > 0)
@@ -342,10 +332,7 @@ class SegmentErrors:
     def joint_errors(self, errors: FloatArray) -> FloatArray:
         """Returns the errors of joint positions, ``(valid steps, hinges)``, rad.
 
-        The error of an unknown hinge is 0.
-
-        Args:
-            errors: All errors of one model, ``(errors,)``.
+        The error of an unknown hinge is 0. ``errors`` are all errors of one model, ``(errors,)``.
         """
         first, found = 0, []
         for own in self.data:

@@ -88,13 +88,7 @@ class Simulator:
         self._contact_points = lru_cache(MAX_CACHED_ENSEMBLES)(points)
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates each run for ``steps`` control steps from the initial pose.
-
-        Args:
-            runs: At least one run.
-            steps: Control steps, and rows of every signal.
-            record: Signals to record; other signals are not computed.
-        """
+        """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``."""
         embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
         return self._run(embodiments, [driver for _, driver in runs], steps, record)
 
@@ -152,12 +146,6 @@ class Simulator:
     ) -> SimulationResult:
         """Simulates each hypothesis with each member of an ensemble of perturbed self-models.
 
-        Args:
-            hypotheses: At least one hypothesis.
-            driver: Source of the commands.
-            steps: Control steps, and rows of every signal.
-            ensemble: Number of members, gap level and recorded signals.
-
         Returns:
             Signals of ``(n, members, steps, width)``; a hypothesis has diverged if any member has.
         """
@@ -179,13 +167,6 @@ class Simulator:
         record: Sequence[Signal],
     ) -> SimulationResult:
         """Simulates each driver under each condition.
-
-        Args:
-            conditions: At least one condition.
-            uncertainty: Distribution of the conditions.
-            drivers: Sources of the commands, at least one.
-            steps: Control steps, and rows of every signal.
-            record: Signals to record.
 
         Returns:
             Signals of ``(drivers, conditions, steps, width)``, and a mask of
@@ -248,10 +229,6 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
 
     A contact point is the lowest point of a body, at each step with a touch reading of 1. Wrong
     touch readings result in points in the air. A body beyond an unknown hinge has no contact point.
-
-    Args:
-        robot: The healthy robot.
-        behaviour: The logged behaviour of the trial.
 
     Returns:
         ``(n, 3)``, world frame, m, read-only; ``(0, 3)`` for a model without level ground.
@@ -328,12 +305,7 @@ class Cache(Generic[Key]):
     def get_or_compute(
         self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
     ) -> list[FloatArray]:
-        """Returns the row of each key.
-
-        Args:
-            keys: Keys in any order, with or without repetitions.
-            compute: Returns the rows, ``(n, ...)``, of the distinct keys that are not cached.
-        """
+        """Returns the row of each key; ``compute`` returns those of distinct keys that are new."""
         missing = list(dict.fromkeys(key for key in keys if key not in self._rows))
         if missing:
             self._rows.update(zip(missing, compute(missing), strict=True))
