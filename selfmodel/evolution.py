@@ -134,30 +134,14 @@ class Evolution:
 def first_generation(
     size: int, length: int, draw: Draw, rng: np.random.Generator, seeds: Sequence[FloatArray]
 ) -> FloatArray:
-    """Returns seeds, then random genomes, ``(size, length)``; no more than ``size`` seeds.
-
-    Args:
-        size: Number of genomes.
-        length: Number of values of a genome.
-        draw: Draws random genomes.
-        rng: Source of all random numbers.
-        seeds: Known genomes, each ``(length,)``.
-    """
+    """Returns seeds, then random genomes, ``(size, length)``; no more than ``size`` seeds."""
     known = list(seeds)[:size]
     fresh = draw(rng, (size - len(known), length))
     return np.concatenate([np.array(known).reshape(-1, length), fresh])
 
 
 def check_fitness(fitness: FloatArray, genomes: FloatArray) -> None:
-    """Checks that there is a fitness for each genome.
-
-    Args:
-        fitness: ``(n,)``.
-        genomes: The genomes that a search asked for, ``(n, length)``.
-
-    Raises:
-        ValueError: ``fitness`` has another shape, or a NaN.
-    """
+    """Raises ``ValueError`` unless there is a fitness, ``(n,)``, for each genome."""
     if fitness.shape != (len(genomes),) or np.isnan(fitness).any():
         raise ValueError(
             f"expected a fitness other than NaN for each of the {len(genomes)} genomes asked for, "
@@ -168,14 +152,7 @@ def check_fitness(fitness: FloatArray, genomes: FloatArray) -> None:
 def offspring_of(
     survivors: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
 ) -> FloatArray:
-    """Returns the children of a generation, ``(children, length)``.
-
-    Args:
-        survivors: Genomes, best first, ``(n, length)``.
-        draw: Draws the values of mutations.
-        settings: Parameters of the search.
-        rng: Source of all random numbers.
-    """
+    """Returns the children of survivors, best first, ``(children, length)``."""
     count = settings.population - settings.survivors
     # The entrant with the lowest index, which is the best one, wins a tournament.
     entrants = rng.integers(len(survivors), size=(count, settings.tournament))
@@ -185,14 +162,7 @@ def offspring_of(
 def reproduce(
     parents: FloatArray, draw: Draw, settings: Settings, rng: np.random.Generator
 ) -> FloatArray:
-    """Returns one child per parent: mutated, then some adjacent pairs with one-point crossover.
-
-    Args:
-        parents: Genomes, ``(n, length)``; not changed.
-        draw: Draws the values of mutations.
-        settings: Mutation probability and number of crossovers.
-        rng: Source of all random numbers.
-    """
+    """Returns one child per parent: mutated, then some adjacent pairs with one-point crossover."""
     mutated = rng.random(parents.shape) < settings.mutation
     children = np.where(mutated, draw(rng, parents.shape), parents)
     for pair in rng.permutation(len(children) // 2)[: settings.crossovers]:

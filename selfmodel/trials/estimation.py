@@ -29,13 +29,9 @@ def known_steps(states: Mapping[Signal, FloatArray]) -> BoolArray:
 
     Some hinge of each joint signal is known there, and all other signals are known completely. A
     hinge without an encoder is unknown, and does not make the steps of a trial unknown.
-
-    Args:
-        states: Signals of the state, ``(steps, width)`` each.
     """
-    return np.asarray(
-        np.logical_and.reduce([known_rows(signal, rows) for signal, rows in states.items()])
-    )
+    known = [known_rows(signal, rows) for signal, rows in states.items()]
+    return np.asarray(np.logical_and.reduce(known))
 
 
 def known_rows(signal: Signal, values: FloatArray) -> BoolArray:
@@ -66,16 +62,11 @@ that is smoothed, in the position's unit."""
 def estimated_states(
     behaviour: Behaviour, signals: tuple[Signal, ...] = STATE
 ) -> Mapping[Signal, FloatArray]:
-    """Returns the estimated state at each step.
+    """Returns the estimated state at each step of one run, ``(steps, width)`` for each signal.
 
-    Args:
-        behaviour: Behaviour of one run.
-        signals: The signals of the state to estimate.
-
-    Returns:
-        Each signal, ``(steps, width)``. A signal without detectable noise is the logged signal,
-        bit-identical, and so is a position whose velocity was never observed. Otherwise the result
-        is NaN where a value it depends on was not observed, or a late step is in between.
+    A signal without detectable noise is the logged signal, bit-identical, and so is a position
+    whose velocity was never observed. Otherwise the result is NaN where a value it depends on was
+    not observed, or a late step is in between.
     """
     states = {signal: behaviour[signal] for signal in signals}
     timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
@@ -184,14 +175,8 @@ def with_joint_velocities(behaviour: Behaviour) -> Behaviour:
 
     The velocity at a step is the slope of the cubic polynomial of least squares over the positions
     within ``HALF_WIDTH`` (Savitzky & Golay 1964, Analytical Chemistry 36), with a window that is
-    shifted inwards at the ends of the behaviour.
-
-    Args:
-        behaviour: Behaviour of one run.
-
-    Returns:
-        The behaviour with estimated joint velocities. A velocity is NaN if a position in its window
-        is unknown, or a step in its window is late.
+    shifted inwards at the ends of the behaviour. It is NaN if a position in its window is unknown,
+    or a step in its window is late.
     """
     if not lacks_joint_velocities(behaviour):
         return behaviour

@@ -42,24 +42,8 @@ def stage_of(name: str) -> Stage | None:
     return next((stage for stage in STAGES if stage == name), None)
 
 
-def checked_stage(name: str) -> Stage:
-    """Returns the stage with a name.
-
-    Raises:
-        InputError: There is no such stage.
-    """
-    found = stage_of(name)
-    if found is None:
-        raise unknown_name("stage", name, STAGES)
-    return found
-
-
 def checked_seed(seed: int) -> int:
-    """Returns a valid seed of a trial.
-
-    Raises:
-        InputError: The seed is negative, or above ``MAX_SEED``.
-    """
+    """Returns a valid seed of a trial; raises ``InputError`` for another one."""
     if not 0 <= seed <= MAX_SEED:
         raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {seed}")
     return seed
@@ -202,13 +186,15 @@ class Trial:
         }
         orders = {**dict.fromkeys(joints, joint_names), "commands": motor_names}
         behaviour = behaviour_of_arrays(robot, arrays, time, orders)
+        if stage not in STAGES:
+            raise unknown_name("stage", stage, STAGES)
         try:
             played = played_back(behaviour.names.motors, behaviour["commands"])
         except ValueError as error:
             raise InputError(
                 f"{error}: begin the arrays at the first row with all commands"
             ) from error
-        plan = TrialPlan(name, checked_stage(stage), controller or played, behaviour.steps, seed=0)
+        plan = TrialPlan(name, stage, controller or played, behaviour.steps, seed=0)
         return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)[:16]})")
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
@@ -277,18 +263,14 @@ def trial_names(trials: Iterable[Trial]) -> dict[str, str]:
     The name is that of the log's file, without ``.mcap``, and not that of the plan: every imported
     trial has the plan ``imported``. A trial without a log has the name of its plan. Where several
     trials would have one name, each of them has its whole path.
-
-    Args:
-        trials: All trials of a diagnosis.
     """
-    names = {trial.path: _name(trial) for trial in trials}
+    files = {trial.path: (PurePath(trial.path), trial.plan.name) for trial in trials}
+    names = {
+        path: file.stem if file.suffix.lower() == ".mcap" else planned
+        for path, (file, planned) in files.items()
+    }
     counts = Counter(names.values())
     return {path: name if counts[name] == 1 else path for path, name in names.items()}
-
-
-def _name(trial: Trial) -> str:
-    file = PurePath(trial.path)
-    return file.stem if file.suffix.lower() == ".mcap" else trial.plan.name
 
 
 LOSABLE_SIGNALS: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
@@ -299,21 +281,13 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """Returns a trial without the columns that were never observed in one of the others.
 
     An unknown joint makes the prediction of the others worse. So the loss of a healthy trial is a
-    reference for a trial with a lost encoder only without the same encoder.
-
-    Args:
-        trial: The trial.
-        others: Trials of the same robot.
-
-    Returns:
-        The trial itself if the others lack nothing; otherwise a trial with NaN in these columns.
+    reference for a trial with a lost encoder only without the same encoder. The trial itself is
+    returned if the others, of the same robot, lack nothing.
     """
     signals, is_lacking = dict(trial.behaviour.signals), False
     for signal in LOSABLE_SIGNALS:
-        missing = np.zeros(signals[signal].shape[1], dtype=bool)
-        for other in others:
-            missing |= ~np.isfinite(other.behaviour[signal]).any(axis=0)
-        lost = missing & np.isfinite(signals[signal]).any(axis=0)
+        observed = [np.isfinite(own.behaviour[signal]).any(axis=0) for own in (trial, *others)]
+        lost = observed[0] & ~np.logical_and.reduce(observed)
         if lost.any():
             is_lacking = True
             signals[signal] = np.where(lost, np.nan, signals[signal])
@@ -330,15 +304,7 @@ at 1e8 m, a number still resolves 1e-8 m."""
 
 
 def check_magnitudes(trial: Trial, signals: Iterable[Signal]) -> None:
-    """Checks that the observed values of some signals can be those of a robot.
-
-    Args:
-        trial: The logged trial.
-        signals: The signals to check.
-
-    Raises:
-        InputError: A value is infinite or above ``MAX_VALUE``; the message contains the first one.
-    """
+    """Raises ``InputError`` if a value of some signals is infinite or above ``MAX_VALUE``."""
     for signal in signals:
         values = trial.behaviour[signal]
         wrong = np.argwhere(np.abs(values) > MAX_VALUE)
@@ -358,12 +324,7 @@ the same gait, also of a network on a damaged robot, and at least 0.7 for differ
 
 
 def have_one_gait(trials: Sequence[Trial], others: Sequence[Trial]) -> bool:
-    """Returns whether for each trial one of the others has commands of the same gait.
-
-    Args:
-        trials: Trials of a robot.
-        others: Other trials of the same robot.
-    """
+    """Returns whether for each trial one of the others has commands of the same gait."""
     return all(
         any(command_difference(one, other) <= MAX_DIFFERENCE for other in others) for one in trials
     )
