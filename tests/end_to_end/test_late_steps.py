@@ -8,14 +8,16 @@ import dm_env
 import numpy as np
 import pytest
 
-from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD
+from selfmodel.comparators.segment_prediction import (
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+    SegmentPrediction,
+)
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.robots import robot_of
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.settings import Settings
@@ -23,7 +25,7 @@ from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
-from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
@@ -82,38 +84,53 @@ def without_marks(trial: Trial) -> Trial:
     return replace(trial, behaviour=replace(trial.behaviour, late=None))
 
 
+def test_the_marks_are_those_of_the_environment_and_a_command_before_one_is_not_steady(
+    trial: Trial,
+):
+    behaviour = trial.behaviour
+    stood_longer = np.isnan(behaviour.steady_commands).all(axis=1)
+    unmarked = without_marks(trial).behaviour
+
+    assert np.flatnonzero(behaviour.late).tolist() == list(LATE)
+    assert np.flatnonzero(stood_longer).tolist() == [k - 1 for k in LATE]
+    steady = behaviour.steady_commands[~stood_longer]
+    np.testing.assert_array_equal(steady, behaviour["commands"][~stood_longer])
+    assert unmarked.steady_commands is unmarked["commands"]
+    with pytest.raises(ValueError, match=r"late must be \(steps,\) = \(250,\), got \(3,\)"):
+        replace(behaviour, late=np.zeros(3, dtype=bool))
+
+
+def losses(trial: Trial, comparator: SegmentPrediction, *texts: str) -> np.ndarray:
+    """The loss of each hypothesis."""
+    hypotheses = [parse(text, QUADRUPED.anatomy) for text in texts]
+    prepared = comparator.prepare(trial)
+    predicted = Simulator(QUADRUPED, 1).predict(hypotheses, prepared.request).behaviour
+    return prepared.losses(predicted).total.mean(axis=1)
+
+
 @pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
 def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
-    trial: Trial, comparator: object
+    trial: Trial, comparator: SegmentPrediction
 ):
-    def distance(judged: Trial) -> float:
-        asked = comparator.prepare(judged).request
-        outcome = Simulator(QUADRUPED, 1).predict([INTACT], asked).behaviour
-        return float(comparator.prepare(judged).losses(outcome).total.mean())
+    (marked,), (unmarked,) = (
+        losses(own, comparator, "intact") for own in (trial, without_marks(trial))
+    )
 
+    assert marked < unmarked
     if comparator is SEGMENT_PREDICTION:
-        assert distance(trial) < 1e-20
-    assert distance(trial) < distance(without_marks(trial))
+        assert marked < 1e-20
 
 
 def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tmp_path: Path):
     env = load("quadruped", "walk")
     physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
-    plan = TrialPlan("00", "after", driver, STEPS, 0)
-    path = tmp_path / "trial.mcap"
-    write_trial(
-        path, QUADRUPED, plan, physical.run(driver, STEPS), TrialHeader(Settings(), timed=True)
-    )
-    log = read_log(path)
-    self_model = robot_of(log)
+    plan, header = TrialPlan("00", "after", driver, STEPS, 0), TrialHeader(Settings(), timed=True)
+    samples = physical.run(driver, STEPS)
+    log = read_log(write_trial(tmp_path / "trial.mcap", QUADRUPED, plan, samples, header))
     texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
-    hypotheses = [parse(text, self_model.anatomy) for text in texts]
 
-    asked = SEGMENT_PREDICTION.prepare(log.trial).request
-    predicted = Simulator(self_model, 1).predict(hypotheses, asked).behaviour
-    losses = SEGMENT_PREDICTION.prepare(log.trial).losses(predicted)
-    intact, *others = losses.total.mean(axis=1)
+    intact, *others = losses(log.trial, SEGMENT_PREDICTION, *texts)
     assert log.timing is not None
     assert np.flatnonzero(log.timing.missing).tolist() == [90]
     assert np.flatnonzero(log.timing.late).tolist() == list(LATE)
@@ -126,28 +143,25 @@ def test_a_model_that_is_exact_predicts_it_exactly_for_calibration_too(trial: Tr
     assert prediction_error(QUADRUPED, [without_marks(trial)], 1) > EXACT_ERROR
 
 
-def noisy(behaviour: Behaviour) -> Behaviour:
-    noise = np.random.default_rng(0).normal(0, 3e-3, behaviour["base_position"].shape)
-    position = behaviour["base_position"] + noise
-    return replace(behaviour, signals={**behaviour.signals, "base_position": position})
-
-
 def test_positions_are_not_averaged_across_a_step_that_was_late(trial: Trial):
-    run = noisy(trial.behaviour)
-    marked = estimated_states(run)["base_position"]
-    unmarked = estimated_states(replace(run, late=None))["base_position"]
+    behaviour = trial.behaviour
+    noise = np.random.default_rng(0).normal(0, 3e-3, behaviour["base_position"].shape)
+    noisy = {**behaviour.signals, "base_position": behaviour["base_position"] + noise}
+    marked, unmarked = (
+        estimated_states(replace(behaviour, signals=noisy, late=late))["base_position"]
+        for late in (behaviour.late, None)
+    )
     # Six steps to either side: from the sixth row before the late one to the fifth after it.
     across = np.zeros(STEPS, dtype=bool)
     for k in LATE:
         across[k - 6 : k + 6] = True
 
-    assert not np.array_equal(marked, run["base_position"])
+    assert not np.array_equal(marked, noisy["base_position"])
     assert np.isnan(marked[across]).all()
     np.testing.assert_allclose(marked[~across], unmarked[~across], atol=1e-12)
 
 
 def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
-    late = np.ones(STEPS, dtype=bool)
-    hurried = replace(trial, behaviour=replace(trial.behaviour, late=late))
+    late = replace(trial, behaviour=replace(trial.behaviour, late=np.ones(STEPS, dtype=bool)))
     with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
-        SEGMENT_PREDICTION.prepare(hurried)
+        SEGMENT_PREDICTION.prepare(late)
