@@ -1,6 +1,7 @@
 """Short predictions from logged states under logged commands."""
 
 from collections.abc import Iterator, Sequence
+from functools import cache, partial
 
 import mujoco
 import numpy as np
@@ -62,26 +63,26 @@ def predict(
     )
     moving = [embodiments[i] for i in simulated]
     lag = robot.control_delay if delay is None else delay
-    batch = _OpenLoop(robot, moving, segments, lag, threads, stats)
-    together = batch.together
-    qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
+    loop = _OpenLoop(robot, moving, segments, lag, threads, stats)
+    together = loop.together
+    qpos, sensordata = loop.bind("qpos"), loop.bind("sensordata")
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
     reader = SensorReader(robot.model, robot.anatomy, embodiments, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
-    live = live_signals(robot, batch.bind, batch.models, segments.record)
+    live = live_signals(robot, loop.bind, loop.models, segments.record)
     kept = {
         signal: np.empty((n, count, horizon + 1, robot.anatomy.names.width(signal)))
         for signal in segments.record
     }
-    for stage, k in batch.steps():
+    for stage, k in loop.steps():
         if "sensors" in kept:
             reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
             kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
         for signal, read in live.items():
             kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
-    diverged = np.any(batch.diverged()[batch_rows].reshape(n, together), axis=1)
+    diverged = np.any(loop.batch.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.runs += n
     stats.steps += len(moving) * count * horizon
     stats.diverged += int(diverged.sum())
@@ -99,7 +100,7 @@ def predict(
     return SimulationResult(predicted, diverged)
 
 
-class _OpenLoop(RobotBatch):
+class _OpenLoop:
     """A batch that follows the commands of segments, for every embodiment by its control delay.
 
     Args:
@@ -126,10 +127,9 @@ class _OpenLoop(RobotBatch):
         )
         self.together = len(self._stages[0])
         self.models = [own for own in moving for _ in range(self.together)]
-        super().__init__(robot.model, self.models, threads)
+        self.batch = RobotBatch(robot.model, self.models, threads)
         # Before the first step, after which a field that is bound remains zero.
-        self._live = {name: self.bind(name) for name in ("qpos", "qvel", "act")}
-        self._bind_live, self.bind = self.bind, self._bind_copy
+        self._live = {name: self.batch.bind(name) for name in ("qpos", "qvel", "act")}
         self._fields: dict[str, FloatArray] = {}
         self._substeps = robot.substeps
         whole, self._part = split_delay(lag, robot.substeps)
@@ -139,45 +139,41 @@ class _OpenLoop(RobotBatch):
         self._commands = np.concatenate(
             [segments.commands, np.zeros((1, segments.commands.shape[1]))]
         )
-        self._write = state_writer(robot, self._bind_live, *(own.model for own in self.models))
-        by_delay = {
-            delay: activations(robot, segments.commands, delay)[segments.starts]
-            for delay in set(self._delays.tolist())
-        }
-        self._activations = np.array([by_delay[delay] for delay in self._delays.tolist()])
+        self._write = state_writer(robot, self.batch.bind, *(own.model for own in self.models))
+        since_rest = cache(partial(activations, robot, segments.commands))
+        self._activations = np.array(
+            [since_rest(delay)[segments.starts] for delay in self._delays.tolist()]
+        )
         self._offsets = np.array([own.encoder_offset for own in self.models])
         resting = _resting_hinges(robot, segments)
         self._constant_angles = [
             (number, *constant)
             for number, own in enumerate(moving)
-            for constant in (
-                *own.welded,
-                *(resting[name] for name in own.detached & resting.keys()),
-            )
+            for constant in own.welded + [resting[name] for name in own.detached & resting.keys()]
         ]
 
-    def _bind_copy(self, name: str) -> FloatArray:
+    def bind(self, name: str) -> FloatArray:
         """Returns the array of a field at the step that ``steps`` yields."""
-        self._live[name] = self._bind_live(name)
+        self._live[name] = self.batch.bind(name)
         return self._fields.setdefault(name, np.zeros_like(self._live[name]))
 
     def steps(self) -> Iterator[tuple[IndexArray, int]]:
         """Yields the segments and the step within them at which the bound fields are."""
-        self.reset(mujoco.mjtStage.mjSTAGE_POS)
+        self.batch.reset(mujoco.mjtStage.mjSTAGE_POS)
         row_bytes = sum(values.nbytes for values in self._fields.values())
         chunk = max(1, CHUNK_BYTES // (self._substeps * row_bytes))
         for stage in self._stages:
             self._write_states(stage)
             with self._stats.physics():
-                self.forward()
+                self.batch.forward()
             for name, values in self._fields.items():
                 values[:] = self._live[name]
             yield stage, 0
             for first in range(0, self._segments.horizon, chunk):
                 steps = np.arange(first, min(first + chunk, self._segments.horizon))
-                commands, running = self._arriving(stage, steps), self.running
+                commands, running = self._arriving(stage, steps), self.batch.running
                 with self._stats.physics():
-                    recorded = self.rollout(commands, list(self._fields))
+                    recorded = self.batch.rollout(commands, list(self._fields))
                 for number, k in enumerate(steps.tolist(), 1):
                     for name, values in recorded.items():
                         self._fields[name][running] = values[:, number * self._substeps - 1]
