@@ -78,20 +78,17 @@ def test_the_same_seed_finds_the_same_and_another_seed_another():
     assert best(3) == best(3) != best(4)
 
 
-def test_seeds_start_in_the_population():
+def test_seeds_start_the_worst_do_not_survive_and_of_equals_the_earlier_do():
     seed = np.full(LENGTH, 0.999)
     evolution = search(seeds=(seed,))
+    asked = evolution.ask().copy()
+    evolution.tell(np.zeros(100))
 
-    assert len(evolution.ask()) == 100
-    assert evolution.ask()[0].tobytes() == seed.tobytes()
-
-
-def test_the_worst_fitness_does_not_survive():
+    assert asked[0].tobytes() == seed.tobytes()
+    assert evolution.survivors[0].tobytes() == asked[:50].tobytes()
     evolution = search()
-    fitness = np.where(np.arange(100) < 50, -np.inf, np.arange(100))
     losers = {genome.tobytes() for genome in evolution.ask()[:50]}
-    evolution.tell(fitness.astype(float))
-
+    evolution.tell(np.where(np.arange(100) < 50, -np.inf, np.arange(100.0)))
     assert evolution.best_fitness == 99
     assert not losers & {genome.tobytes() for genome in evolution.survivors[0]}
 
@@ -117,18 +114,15 @@ def test_twelve_pairs_of_children_cross_over_at_one_point():
         origin = {value: i for i, parent in enumerate(parents) for value in parent}
         children = np.vectorize(origin.get)(evolution.ask()).reshape(25, 2, LENGTH)
         for first, second in children:
-            if len(set(first)) > 1:
+            point = int(np.argmax(first != first[0]))
+            assert set(first) <= {first[0], second[0]}
+            if point:
                 crossed += 1
-                point = int(np.argmax(first != first[0]))
                 points.add(point)
-                np.testing.assert_array_equal(
-                    first, [first[0]] * point + [second[0]] * (LENGTH - point)
-                )
-                np.testing.assert_array_equal(
-                    second, [second[0]] * point + [first[0]] * (LENGTH - point)
-                )
-            else:
-                assert len(set(second)) == 1
+                np.testing.assert_array_equal(first[point:], np.full(LENGTH - point, second[0]))
+            tail = first[0] if point else second[0]
+            expected = [second[0]] * (point or LENGTH) + [tail] * (LENGTH - (point or LENGTH))
+            np.testing.assert_array_equal(second, expected)
 
     assert points == set(range(1, LENGTH))
     assert 10.5 * 20 < crossed <= 12 * 20  # a pair of twins crosses unseen
@@ -145,14 +139,6 @@ def test_a_parent_is_the_best_of_three_survivors():
 
     assert max(ranks) < 50
     assert abs(np.mean(ranks) - expected) < 0.4  # two would give 16.2, four 9.6, three 12.0
-
-
-def test_of_equals_the_earlier_survive():
-    evolution = search()
-    first = evolution.ask()[:50].copy()
-    evolution.tell(np.zeros(100))
-
-    assert evolution.survivors[0].tobytes() == first.tobytes()
 
 
 @pytest.mark.parametrize("fitness", [np.zeros(99), np.full(100, np.nan)])

@@ -214,14 +214,19 @@ def forward_displacement(behaviour: Behaviour) -> FloatArray:
 
 
 class Described(Protocol):
-    """Robot of a trial: its name, control time step (s) and parts; see ``selfmodel.Robot``."""
+    """Robot of a trial; ``selfmodel.Robot`` is one."""
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str:
+        """Name of the robot."""
+
     @property
-    def control_timestep(self) -> float: ...  # noqa: D102
+    def control_timestep(self) -> float:
+        """Duration of a control step, s."""
+
     @property
-    def anatomy(self) -> Any: ...  # noqa: ANN401, D102  # its class belongs to the robots
+    def anatomy(self) -> Any:  # noqa: ANN401  # its class belongs to the robots
+        """Parts of the robot, whose ``names`` are those of the columns."""
 
 
 def behaviour_of_arrays(
