@@ -154,6 +154,10 @@ class Behaviour:
         """Number of recorded control steps."""
         return len(self.time)
 
+    def with_signals(self, signals: Mapping[Signal, FloatArray]) -> "Behaviour":
+        """Returns the behaviour with other, or further, signals."""
+        return dataclasses.replace(self, signals={**self.signals, **signals})
+
     def first(self, steps: int) -> "Behaviour":
         """Returns the behaviour of the first ``steps`` steps, at most all."""
         return self.rows(slice(steps))

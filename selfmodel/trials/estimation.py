@@ -5,7 +5,6 @@ An estimated position is the mean of the positions of the neighbouring steps, ea
 velocities in between.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping
 
@@ -180,8 +179,7 @@ def with_joint_velocities(behaviour: Behaviour) -> Behaviour:
     """
     if not lacks_joint_velocities(behaviour):
         return behaviour
-    signals = {**behaviour.signals, "joint_velocities": _slopes(behaviour)}
-    return dataclasses.replace(behaviour, signals=signals)
+    return behaviour.with_signals({"joint_velocities": _slopes(behaviour)})
 
 
 def lacks_joint_velocities(behaviour: Behaviour) -> bool:

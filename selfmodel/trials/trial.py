@@ -284,18 +284,15 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     reference for a trial with a lost encoder only without the same encoder. The trial itself is
     returned if the others, of the same robot, lack nothing.
     """
-    signals, is_lacking = dict(trial.behaviour.signals), False
+    reduced: dict[Signal, FloatArray] = {}
     for signal in LOSABLE_SIGNALS:
         observed = [np.isfinite(own.behaviour[signal]).any(axis=0) for own in (trial, *others)]
         lost = observed[0] & ~np.logical_and.reduce(observed)
         if lost.any():
-            is_lacking = True
-            signals[signal] = np.where(lost, np.nan, signals[signal])
-    if not is_lacking:
+            reduced[signal] = np.where(lost, np.nan, trial.behaviour[signal])
+    if not reduced:
         return trial
-    return dataclasses.replace(
-        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
-    )
+    return dataclasses.replace(trial, behaviour=trial.behaviour.with_signals(reduced))
 
 
 MAX_VALUE = 1e8

@@ -50,7 +50,7 @@ def batch(*runs: Behaviour) -> Behaviour:
 
 def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
     """The run with other values of some signals."""
-    return Behaviour(run.names, run.time, {**run.signals, **signals})
+    return run.with_signals(signals)
 
 
 def logged(run: Behaviour) -> Trial:

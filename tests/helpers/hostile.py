@@ -1,6 +1,6 @@
 """Inputs that are hard to judge: models that diverge, and trials with missing signals."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,30 +22,25 @@ def exploding(simulator: Simulator, text: str) -> Hypothesis:
     return hypothesis
 
 
-def lacking(trial: Trial, signals: tuple[Signal, ...], steps: slice = slice(None)) -> Trial:
+def lacking(trial: Trial, signals: Iterable[Signal], steps: slice = slice(None)) -> Trial:
     """Returns the trial with signals that are NaN, not observed, at some steps."""
-    run = trial.behaviour
-    lost = {signal: run[signal].copy() for signal in signals}
-    for values in lost.values():
-        values[steps] = np.nan
-    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
+    for signal in signals:
+        trial = with_value(trial, signal, steps, slice(None), np.nan)
+    return trial
 
 
 def without_encoders(trial: Trial, hinges: Sequence[int], steps: slice = slice(None)) -> Trial:
     """Returns the trial with joint signals of some hinges that are NaN at some steps."""
-    run = trial.behaviour
-    lost = {signal: run[signal].copy() for signal in JOINTS}
-    for values in lost.values():
-        values[steps, hinges] = np.nan
-    return replace(trial, behaviour=replace(run, signals={**run.signals, **lost}))
+    for signal in JOINTS:
+        trial = with_value(trial, signal, steps, hinges, np.nan)
+    return trial
 
 
-def with_value(trial: Trial, signal: Signal, step: int, column: int, value: float) -> Trial:
-    """Returns the trial with another number at one step in one column of a signal."""
-    run = trial.behaviour
-    values = run[signal].copy()
+def with_value(trial: Trial, signal: Signal, step: object, column: object, value: float) -> Trial:
+    """Returns the trial with another number at some steps in some columns of a signal."""
+    values = trial.behaviour[signal].copy()
     values[step, column] = value
-    return replace(trial, behaviour=replace(run, signals={**run.signals, signal: values}))
+    return replace(trial, behaviour=trial.behaviour.with_signals({signal: values}))
 
 
 def unstable(robot: Robot) -> Robot:

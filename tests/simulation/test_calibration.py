@@ -220,10 +220,9 @@ def test_factors_that_predict_left_out_segments_no_better_stay_nominal_to_the_bi
     """A trial in the model's own physics, with noise: there is nothing to fit."""
     rng = np.random.default_rng(0)
     (exact,) = trials(QUADRUPED, 1)
-    signals = dict(exact.behaviour.signals)
-    velocities = signals["joint_velocities"]
-    signals["joint_velocities"] = velocities + 0.3 * rng.standard_normal(velocities.shape)
-    behaviour = dataclasses.replace(exact.behaviour, signals=signals)
+    velocities = exact.behaviour["joint_velocities"]
+    velocities = velocities + 0.3 * rng.standard_normal(velocities.shape)
+    behaviour = exact.behaviour.with_signals({"joint_velocities": velocities})
     found = calibrate(QUADRUPED, [dataclasses.replace(exact, behaviour=behaviour)], threads=1)
 
     assert found.error_before > EXACT_ERROR

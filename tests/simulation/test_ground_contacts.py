@@ -78,7 +78,7 @@ def logged(behaviour: Behaviour, walk: Controller, path: str) -> Trial:
 def changed(run: Behaviour, signal: Signal, place: object, value: float) -> Behaviour:
     values = run[signal].copy()
     values[place] = value
-    return dataclasses.replace(run, signals={**run.signals, signal: values})
+    return run.with_signals({signal: values})
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.02, 0.04])

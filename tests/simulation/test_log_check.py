@@ -29,8 +29,7 @@ def found(tried: Trial) -> Suspicion | None:
 
 def changed(**signals: np.ndarray) -> Trial:
     """The healthy trial with other columns."""
-    behaviour = HEALTHY.behaviour
-    return replace(HEALTHY, behaviour=replace(behaviour, signals={**behaviour.signals, **signals}))
+    return replace(HEALTHY, behaviour=HEALTHY.behaviour.with_signals(signals))
 
 
 def test_a_healthy_trial_is_not_suspicious():

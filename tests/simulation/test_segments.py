@@ -22,7 +22,7 @@ from selfmodel.trials.estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
-from tests.helpers.hostile import lacking, without_encoders
+from tests.helpers.hostile import lacking, with_value, without_encoders
 
 STEPS = 201
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -45,11 +45,8 @@ WHOLE = trial(SimulatedRobot(QUADRUPED))
 
 def lost_and_late(whole: Trial) -> Trial:
     """One joint's velocity was not observed at steps 60 to 79, and step 150 came late."""
-    velocities = whole.behaviour["joint_velocities"].copy()
-    velocities[60:80, 0] = np.nan
-    signals = {**whole.behaviour.signals, "joint_velocities": velocities}
-    run = replace(whole.behaviour, signals=signals, late=np.arange(STEPS) == 150)
-    return replace(whole, behaviour=run)
+    lost = with_value(whole, "joint_velocities", slice(60, 80), 0, np.nan)
+    return replace(lost, behaviour=replace(lost.behaviour, late=np.arange(STEPS) == 150))
 
 
 def starts(tried: Trial) -> np.ndarray:
@@ -166,16 +163,12 @@ def test_a_trial_without_a_usable_segment_is_refused_by_what_it_lacks():
     # All of it is seen at some time, and together after five steps only.
     blinking = lacking(WHOLE, (*BASE, "base_orientation"), slice(6, None))
     numb = lacking(WHOLE, (*BASE, "base_angular_velocity"))
-    commands = numb.behaviour["commands"].copy()
-    commands[:, 3] = np.nan
-    mute = replace(numb.behaviour, signals={**numb.behaviour.signals, "commands": commands})
+    mute = with_value(numb, "commands", slice(None), 3, np.nan)
     refused = {
         "16 steps or more.* and the trial has 15: leave": trial(SimulatedRobot(QUADRUPED), 15),
         "without late steps, .* the log has no such segment": replace(WHOLE, behaviour=late),
         r"a\.mcap: .* the log has no such segment: leave": blinking,
-        f"never has base_angular_velocity, commands of {WHOLE.behaviour.names.motors[3]}": replace(
-            numb, behaviour=mute
-        ),
+        f"never has base_angular_velocity, commands of {WHOLE.behaviour.names.motors[3]}": mute,
     }
     for message, tried in refused.items():
         with pytest.raises(InputError, match=message):

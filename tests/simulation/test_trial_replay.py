@@ -89,10 +89,7 @@ def changed(trial: Trial, signal: Signal, place: object, value: float) -> Trial:
     """The trial with another value of a signal at some places."""
     values = trial.behaviour[signal].copy()
     values[place] = value
-    signals = {**trial.behaviour.signals, signal: values}
-    return dataclasses.replace(
-        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
-    )
+    return dataclasses.replace(trial, behaviour=trial.behaviour.with_signals({signal: values}))
 
 
 def compared(robot: Robot, trial: Trial, truth: str = TRUTH, tolerance: float = 0.0) -> Replay:
