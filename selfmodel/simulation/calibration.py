@@ -232,6 +232,8 @@ _QUANTITY_NAMES = {
 }
 """Names of quantities in JSON."""
 
+_ROW = ("name", "quantity", "before", "value", "deviation", "determined")
+
 
 def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
     robot, rows = segments.robot, list[dict[str, Any]]()
@@ -246,16 +248,10 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
             values = np.array(best.parameters.motor_gains)
         deviations = best.deviations[quantity]
         known = best.is_fitted & is_determined(deviations, np.array(prior))
+        columns = (own.tolist() for own in (before, values, deviations, known))
         rows += [
-            {
-                "name": name,
-                "quantity": _QUANTITY_NAMES[quantity],
-                "before": float(before[k]),
-                "value": float(values[k]),
-                "deviation": float(deviations[k]),
-                "determined": bool(known[k]),
-            }
-            for k, name in enumerate(names)
+            dict(zip(_ROW, (name, _QUANTITY_NAMES[quantity], *numbers), strict=True))
+            for name, *numbers in zip(names, *columns, strict=True)
         ]
     sizes = np.sqrt((segments.joint_errors(best.errors) ** 2).mean(axis=0))
     worst = int(np.argmax(sizes))

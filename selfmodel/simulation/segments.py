@@ -308,12 +308,11 @@ class SegmentErrors:
     @property
     def overlap(self) -> float:
         """Number of segments that contain a step, on average over the steps; at least 1."""
-        ahead = [np.arange(own.segments.horizon) for own in self.data]
         steps = [
-            len(np.unique(own.segments.starts[:, np.newaxis] + after))
-            for own, after in zip(self.data, ahead, strict=True)
+            own.segments.starts[:, np.newaxis] + np.arange(own.segments.horizon)
+            for own in self.data
         ]
-        return sum(own.valid.size for own in self.data) / sum(steps)
+        return sum(own.size for own in steps) / sum(len(np.unique(own)) for own in steps)
 
     def folds(self, count: int) -> IndexArray:
         """Returns the part of each segment, ``(segments,)``: each trial cut in time."""

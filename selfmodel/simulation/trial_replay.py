@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, data_frame
+from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
@@ -57,12 +57,13 @@ class Replay:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values; a signal's rms is None if not observed, or not finite."""
+        rms_values = [(signal, self.rms(signal)) for signal in self.errors]
         return {
             "observed": self.observed,
             "identical": self.identical,
             "first_divergence_step": self.first_divergence_step,
             "diverged": self.diverged,
-            "rms": {signal: _finite(self.rms(signal)) for signal in self.errors},
+            "rms": {signal: rms if np.isfinite(rms) else None for signal, rms in rms_values},
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
@@ -95,41 +96,26 @@ def replay(
     outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
     batch = outcome.behaviour
     simulated = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
-    differs = np.zeros(logged.steps, dtype=bool)
-    some, identical = False, True
-    errors: dict[Signal, FloatArray] = {}
-    for signal in SIGNALS:
-        recorded, predicted = logged[signal], simulated[signal]
-        observed = ~np.isnan(recorded)
-        with np.errstate(invalid="ignore", over="ignore"):  # values of a diverged simulation
-            difference = np.where(observed, predicted - recorded, 0.0)
-            differs |= (~(np.abs(difference) <= tolerance) & observed).any(axis=1)
-            errors[signal] = _rms_of_rows(difference, observed)
-        some |= bool(observed.any())
-        identical &= bool(np.all((_bits(predicted) == _bits(recorded)) | ~observed))
+    recorded, predicted = (
+        np.concatenate([own[signal] for signal in SIGNALS], axis=1) for own in (logged, simulated)
+    )
+    observed = ~np.isnan(recorded)
+    is_same = (predicted.view(np.int64) == recorded.view(np.int64)) | ~observed
+    ends = np.cumsum([logged.names.width(signal) for signal in SIGNALS])[:-1]
+    with np.errstate(all="ignore"):  # values of a diverged simulation; steps without observation
+        differences = np.where(observed, predicted - recorded, 0.0)
+        differs = (~(np.abs(differences) <= tolerance) & observed).any(axis=1)
+        squares, counts = (
+            [own.sum(axis=1) for own in np.split(values, ends, axis=1)]
+            for values in (differences**2, observed)
+        )
+        means = [total / count for total, count in zip(squares, counts, strict=True)]
     steps = np.flatnonzero(differs)
     return Replay(
         simulated=simulated,
-        observed=some,
-        identical=some and identical,
+        observed=bool(observed.any()),
+        identical=bool(observed.any() and is_same.all()),
         first_divergence_step=int(steps[0]) if len(steps) else None,
-        errors=errors,
+        errors={signal: np.sqrt(mean) for signal, mean in zip(SIGNALS, means, strict=True)},
         diverged=bool(outcome.diverged[0]),
     )
-
-
-def _finite(rms: float) -> float | None:
-    """JSON has neither NaN nor infinity."""
-    return rms if np.isfinite(rms) else None
-
-
-def _bits(values: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(values).view(np.int64)
-
-
-def _rms_of_rows(difference: FloatArray, observed: BoolArray) -> FloatArray:
-    counts = observed.sum(axis=1)
-    total = np.sum(np.square(difference), axis=1)
-    mean: FloatArray = np.full(len(total), np.nan)
-    np.divide(total, counts, out=mean, where=counts > 0)
-    return np.sqrt(mean)
