@@ -111,7 +111,8 @@ def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
     """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
     weak = dataclasses.replace(fit.FLOATING, prior_weight=0.005, iterations=20)
     monkeypatch.setattr(fit, "FLOATING", weak)
-    found = calibrate(QUADRUPED, trials(real()), threads=2)
+    monkeypatch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
+    found = calibrate(QUADRUPED, trials(real(), 1), threads=1)
     off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
 
     assert off.max() < 0.05, dict(zip(factor_names(QUADRUPED), off, strict=True))
@@ -129,7 +130,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(robot: Robot, lost: t
 
 @search
 def test_threads_of_the_physics_and_of_the_linear_algebra_do_not_matter():
-    healthy = noisy(QUADRUPED, real(), 1)
+    healthy = noisy(QUADRUPED, real(), 1, steps=200)
 
     def calibrated(threads: int) -> Calibration:
         with threadpool_limits(threads, "blas"):
@@ -151,7 +152,7 @@ def noisy(robot: Robot, physical: Robot, seed: int, steps: int = STEPS) -> Trial
 @search
 def test_contacts_that_differ_are_found_under_noise():
     other = dataclasses.replace(nominal(QUADRUPED), contact_stiffness=2.0, contact_damping=0.25)
-    healthy = noisy(QUADRUPED, with_parameters(QUADRUPED, other), 3, steps=1000)
+    healthy = noisy(QUADRUPED, with_parameters(QUADRUPED, other), 3, steps=700)
     found = calibrate(QUADRUPED, [healthy], threads=2)
 
     assert found.parameters.contact_stiffness in {1.0, 2.0, 4.0}
@@ -182,8 +183,8 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
     adrift = dataclasses.replace(QUADRUPED, mjcf=mjcf.replace('pos="0 0 0.3245"', 'pos="0 0 3"'))
     gap = draw_gap(adrift, 0.02, np.random.default_rng(0))
     friction = factor_names(adrift).index("friction")
-    several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k, 200) for k in range(3)]
-    found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 3)]
+    several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k, 120) for k in range(2)]
+    found = [calibrate(adrift, several[:count], threads=1).deviations for count in (1, 2)]
 
     np.testing.assert_allclose([each[friction] for each in found], PRIOR[friction], rtol=1e-3)
 
@@ -219,7 +220,7 @@ def test_trials_in_which_the_base_was_seen_and_others_are_fitted_to_together():
 def test_factors_that_predict_left_out_segments_no_better_stay_nominal_to_the_bit():
     """A trial in the model's own physics, with noise: there is nothing to fit."""
     rng = np.random.default_rng(0)
-    (exact,) = trials(QUADRUPED, 1)
+    (exact,) = trials(QUADRUPED, 1, 200)
     velocities = exact.behaviour["joint_velocities"]
     velocities = velocities + 0.3 * rng.standard_normal(velocities.shape)
     behaviour = exact.behaviour.with_signals({"joint_velocities": velocities})
