@@ -41,7 +41,7 @@ def fit_to(robot: Robot, first: int, last: int, threads: int) -> dict[str, Any]:
     fit = calibrate(robot, [trial], threads).joints
     if fit is None:
         raise ValueError(f"{robot.name} has no fixed base")
-    return fit.to_dict()
+    return fit
 
 
 def robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
