@@ -116,7 +116,6 @@ def model_with_parameters(
     """
     model = robot.model if model is None else model
     masses = np.full(model.nbody, parameters.limb_mass)
-    masses[0] = 1.0
     masses[model.body(robot.root).id] = parameters.root_mass
     scaled = scale_model(
         model,

@@ -104,7 +104,7 @@ def replay(
     ends = np.cumsum([logged.names.width(signal) for signal in SIGNALS])[:-1]
     with np.errstate(all="ignore"):  # values of a diverged simulation; steps without observation
         differences = np.where(observed, predicted - recorded, 0.0)
-        differs = (~(np.abs(differences) <= tolerance) & observed).any(axis=1)
+        differs = ~(np.abs(differences) <= tolerance).all(axis=1)
         squares, counts = (
             [own.sum(axis=1) for own in np.split(values, ends, axis=1)]
             for values in (differences**2, observed)

@@ -20,6 +20,7 @@ from selfmodel.simulation.domain import (
     StartSpread,
     draw_samples,
     randomize_initial_pose,
+    randomize_joint_angles,
     start_spread,
 )
 from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
@@ -192,6 +193,10 @@ def test_no_start_is_deeper_in_the_ground_or_bent_further_than_the_robot_can_be(
             low, high = model.joint(hinge).range
             assert low <= data.joint(hinge).qpos[0] <= high
         assert not data.qvel.any()
+        randomize_joint_angles(robot.anatomy, model, data, 2.0, np.random.default_rng(seed))
+        angles = [float(data.joint(hinge).qpos[0]) for hinge in robot.anatomy.hinges]
+        limits = np.array([model.joint(hinge).range for hinge in robot.anatomy.hinges]).T
+        assert ((limits[0] <= angles) & (angles <= limits[1])).all()
     assert min(heights) >= reference.qpos[2]
     assert max(heights) > reference.qpos[2] + 0.005  # some had to be lifted
 

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from functools import cache
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
@@ -184,6 +185,16 @@ def test_the_ground_is_the_plane_that_lies_level_not_a_wall(quadruped: Robot, ob
     points = [ground_contact_points(robot, observed("intact")) for robot in (walled, quadruped)]
 
     np.testing.assert_allclose(*points, atol=1e-9)
+
+
+def test_of_several_geoms_of_a_foot_the_lowest_counts(quadruped: Robot, observed: Observed):
+    spec = quadruped.specification()
+    for name in ("front_left_lower", "back_right_lower"):
+        spec.body(name).add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0, 0], mass=0)
+    knobbed = dataclasses.replace(quadruped, mjcf=spec.to_xml())
+    points = [ground_contact_points(robot, observed("intact")) for robot in (knobbed, quadruped)]
+
+    np.testing.assert_allclose(*points, atol=1e-4)
 
 
 def test_a_robot_without_touch_feels_nothing():

@@ -245,8 +245,11 @@ def test_draws_have_a_median_of_one_and_the_given_deviations(quadruped: Robot):
         np.testing.assert_allclose(logarithms.mean(axis=0), 0, atol=deviation / 4)
         np.testing.assert_allclose(logarithms.std(axis=0), deviation, rtol=0.2)
     # Known contacts take no random numbers.
-    known, first = LogNormal(factors, bodies).draw(np.random.default_rng(0)), drawn[0]
-    assert dataclasses.replace(first, contact_stiffness=1.0, contact_damping=1.0) == known
+    rng, again = np.random.default_rng(0), np.random.default_rng(0)
+    known, count = LogNormal(factors, bodies).draw(rng), len(factors) + 2 * len(bodies)
+    assert dataclasses.replace(drawn[0], contact_stiffness=1.0, contact_damping=1.0) == known
+    again.standard_normal(count)
+    assert rng.random() == again.random()
 
 
 def test_a_draw_scales_the_model_of_the_robot(quadruped: Robot):
