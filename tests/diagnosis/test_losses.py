@@ -1,6 +1,7 @@
 """Promises of the losses: simulated once, kept by trial and hypothesis, infinite if diverged."""
 
 import dataclasses
+import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -14,9 +15,8 @@ from selfmodel.comparators import (
     SEGMENT_PREDICTION_ONBOARD,
     SENSOR_SERIES,
 )
-from selfmodel.controllers.controller import CommandSource
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
-from selfmodel.diagnosis.losses import LossTable, contradiction_losses, observed_jams
+from selfmodel.diagnosis.losses import LossTable, contradiction_losses, observed_jams, simulate
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -24,11 +24,10 @@ from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import rollout
-from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
-from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.behaviour import Behaviour
-from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
@@ -41,42 +40,22 @@ KNEE = "front_left_knee"
 CLOSED_LOOP = ClosedLoop(("base_position",))
 
 
-class CountingSimulator(Simulator):
-    """Counts how often each hypothesis is simulated for each driver or each set of segments."""
+Batches = list[list[tuple[object, Hypothesis]]]
 
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot, threads=1)
-        self.times: Counter = Counter()
-        self.calls = 0
 
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates as ever."""
-        self.calls += 1
-        self.times.update(runs)
-        return super().run(runs, steps, record)
+@pytest.fixture
+def simulated(monkeypatch: pytest.MonkeyPatch) -> Batches:
+    """The trials, by their content, and the hypotheses of each simulation."""
+    batches: Batches = []
 
-    def predict(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        segments: Segments,
-        observed: Behaviour | None = None,
+    def recorded(
+        simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
     ) -> SimulationResult:
-        """Predicts as ever."""
-        self.calls += 1
-        self.times.update((one, segments.commands.tobytes()) for one in hypotheses)
-        return super().predict(hypotheses, segments, observed)
+        batches.append([(trial.content, one) for one in hypotheses])
+        return simulate(simulator, request, trial, hypotheses)
 
-    def run_ensemble(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        driver: CommandSource,
-        steps: int,
-        ensemble: Ensemble,
-    ) -> SimulationResult:
-        """Simulates as ever."""
-        self.calls += 1
-        self.times.update((one, driver) for one in hypotheses)
-        return super().run_ensemble(hypotheses, driver, steps, ensemble)
+    monkeypatch.setattr("selfmodel.diagnosis.losses.simulate", recorded)
+    return batches
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,27 +124,30 @@ def test_losses_are_the_same_in_small_batches_and_nothing_is_simulated_twice(
     quadruped: Robot,
     trials: list[Trial],
     three: list[Hypothesis],
-    monkeypatch: pytest.MonkeyPatch,
+    simulated: Batches,
 ):
     whole = LossTable(Simulator(quadruped, 1), comparator)
     losses = [whole.losses(three, [trial]) for trial in trials]
     needed = hypothesis_bytes(quadruped, comparator.prepare(trials[0]).request, STEPS)
-    monkeypatch.setattr(rollout, "batch_bytes", lambda: 2 * needed)
-    simulator = CountingSimulator(quadruped)
-    batched = LossTable(simulator, comparator)
-
-    assert np.array_equal(batched.losses(three, trials), np.concatenate(losses, axis=1))
-    assert simulator.calls == 2 * len(trials)
+    simulated.clear()
+    batched = LossTable(Simulator(quadruped, 1), comparator)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rollout, "batch_bytes", lambda: 2 * needed)
+        assert np.array_equal(batched.losses(three, trials), np.concatenate(losses, axis=1))
+    assert [len(batch) for batch in simulated] == [2, 1] * len(trials)
     distances = batched.distances([*three[::-1], three[0]], trials)
     assert np.array_equal(distances[2::-1], sum(one.mean(axis=1) for one in losses))
     batched.by_hinge(three, trials)
     batched.by_signal(INTACT, trials)
-    assert len(simulator.times) == len(three) * len(trials)
-    assert set(simulator.times.values()) == {1}
+    assert len(set(itertools.chain(*simulated))) == len(three) * len(trials)
+    assert len(simulated) == 2 * len(trials), "nothing is simulated twice"
 
 
 def test_a_trial_is_known_by_its_content_and_prepared_once(
-    quadruped: Robot, trials: list[Trial], three: list[Hypothesis]
+    quadruped: Robot,
+    trials: list[Trial],
+    three: list[Hypothesis],
+    simulated: Batches,
 ):
     times: Counter = Counter()
 
@@ -176,8 +158,7 @@ def test_a_trial_is_known_by_its_content_and_prepared_once(
             times[trial.behaviour.steps] += 1
             return SENSOR_SERIES.prepare(trial)
 
-    trial, simulator = trials[0], CountingSimulator(quadruped)
-    table = LossTable(simulator, Counting())
+    trial, table = trials[0], LossTable(Simulator(quadruped, 1), Counting())
     opening = dataclasses.replace(trial, behaviour=trial.behaviour.first(STEPS // 2))
     position = trial.behaviour["base_position"] + np.linspace(0, 5, STEPS)[:, np.newaxis]
     elsewhere = dataclasses.replace(
@@ -187,7 +168,7 @@ def test_a_trial_is_known_by_its_content_and_prepared_once(
 
     assert np.array_equal(table.losses(three, [dataclasses.replace(trial, path="copy")]), first)
     assert table.losses(three, [opening]).shape[1] < first.shape[1]
-    assert set(simulator.times.values()) == {2}, "the opening is another trial"
+    assert len(simulated) == 2, "the opening is another trial"
     assert times == {STEPS: 1, STEPS // 2: 1}
     assert not np.array_equal(table.losses([INTACT], [elsewhere])[0], first[0])
 
