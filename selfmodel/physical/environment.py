@@ -256,13 +256,7 @@ class EnvironmentRobot:
         *,
         missing: bool,
     ) -> None:
-        """Checks the observation of a step.
-
-        Args:
-            k: The step.
-            values: Row of each signal, ``(width,)``, NaN where not observed.
-            missing_steps: Consecutive steps without a value, ``(width,)``, of each required signal.
-            missing: Whether the step has no observation.
+        """Checks the observation of a step, and the steps without a value of each required signal.
 
         Raises:
             TrialError: A required signal is missing for too long, a number is invalid, or a limit
@@ -331,11 +325,8 @@ class StepTimer:
     """Computes the timing of each control step.
 
     If the first observation has a timestamp, all times are timestamps of observations; otherwise
-    all times are readings of the clock.
-
-    Args:
-        timestep: Control time step, s.
-        tolerance: Largest deviation of a punctual step, as a fraction of the control time step.
+    all times are readings of the clock. The tolerance is the largest deviation of a punctual step,
+    as a fraction of the control time step.
     """
 
     def __init__(self, timestep: float, tolerance: float) -> None:
@@ -348,11 +339,7 @@ class StepTimer:
         """Returns the timing of the next step.
 
         An observation that is not newer than the previous observation is a repetition, and counts
-        as missing.
-
-        Args:
-            now: Reading of the clock, s.
-            observation: The observation; None if there is no observation.
+        as missing. ``now`` is a reading of the clock, s.
         """
         timestamp = float("nan" if observation is None else observation.get(TIMESTAMP, "nan"))
         if math.isinf(timestamp):  # a log cannot contain an infinite time

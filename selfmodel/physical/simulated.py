@@ -42,16 +42,7 @@ CONTACT_MEMORY = 4 * 2**20
 
 
 def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
-    """Returns a random reality gap for a robot; see ``draw_gap_of``.
-
-    Args:
-        robot: The robot as its model describes it.
-        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
-        rng: Random numbers of the gap.
-
-    Raises:
-        InputError: The level is out of range.
-    """
+    """Returns a random reality gap for a robot; see ``draw_gap_of``."""
     return draw_gap_of(robot.model, robot.anatomy, level, rng)
 
 
@@ -72,12 +63,6 @@ class NoisyMeasurement(Measurement):
     An angle reading has normal noise with a standard deviation of ``level`` (half of the range is a
     reading of 1). A touch reading is flipped with a probability of ``level / 2``. A dead sensor
     reads exactly 0. Logged joint positions have noise independent of the readings.
-
-    Args:
-        level: Standard deviation of the noise, as a fraction of the full scale.
-        robot: The healthy robot.
-        embodiment: Model of the robot with its faults.
-        rng: Random numbers of the noise.
     """
 
     def __init__(
@@ -200,11 +185,7 @@ def physical_embodiment(
 ) -> Embodiment:
     """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
 
-    Args:
-        robot: The robot as its model describes it.
-        hidden: Hidden faults of the physical robot, as a hypothesis.
-        seed: Seed of the random parts of the faults.
-        gap: Reality gap with a level above 0; None for no gap.
+    The seed is that of the random parts of the faults.
     """
     if gap is None:
         return build(robot, hidden, seed)
@@ -230,10 +211,6 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
     unchanged. The copy has no motors, tendons and sensors, and its joints are free. The copy
     collides with the ground, the robot and other debris, but not with a body that it overlaps at
     the start: the contact force would throw the copy away.
-
-    Args:
-        spec: The model; it is changed.
-        limbs: Root body of each limb.
     """
     bare = spec.copy()
     for parts in (bare.actuators, bare.sensors, bare.equalities, bare.tendons):
@@ -287,13 +264,7 @@ def _overlapping_pairs(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> list[tupl
 
 
 def place_debris(model: mujoco.MjModel, data: mujoco.MjData, limbs: tuple[str, ...]) -> None:
-    """Sets the pose of each debris body to the pose of the limb that the body is a copy of.
-
-    Args:
-        model: Model of a physical robot with debris.
-        data: State of the model; the positions of the debris are written.
-        limbs: Root body of each limb.
-    """
+    """Sets the pose of each debris body to the pose of the limb that the body is a copy of."""
     mujoco.mj_kinematics(model, data)
     for limb in limbs:
         body = data.body(limb)
