@@ -55,11 +55,7 @@ def is_campaign(folder: Path) -> bool:
 
 
 def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Report:
-    """Returns the report of a campaign.
-
-    Args:
-        folder: Folder of the campaign.
-        most_figures: Largest size of all figures together, bytes.
+    """Returns the report of a campaign, with figures up to a size of all together, bytes.
 
     Raises:
         InputError: The folder has no table, or a file cannot be read.
@@ -173,10 +169,7 @@ def _table_files(folder: Path) -> list[Path]:
 
 
 def read_table(path: Path) -> list[dict[str, Cell]]:
-    """Returns the rows of a table.
-
-    Args:
-        path: A CSV file, or a file with a JSON object per line, ``.jsonl``.
+    """Returns the rows of a CSV file, or of a file with a JSON object per line, ``.jsonl``.
 
     Raises:
         InputError: The file cannot be read.
@@ -194,9 +187,6 @@ def read_table(path: Path) -> list[dict[str, Cell]]:
 
 def other_lists(folder: Path) -> dict[str, list[dict[str, Cell]]]:
     """Returns the lists of ``results.json`` that are in no other table, such as summaries.
-
-    Args:
-        folder: Folder of the campaign.
 
     Raises:
         InputError: The file cannot be read.

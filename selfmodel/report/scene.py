@@ -98,12 +98,8 @@ class Shot:
 def scene_of(robot: Robot, shots: Sequence[Shot], most_poses: int = MAX_POSES) -> dict[str, Any]:
     """Returns the geometry and the motions of a robot as JSON values.
 
-    Steps are left out where a report would be too large; the first and the last remain.
-
-    Args:
-        robot: The robot.
-        shots: The trials.
-        most_poses: Largest number of poses of single bodies, about.
+    Steps are left out where there would be more poses of single bodies, about; the first and the
+    last remain.
     """
     bodies = bodies_of(robot.model, robot.root)
     poses = sum(shot.trial.behaviour.steps * len(shot.motions) for shot in shots) * len(bodies)
