@@ -19,7 +19,7 @@ import mujoco.minimize
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.robot.control_delay import MAX_CONTROL_DELAY, as_delay
+from selfmodel.robot.anatomy import MAX_CONTROL_DELAY, as_delay
 from selfmodel.simulation.model_factors import Basis, Parameters, bases, nominal, prior_deviations
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
