@@ -22,7 +22,7 @@ from selfmodel.studies import figures
 from selfmodel.studies.cells import finished
 from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
-from selfmodel.studies.rows import study_rows
+from selfmodel.studies.rows import KINDS, study_rows
 from selfmodel.studies.study import RUNS, SHARED, Row, grouped
 from selfmodel.studies.tables import Table, markdown_of, table_files, table_of, write_files
 from selfmodel.tasks import ROBOTS
@@ -142,15 +142,16 @@ def collect(folder: Path) -> PaperResults:
     """
     first = next(finished(folder / RUNS), None)
 
-    def rows(table: str, *columns: str) -> list[Row]:
+    def rows(table: str, columns: Sequence[str]) -> list[Row]:
         every = study_rows("paper", folder, table)
-        return [{name: row[name] for name in (*RUN, *columns)} for row in every]
+        every.sort(key=lambda row: list(ROBOTS).index(row["robot"]))
+        return [{name: row[name] for name in columns} for row in every]
 
     return PaperResults(
         None if first is None else Settings(**first.parameters[SHARED]["settings"]),
-        study_rows("paper", folder),
-        rows("trials", "comparator", "number", "stage", "hypothesis", "displacement"),
-        rows("evolution", "evaluations", "before", "best"),
+        rows("recoveries", KINDS["paper"].columns),
+        rows("trials", (*RUN, "comparator", "number", "stage", "hypothesis", "displacement")),
+        rows("evolution", (*RUN, "evaluations", "before", "best")),
     )
 
 

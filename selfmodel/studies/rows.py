@@ -17,7 +17,6 @@ from selfmodel.files import read_file
 from selfmodel.studies import comparisons
 from selfmodel.studies.comparisons import OUTCOME
 from selfmodel.studies.study import Row, rows_in, study_in
-from selfmodel.tasks import ROBOTS
 
 INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
 """Columns of whole numbers, of which some may be unknown."""
@@ -41,17 +40,27 @@ class Kind:
 
     Attributes:
         table: Name of the rows in the result of a cell.
-        columns: Columns of the rows, in order.
-        optional: Columns that tables of earlier versions lack.
-        order: Sort key of a row.
+        names: Names of the columns of the rows, in order, with spaces between them.
+        may_lack: Those that tables of earlier versions lack.
+        sorted_by: Those by which rows are sorted.
         outcomes: Function of the rows to the outcomes that are compared.
     """
 
     table: str
-    columns: tuple[str, ...]
-    optional: tuple[str, ...]
-    order: Callable[[Row], tuple[Any, ...]]
+    names: str
+    may_lack: str
+    sorted_by: str
     outcomes: Callable[[pd.DataFrame], list[tuple[Any, ...]]]
+
+    @property
+    def columns(self) -> list[str]:
+        """Columns of the rows, in order."""
+        return self.names.split()
+
+    def order(self, row: Row) -> tuple[Any, ...]:
+        """Returns the sort key of a row; of a run, the paper's comparator is the first."""
+        key = [row[name] for name in self.sorted_by.split()]
+        return (*key, row.get("comparator") != REFERENCE)
 
 
 def _of_ablation(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
@@ -134,47 +143,35 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "ablate": Kind(
             "diagnoses",
-            (
-                *("robot", "case", "truth", "gap", "seed", "next_trial", "comparator", "trials"),
-                *("best", "correct", "distance", "intact_distance", "verdict", "rivals"),
-                *("evaluations", "distinct_hypotheses", "seconds", "before", "after", "recovered"),
-                *("repair", "search"),
-            ),
-            ("repair", "search"),
-            lambda row: tuple(
-                row[name] for name in ("robot", "truth", "gap", "seed", "comparator", "trials")
-            ),
+            "robot case truth gap seed next_trial comparator trials best correct distance "
+            "intact_distance verdict rivals evaluations distinct_hypotheses seconds before after "
+            "recovered repair search",
+            "repair search",
+            "robot truth gap seed comparator trials",
             _of_ablation,
         ),
         "rivals": Kind(
             "recoveries",
-            (
-                *("method", "robot", "case", "truth", "gap", "seed", "best", "upright"),
-                *("displacement", "fallen", "steps", "simulated_steps", "seconds"),
-            ),
-            (),
-            lambda row: tuple(row[name] for name in ("robot", "case", "gap", "seed", "method")),
+            "method robot case truth gap seed best upright displacement fallen steps "
+            "simulated_steps seconds",
+            "",
+            "robot case gap seed method",
             _of_methods,
         ),
         "paper": Kind(
             "recoveries",
-            (
-                *("robot", "case", "truth", "seed", "comparator", "compared_by", "best", "correct"),
-                *("before", "after", "recovered", "distinct_hypotheses", "diverged", "seconds"),
-            ),
-            (),
-            lambda row: (list(ROBOTS).index(row["robot"]), row["case"], row["seed"]),
+            "robot case truth seed comparator compared_by best correct before after recovered "
+            "distinct_hypotheses diverged seconds",
+            "",
+            "robot case seed",
             _of_paper,
         ),
         "suite": Kind(
             "recoveries",
-            (
-                *("robot", "case", "truth", "seed", "best", "correct", "verdict", "trials"),
-                *("before", "after", "recovered", "diverged", "seconds", "upright"),
-                *("repair", "search"),
-            ),
-            ("upright", "repair", "search"),
-            lambda row: (row["robot"], row["case"], row["seed"]),
+            "robot case truth seed best correct verdict trials before after recovered diverged "
+            "seconds upright repair search",
+            "upright repair search",
+            "robot case seed",
             lambda _rows: [],  # its bodies are recovered with one comparator, and are no pairs
         ),
     }
@@ -242,7 +239,7 @@ def load(path: str | Path) -> LoadedStudy:
         fitting = (
             name
             for name, kind in KINDS.items()
-            if set(kind.columns) - set(kind.optional) <= columns <= set(kind.columns)
+            if set(kind.columns) - set(kind.may_lack.split()) <= columns <= set(kind.columns)
         )
         if not (name := next(fitting, "")):
             raise InputError(
@@ -308,8 +305,6 @@ def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
     rows = rows_in(folder, table or kind.table)
     if table is None:
         rows = [{column: row[column] for column in kind.columns} for row in rows]
-    # Stable: of a run, the rows of the paper's comparator are the first.
-    rows.sort(key=lambda row: row.get("comparator") != REFERENCE)
     return sorted(rows, key=kind.order)
 
 

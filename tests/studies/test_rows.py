@@ -36,7 +36,7 @@ def test_rows_of_a_file_are_those_that_were_written(name: str, tmp_path: Path):
     found = load(written(tmp_path, name, TABLES[name]))
 
     assert found.kind == name
-    assert list(found.rows.columns) == list(KINDS[name].columns)
+    assert list(found.rows.columns) == KINDS[name].columns
     for row, values in zip(found.rows.to_dict("records"), TABLES[name], strict=True):
         for column, value in values.items():
             assert row[column] == value if value is not None else pd.isna(row[column]), column
