@@ -221,13 +221,8 @@ def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray
 class ReadingNoise:
     """Adds noise to the readings of a batch of runs, by condition, step by step.
 
-    The noise of a condition is the same in all its runs (common random numbers).
-
-    Args:
-        anatomy: Parts of the robot.
-        embodiments: The robot under each condition; its dead sensors have no noise.
-        conditions: The conditions, whose runs are in turn in each group of adjacent rows.
-        uncertainty: Distribution of the noise.
+    The noise of a condition is the same in all its runs (common random numbers); dead sensors have
+    none. The runs of the conditions are in turn in each group of adjacent rows.
     """
 
     def __init__(

@@ -107,12 +107,9 @@ def from_factors(factors: FloatArray, delay: float) -> Parameters:
 def model_with_parameters(
     robot: Robot, parameters: Parameters, model: mujoco.MjModel | None = None
 ) -> mujoco.MjModel:
-    """Returns a copy of a model with scaled parameters; the control delay is unchanged.
+    """Returns a copy of the robot's own or an edited model with scaled parameters.
 
-    Args:
-        robot: The robot.
-        parameters: The parameters.
-        model: Model of the robot with edits of its specification; the robot's own by default.
+    The control delay is unchanged.
     """
     model = robot.model if model is None else model
     masses = np.full(model.nbody, parameters.limb_mass)
@@ -167,11 +164,8 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
 def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     """Returns a robot whose MJCF has the parameters of an edited copy of its compiled model.
 
-    Args:
-        robot: The robot.
-        model: A copy of the robot's model with other masses, friction, contacts or motor gains,
-            or other damping, dry friction and armature of joints.
-        delay: Control delay, in control steps.
+    They are masses, friction, contacts, motor gains, and the damping, dry friction and armature of
+    joints; and the control delay, in control steps.
     """
     spec = robot.specification()
     spec.compile()  # assigns the ids of the parts

@@ -72,12 +72,6 @@ def draw_gap_of(
     Source of the idea of randomising simulation errors: Jakobi, Husbands and Harvey, "Noise and
     the reality gap" (ECAL 1995).
 
-    Args:
-        model: The model of the healthy robot.
-        anatomy: Its parts.
-        level: 0 to ``MAX_GAP_LEVEL``; at 0 every factor is 1.
-        rng: Random numbers of the gap.
-
     Raises:
         InputError: The level is out of range.
     """
@@ -114,10 +108,6 @@ def perturbed_model(model: mujoco.MjModel, gap: RealityGap) -> mujoco.MjModel:
     The layout of the copy is the model's: ``apply_faults`` applies a hypothesis to it, and such
     copies share a batch. A body or motor without a factor in the gap is unchanged. The delay and
     the measurement noise are not part of a model.
-
-    Args:
-        model: Model of the healthy robot; it is not changed.
-        gap: The reality gap.
     """
     if gap.level == 0:
         return copy.copy(model)

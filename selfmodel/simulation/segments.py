@@ -347,11 +347,8 @@ class SegmentErrors:
     def of(self, models: Sequence[Parameters], stats: SimulationStats | None = None) -> FloatArray:
         """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
 
-        The models are predicted in batches, so that their memory is bounded.
-
-        Args:
-            models: At least one model; adjacent ones with one control delay share batches.
-            stats: Statistics that are updated.
+        The models are predicted in batches, so that their memory is bounded; adjacent ones with one
+        control delay share them.
         """
         stats = SimulationStats() if stats is None else stats
         size = min(largest_batch(self.robot, own.segments, steps=0) for own in self.data)

@@ -85,12 +85,8 @@ def replay(
 ) -> Replay:
     """Simulates a logged trial under a hypothesis and compares the simulation with the log.
 
-    Args:
-        trial: The logged trial.
-        hypothesis: Assumed faults of the robot.
-        simulator: Simulator of the trial's robot.
-        tolerance: Largest difference of two equal numbers, in the unit of the signal; a log of
-            another MuJoCo version requires a tolerance above 0.
+    A log of another MuJoCo version requires a tolerance above 0: the largest difference of two
+    equal numbers, in the unit of the signal.
     """
     logged = trial.behaviour
     outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)

@@ -241,11 +241,8 @@ def behaviour_of_arrays(
 ) -> Behaviour:
     """Returns the behaviour of measured arrays; missing signals are NaN.
 
-    Args:
-        robot: The robot.
-        arrays: Signals, ``(steps, width)`` each; None for a signal that was not measured.
-        time: Times of the rows, ``(steps,)`` s; None for rows at every control step.
-        orders: Names of the columns of an array, where they are not in the robot's order.
+    Without times, ``(steps,)`` s, the rows are at every control step. The orders are the names of
+    the columns of an array, where they are not in the robot's order.
 
     Raises:
         InputError: An array has another shape, infinite numbers or quaternions that are not of unit
@@ -361,12 +358,6 @@ def columns_of(behaviour: Behaviour) -> dict[str, FloatArray]:
     """Returns the columns of a behaviour by name, time first.
 
     A joint, motor or sensor without any number has no column, and so the base's vectors.
-
-    Args:
-        behaviour: Behaviour of one run.
-
-    Returns:
-        Columns, ``(steps,)`` each, in the unit of their signal.
     """
     found: dict[str, FloatArray] = {TIME: behaviour.time}
     for signal in (name for name in PREFIXES if name in behaviour.signals):

@@ -69,31 +69,14 @@ class Names:
 
 
 def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:
-    """Returns ``one - other`` for values of a signal: the rotation between orientations.
-
-    Args:
-        signal: Name of the signal.
-        one: ``(..., width)``.
-        other: ``(..., width)``, broadcastable to the shape of ``one``.
-
-    Returns:
-        ``(..., width)`` in the signal's unit; ``(..., 3)``, rad, for an orientation.
-    """
+    """Returns ``one - other``, ``(..., width)``; of orientations the rotation, ``(..., 3)``."""
     if signal == "base_orientation":
         return rotation_between(one, other)
     return np.asarray(one - other)
 
 
 def comparable(signal: Signal, values: FloatArray) -> FloatArray:
-    """Returns the columns of a signal in a form that may be averaged and subtracted.
-
-    Args:
-        signal: Name of the signal.
-        values: ``(..., width)``.
-
-    Returns:
-        ``(..., columns)``: direction cosines for an orientation; otherwise the values.
-    """
+    """Returns columns that may be averaged and subtracted: an orientation's direction cosines."""
     return directions(values) if signal == "base_orientation" else values
 
 
