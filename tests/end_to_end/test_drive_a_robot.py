@@ -210,6 +210,6 @@ def test_the_trial_of_the_docs_runs(tmp_path: Path):
     subprocess.run([sys.executable, "-c", block.text], cwd=tmp_path, env=environment, check=True)
     log = verify(tmp_path / "walk.mcap").log
 
-    assert (log.status, log.trial.behaviour.steps) == ("finished", 300)
+    assert (log.status, log.trial.behaviour.steps) == ("finished", 100)
     assert log.timing is not None
     assert not log.timing.late.any()
