@@ -60,6 +60,9 @@ def test_all_cases_are_those_that_each_robot_can_have(tmp_path: Path):
     assert robots.count("quadruped") == 10
     assert 0 < robots.count("suite-walker-walk") < 10
     assert 8 not in known_cases(("suite-hopper-hop", "suite-swimmer-swimmer6"))
+    rewarded = bodies(tmp_path, bodies=["suite-walker-stand"], cases=[3], score="return", neurons=5)
+    (cell,) = rewarded.cells()
+    assert cell.needs["gait"].parameters["score"] == "return"
 
 
 @pytest.mark.parametrize("made", [ablated, bodies])
