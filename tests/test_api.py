@@ -72,10 +72,6 @@ def test_trials_are_diagnosed_as_their_logs_are():
     assert diagnosis([after], BEFORE, robot="quadruped", seed=after.plan.seed) == from_logs
 
 
-def test_a_comparator_by_name_is_the_comparator():
-    assert diagnosis(comparator=DEFAULT.name) == diagnosis(comparator=DEFAULT)
-
-
 @pytest.mark.parametrize(
     "kinds", ["break, jam", ["break", "jam"], ["break", JAMMED], [BROKEN, JAMMED]]
 )
@@ -121,19 +117,6 @@ def test_a_trial_runs_and_replays_to_the_bit(tmp_path: Path):
     for source in (trial, path, str(path)):
         assert selfmodel.replay(source, KNEE, "quadruped").identical
     assert not selfmodel.replay(trial, "intact", "quadruped").identical
-
-
-def test_an_exact_model_stays_as_it_is(tmp_path: Path):
-    walk = selfmodel.read_log(BEFORE).trial.plan.controller
-    physical = selfmodel.simulated_robot("quadruped")
-    path = tmp_path / "walk.mcap"
-    trial = selfmodel.run_trial(physical, walk, path, robot="quadruped", steps=60)
-    robot = selfmodel.load_robot("quadruped")
-
-    for source in (trial, [trial], path, [str(path)]):
-        fit = selfmodel.calibrate(source, robot)
-        assert fit.robot is robot
-        assert fit.error < 0.01
 
 
 def test_a_controller_evolves_equally_from_names_and_objects():
@@ -194,11 +177,6 @@ def test_a_replay_of_wrong_notation_is_refused():
         selfmodel.replay(BEFORE, "brake:front_left_knee", "quadruped")
     with pytest.raises(InputError, match=r"expected a Hypothesis or notation .* type int"):
         selfmodel.replay(BEFORE, 3, "quadruped")
-
-
-def test_a_small_population_alone_is_refused_with_the_remedy():
-    with pytest.raises(InputError, match=r"for another population use Settings\(\)\.scaled\(4\)"):
-        selfmodel.Settings(population=4)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.isolation import IsolationError, Message, available_memory, run_isolated
+from selfmodel.isolation import IsolationError, Message, run_isolated
 from selfmodel.logs import CorruptError
 
 EMPTY = Message({})
@@ -67,7 +67,3 @@ def test_the_working_folder_is_not_imported_from(tmp_path: Path, monkeypatch: py
     (tmp_path / "json.py").write_text("raise SystemExit(3)")
     monkeypatch.chdir(tmp_path)
     assert run("echo").header == {}
-
-
-def test_memory_is_available():
-    assert 10**7 < available_memory() < 10**14

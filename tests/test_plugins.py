@@ -56,18 +56,8 @@ def test_a_comparator_and_a_fault_kind_are_found_by_their_entry_points():
     assert [kind.name for kind in plugins.kinds("break,limp")] == ["break", "limp"]
 
 
-def test_an_entry_point_is_the_object_of_its_module():
-    by_path = plugins.comparator("entry_module:MINE")
-
-    assert plugins.comparator("displacement-of-theirs") == by_path
-
-
 def test_a_name_of_selfmodel_has_precedence_over_an_entry_point():
     assert plugins.comparator("forward-displacement") is FORWARD_DISPLACEMENT
-
-
-def test_all_fault_kinds_are_those_of_selfmodel():
-    assert "limp" not in {kind.name for kind in plugins.kinds("all")}
 
 
 @pytest.mark.parametrize(

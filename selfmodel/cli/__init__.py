@@ -7,10 +7,14 @@ from typing import Annotated, Any
 import typer
 
 from selfmodel.cli.groups import Interrupted, group
-from selfmodel.cli.output.library_warnings import counted_warnings
-from selfmodel.cli.output.plain import plain
-from selfmodel.cli.output.printing import print_lines, print_notes
-from selfmodel.cli.output.streams import flush_output, open_streams
+from selfmodel.cli.output import (
+    counted_warnings,
+    flush_output,
+    open_streams,
+    plain,
+    print_lines,
+    print_notes,
+)
 from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.physical.safety import handle_stop_signals, status_of
 

@@ -6,13 +6,11 @@ from typing import Any
 
 from selfmodel import arguments
 from selfmodel.cli.commands import Calibrate
-from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.tables import show
+from selfmodel.cli.inputs import check_new_file
+from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
-from selfmodel.logs.files import create_file, refuse_existing
-from selfmodel.robot.robot import Robot
+from selfmodel.logs.files import create_file
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
 from selfmodel.simulation.fit import NOMINAL
 from selfmodel.simulation.model_factors import FACTORS
@@ -22,18 +20,20 @@ from selfmodel.simulation.simulator import thread_count
 def calibrate(options: Calibrate) -> None:
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials."""
     start = perf_counter()
-    if options.out.suffix.lower() != ".xml":
-        raise InputError(f"--out needs a name that ends in .xml, got {str(options.out)!r}")
-    check_folder(options.out)
-    refuse_existing(options.out)
+    check_new_file(options.out, ".xml")
     logs = arguments.read_logs(options.files)
     before = arguments.robot_of_logs(logs, options.self_model)
-    _refuse_assets(before, options.self_model or str(options.files[0]))
-    trials = [log.trial for log in logs]
-    fit = fit_to(before, trials, thread_count(options.threads))
+    if before.assets:
+        raise InputError(
+            f"{options.self_model or options.files[0]}: its model names other files "
+            f"({', '.join(sorted(before.assets))}), and calibrate writes a single MJCF file: give "
+            f"--robot a model without them, or give these logs to diagnose, which calibrates by "
+            f"itself"
+        )
+    fit = fit_to(before, [log.trial for log in logs], thread_count(options.threads))
     with create_file(options.out) as file:
         file.write(fit.robot.mjcf.encode())
-    result = {
+    result: dict[str, Any] = {
         "robot": before.name,
         "logs": [str(path) for path in options.files],
         "model": str(options.out),
@@ -55,27 +55,14 @@ def calibrate(options: Calibrate) -> None:
         print_notes(f"warning: {fit.suspicion}")
     if options.as_json:
         print_json(result)
-    else:
-        _print(result, fit.contacts)
-
-
-def _refuse_assets(robot: Robot, where: str) -> None:
-    if robot.assets:
-        raise InputError(
-            f"{where}: its model names other files ({', '.join(sorted(robot.assets))}), and "
-            f"calibrate writes a single MJCF file: give --robot a model without them, or give "
-            f"these logs to diagnose, which calibrates by itself"
-        )
-
-
-def _print(result: dict[str, Any], contacts: Sequence[str]) -> None:
-    if result["joints"] is None:
-        _print_factors(result, contacts)
+        return
+    if fit.joints is None:
+        _print_factors(result, fit.contacts)
     else:
         _print_joints(result["joints"])
     print_lines(
-        f"{result['model']}: {result['robot']} as fitted to "
-        f"{counted(len(result['logs']), 'log')} in {result['seconds']:.1f} s"
+        f"{options.out}: {before.name} as fitted to {counted(len(logs), 'log')} in "
+        f"{result['seconds']:.1f} s"
     )
 
 
@@ -92,13 +79,13 @@ def _print_joints(fit: dict[str, Any]) -> None:
     ]
     if fit["set"] != NOMINAL:
         show(("parameter", "before", "fitted", "uncertainty"), rows)
-    print_lines(f"set of parameters: {fit['set']}; delay, control steps: {fit['delay']:g}")
     print_lines(
+        f"set of parameters: {fit['set']}; delay, control steps: {fit['delay']:g}",
         f"error of predicted motion: {fit['error']:.3f} ({fit['error_before']:.3f} before); in "
         f"segments that were left out of the fit {fit['held_out_error']:.3f} "
-        f"({fit['held_out_error_before']:.3f} before)"
+        f"({fit['held_out_error_before']:.3f} before)",
+        f"largest error: {fit['worst_joint']}, {1e3 * fit['worst_joint_error']:.1f} mrad",
     )
-    print_lines(f"largest error: {fit['worst_joint']}, {1e3 * fit['worst_joint_error']:.1f} mrad")
     if fit["set"] == NOMINAL:
         print_lines(
             "No set of parameters predicts left-out segments significantly better: the model is "
@@ -106,7 +93,7 @@ def _print_joints(fit: dict[str, Any]) -> None:
         )
 
 
-def _print_factors(result: dict[str, Any], contacts: Sequence[str]) -> None:
+def _print_factors(fit: dict[str, Any], contacts: Sequence[str]) -> None:
     rows = [
         (
             one["name"],
@@ -114,28 +101,24 @@ def _print_factors(result: dict[str, Any], contacts: Sequence[str]) -> None:
             f"{one['factor']:.3f}",
             f"± {100 * one['deviation']:.1f} %" if one["determined"] else UNDETERMINED,
         )
-        for one in result["parameters"]
+        for one in fit["parameters"]
     ]
-    show(("factor of", "before", "fitted", "uncertainty"), rows)
-    print_lines(f"delay, control steps: {result['delay']} ({result['delay_before']} before)")
-    print_lines(*contacts)
-    print_lines(
-        f"error of predicted motion: {result['error']:.3f} ({result['error_before']:.3f} before), "
-        f"the root mean square over predictions of 10 steps, each signal in its own scale"
+    end = (
+        f"In segments that were left out of the fit, the loss is {100 * fit['held_out_gain']:.0f} "
+        f"% lower than before."
     )
-    if result["as_it_was"] and result["error"] < EXACT_ERROR:
-        print_lines("The model already predicts the logs exactly: it is written unchanged.")
-    elif result["as_it_was"]:
-        print_lines(
-            "No parameters predict left-out segments significantly better: the model is written "
-            "unchanged."
-        )
-    elif result["set"] != FACTORS:
-        print_lines(
-            "No factors predict left-out segments significantly better: they are unchanged."
-        )
-    else:
-        print_lines(
-            f"In segments that were left out of the fit, the loss is "
-            f"{100 * result['held_out_gain']:.0f} % lower than before."
-        )
+    better = "predict left-out segments significantly better"
+    if fit["as_it_was"] and fit["error"] < EXACT_ERROR:
+        end = "The model already predicts the logs exactly: it is written unchanged."
+    elif fit["as_it_was"]:
+        end = f"No parameters {better}: the model is written unchanged."
+    elif fit["set"] != FACTORS:
+        end = f"No factors {better}: they are unchanged."
+    show(("factor of", "before", "fitted", "uncertainty"), rows)
+    print_lines(
+        f"delay, control steps: {fit['delay']} ({fit['delay_before']} before)",
+        *contacts,
+        f"error of predicted motion: {fit['error']:.3f} ({fit['error_before']:.3f} before), "
+        f"the root mean square over predictions of 10 steps, each signal in its own scale",
+        end,
+    )

@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.cli.commands import Compare
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.tables import show
+from selfmodel.cli.output import print_json, print_lines, print_notes
+from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import LEVEL

@@ -9,15 +9,11 @@ from typing import Any
 
 from selfmodel import arguments, plugins
 from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
-from selfmodel.arguments import comparator_choice
-from selfmodel.cli.commands import Diagnose
-from selfmodel.cli.output.display import display
-from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.ranking import ranking_table
-from selfmodel.cli.output.tables import print_tables
+from selfmodel.cli.commands import Diagnose, FromLogs
+from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.progress import display
+from selfmodel.cli.tables import print_tables, ranking_table
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
 from selfmodel.diagnosis.direct_evidence import DirectEvidence, direct_evidence
 from selfmodel.diagnosis.text import (
@@ -26,7 +22,6 @@ from selfmodel.diagnosis.text import (
     fit_sentence,
     verdict_sentences,
 )
-from selfmodel.faults.kind import FaultKind
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.results import LogsResult, as_json as values_of
@@ -40,39 +35,29 @@ from selfmodel.trials.trial import trial_names
 def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
-    considered = plugins.kinds(options.kinds)
-    made = diagnose_logs(
-        options.files,
-        robot=options.self_model,
-        choose_comparator=comparator_choice(options.comparator),
-        kinds=considered,
-        calibrate=options.calibrate,
-        population=options.population,
-        generations=options.generations,
-        seed=options.seed,
-        threads=options.threads,
-    )
-    found, diagnosis = made.inputs, made.diagnosis
+    found = diagnose_logs(options.files, options)
+    inputs, diagnosis, search = found.inputs, found.diagnosis, found.inputs.search
     evidence = direct_evidence(
-        diagnosis.explained(found.damaged), made.robot.anatomy, trial_names(found.damaged)
+        diagnosis.explained(inputs.damaged), found.robot.anatomy, trial_names(inputs.damaged)
     )
+    paths = [log.trial.path for log in found.explained]
     result = LogsResult(
-        robot=made.robot.name,
-        model=self_model_digest(made.robot),
-        comparator=found.comparator.comparator.name,
-        comparator_reason=found.comparator.reason,
-        kinds=tuple(kind.name for kind in considered),
-        seed=found.seed,
-        settings_from=made.explained[0].trial.path,
-        logs=tuple(log.trial.path for log in made.explained),
-        played_back=tuple(log.trial.path for log in made.played_back),
-        intact=tuple(trial.path for trial in found.healthy),
+        robot=found.robot.name,
+        model=self_model_digest(found.robot),
+        comparator=inputs.comparator.comparator.name,
+        comparator_reason=inputs.comparator.reason,
+        kinds=tuple(kind.name for kind in plugins.kinds(options.kinds)),
+        seed=inputs.seed,
+        settings_from=paths[0],
+        logs=tuple(paths),
+        played_back=tuple(log.trial.path for log in found.explained if _is_played_back(log)),
+        intact=tuple(trial.path for trial in inputs.healthy),
         files={str(path): file_digest(path) for path in options.files},
-        calibration=found.calibration.to_dict() if found.calibration else None,
+        calibration=inputs.calibration.to_dict() if inputs.calibration else None,
         **output_of(diagnosis),
         evidence=to_json(evidence),
-        evaluations=found.search.evaluations,
-        distinct_hypotheses=found.search.distinct_hypotheses,
+        evaluations=search.evaluations,
+        distinct_hypotheses=search.distinct_hypotheses,
         seconds=perf_counter() - start,
     )
     if options.as_json:
@@ -114,76 +99,55 @@ class DiagnosedLogs:
     inputs: LogDiagnosis
     diagnosis: Diagnosis
 
-    @property
-    def played_back(self) -> tuple[TrialLog, ...]:
-        """Logs without a controller."""
-        return tuple(log for log in self.explained if _is_played_back(log))
 
-
-def diagnose_logs(
-    files: Sequence[Path],
-    *,
-    robot: str | None,
-    choose_comparator: ComparatorChoice,
-    kinds: Sequence[FaultKind],
-    calibrate: bool,
-    population: int | None,
-    generations: int | None,
-    seed: int | None,
-    threads: int,
-) -> DiagnosedLogs:
+def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
     """Returns the diagnosis of logs; prints notes and progress on standard error.
 
     Args:
         files: The logs, in the order in which the trials were run.
-        robot: Self-model instead of that in the logs, as in ``--robot``.
-        choose_comparator: Chooses the comparator.
-        kinds: Fault kinds to search.
-        calibrate: Whether the self-model is fitted to the trials before the failure.
-        population: Genomes in a generation; None for the number in the first log.
-        generations: Generations; None for the number in the first log.
-        seed: Seed of all random numbers; None for that of the first log.
-        threads: Threads of the physics; 0 for all processors.
+        options: How to diagnose them.
 
     Raises:
         InputError: A log cannot be used, or no comparator can judge all trials.
     """
+    kinds = plugins.kinds(options.kinds)
+    comparator = arguments.comparator_choice(options.comparator)
     logs = arguments.read_logs(files)
-    model = arguments.robot_of_logs(logs, robot)
+    robot = arguments.robot_of_logs(logs, options.self_model)
     failed, healthy = by_stage([log.trial for log in logs])
-    used = [log for log in logs if log.trial in failed]
-    found = set_up_diagnosis(
+    explained = [log for log in logs if log.trial in failed]
+    inputs = set_up_diagnosis(
         failed,
         healthy,
-        robot=model,
-        choose_comparator=choose_comparator,
+        robot=robot,
+        choose_comparator=comparator,
         kinds=kinds,
-        settings=_settings(used[0].settings, population, generations),
-        seed=seed,
-        calibrate=calibrate,
-        threads=threads,
+        settings=_settings(explained[0].settings, options),
+        seed=options.seed,
+        calibrate=options.calibrate,
+        threads=options.threads,
     )
-    print_notes(*(f"note: {note}" for note in _notes(used)))
+    print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
-        on_event(found.comparator)
-        if found.calibration is not None:
-            on_event(found.calibration)
-        diagnosis = diagnose_trials(found.damaged, found.search, found.seed, on_event)
-    return DiagnosedLogs(tuple(used), model, found, diagnosis)
+        on_event(inputs.comparator)
+        if inputs.calibration is not None:
+            on_event(inputs.calibration)
+        diagnosis = diagnose_trials(inputs.damaged, inputs.search, inputs.seed, on_event)
+    return DiagnosedLogs(tuple(explained), robot, inputs, diagnosis)
 
 
-def _settings(logged: Settings, population: int | None, generations: int | None) -> Settings:
+def _settings(logged: Settings, options: FromLogs) -> Settings:
     """Returns the settings of a log with the options that were given."""
-    if generations is not None:
-        logged = dataclasses.replace(logged, generations=generations)
-    return logged if population is None else logged.scaled(population)
+    if options.generations is not None:
+        logged = dataclasses.replace(logged, generations=options.generations)
+    return logged if options.population is None else logged.scaled(options.population)
 
 
 def _is_played_back(log: TrialLog) -> bool:
     return isinstance(log.trial.plan.controller, Playback)
 
 
-def _notes(logs: list[TrialLog]) -> list[str]:
+def _notes(logs: Sequence[TrialLog]) -> list[str]:
     """Returns the notes on limits of the logs that affect the ranking."""
     first = logs[0]
     notes = [

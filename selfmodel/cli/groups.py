@@ -1,7 +1,8 @@
 """Command groups that import a command as it runs, and its help page, so that help is fast."""
 
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -28,12 +29,23 @@ class Interrupted(Exception):  # noqa: N818  # no error: the user ended the comm
 class InterruptibleGroup(TyperGroup):
     """Command group whose commands end with ``Interrupted``."""
 
+    def make_context(self, *args: Any, **extra: Any) -> Any:  # noqa: ANN401  # as typer declares it
+        """Parses the arguments before the command."""
+        with _interruptible():
+            return super().make_context(*args, **extra)
+
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401  # as typer declares it
         """Runs a command."""
-        try:
+        with _interruptible():
             return super().invoke(ctx)
-        except KeyboardInterrupt as interruption:
-            raise Interrupted(interruption) from interruption
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt as interruption:
+        raise Interrupted(interruption) from interruption
 
 
 class LazyCommand(TyperCommand):

@@ -1,10 +1,14 @@
 """Option values as objects: cases, stages, lists, shares of a study, names of files."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.logs.files import refuse_existing
 from selfmodel.trials.trial import STAGES, Stage, stage_of
+
+Number = TypeVar("Number", int, float)
 
 
 def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None) -> str:
@@ -64,36 +68,25 @@ def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[
 
 
 def whole_numbers(option: str, given: str, every: Iterable[int]) -> tuple[int, ...]:
-    """Returns the distinct whole numbers of a list with commas; see ``texts``.
-
-    Raises:
-        InputError: An item is not a whole number.
-    """
-    try:
-        found = [int(text) for text in texts(option, given, map(str, every))]
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"{option} needs whole numbers with commas between them, or 'all', got {given!r}"
-        ) from None
-    return tuple(dict.fromkeys(found))
+    """Returns the distinct whole numbers of a list with commas, or all; see ``texts``."""
+    expected = "whole numbers with commas between them, or 'all'"
+    return _numbers(option, given, texts(option, given, map(str, every)), int, expected)
 
 
 def numbers(option: str, given: str) -> tuple[float, ...]:
-    """Returns the distinct numbers of a list with commas; see ``texts``.
+    """Returns the distinct numbers of a list with commas; see ``texts``."""
+    expected = "numbers with commas between them, such as 0,0.05"
+    found = _numbers(option, given, texts(option, given), float, expected)
+    return tuple(number + 0.0 for number in found)  # -0 is 0
 
-    Raises:
-        InputError: An item is not a number.
-    """
+
+def _numbers(
+    option: str, given: str, items: Iterable[str], kind: Callable[[str], Number], expected: str
+) -> tuple[Number, ...]:
     try:
-        return tuple(dict.fromkeys(float(text) + 0.0 for text in texts(option, given)))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"{option} needs numbers with commas between them, such as 0,0.05, got {given!r}"
-        ) from None
+        return tuple(dict.fromkeys(map(kind, items)))
+    except ValueError:
+        raise InputError(f"{option} needs {expected}, got {given!r}") from None
 
 
 def share(option: str, given: str) -> tuple[int, int]:
@@ -102,33 +95,14 @@ def share(option: str, given: str) -> tuple[int, int]:
     Raises:
         InputError: The text has another form, or i is not between 1 and n.
     """
-    first, slash, count = given.partition("/")
-    short = len(given) <= 20
-    if not (
-        slash
-        and short
-        and first.isdecimal()
-        and count.isdecimal()
-        and 1 <= int(first) <= int(count)
-    ):
+    first, _, count = given.partition("/")
+    is_pair = first.isdecimal() and count.isdecimal() and len(given) <= 20
+    if not (is_pair and 1 <= int(first) <= int(count)):
         raise InputError(
             f"{option} needs i/n, the i-th of every n runs with i from 1 to n, such as 2/8, "
             f"got {given!r}"
         )
     return int(first), int(count)
-
-
-def assignments(option: str, given: str) -> dict[str, str]:
-    """Returns the names and values of a list ``A=B,C=D``; none of an empty text.
-
-    Raises:
-        InputError: An item has no ``=``, or a name is given twice.
-    """
-    items = [text.partition("=") for text in texts(option, given)] if given.strip() else []
-    found = {name.strip(): value.strip() for name, equals, value in items if equals}
-    if len(found) < len(items):
-        raise InputError(f"{option} needs distinct names with values, A=B,C=D, got {given!r}")
-    return found
 
 
 def check_folder(path: Path) -> None:
@@ -139,6 +113,19 @@ def check_folder(path: Path) -> None:
     """
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+
+
+def check_new_file(path: Path, *endings: str) -> None:
+    """Checks the name of a file to be written.
+
+    Raises:
+        InputError: The name has none of these endings, its folder is missing, or it exists.
+    """
+    if path.suffix.lower() not in endings:
+        expected = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+        raise InputError(f"--out needs a name that ends in {expected}, got {str(path)!r}")
+    check_folder(path)
+    refuse_existing(path)
 
 
 def check_log_name(path: Path) -> None:

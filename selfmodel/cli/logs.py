@@ -10,9 +10,8 @@ import typer
 
 from selfmodel.cli.commands import LogInfo, SalvageLog, Verify
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.cli.output.tables import show
+from selfmodel.cli.output import counted, print_json, print_lines
+from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs import LogError, TrialLog
 from selfmodel.logs.inspection import Info, read_info, verify as check

@@ -7,9 +7,8 @@ from selfmodel import arguments
 from selfmodel.arguments import is_model
 from selfmodel.cli.commands import ExportTable, ImportRecording
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.cli.output.tables import show
+from selfmodel.cli.output import counted, print_json, print_lines
+from selfmodel.cli.tables import show
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.logs.files import refuse_existing

@@ -1,54 +1,95 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
+import dataclasses
+import math
 from datetime import datetime
 from functools import partial
 from os.path import relpath
 from pathlib import Path
+from typing import Any
 
 from selfmodel import arguments, plugins
-from selfmodel.arguments import comparator_choice, repertoire_of
 from selfmodel.cli import inputs
-from selfmodel.cli.commands import Recover
-from selfmodel.cli.output.display import displacement_text, display
-from selfmodel.cli.output.printing import print_json, print_notes
-from selfmodel.cli.output.report import print_report, recovery_result
+from selfmodel.cli.commands import Recover, settings_of
+from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.progress import displacement_text, display
+from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
+from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
+from selfmodel.diagnosis.text import right_or_wrong, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.result_files import result_bytes
-from selfmodel.logs.results import RESULT, as_json as values_of, write_searches
+from selfmodel.logs.results import (
+    RESULT,
+    RecoveryResult,
+    ScoreResult,
+    TrialResult,
+    as_json as values_of,
+    write_searches,
+)
+from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
 from selfmodel.report.progress import Progress
 from selfmodel.report.subject import subject_of_run
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies.experiment import Experiment, choose_score, run
+from selfmodel.studies.experiment import Experiment, Outcome, choose_score, run
 from selfmodel.trials.trial import Trial
 
 
 def recover(options: Recover) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
+    experiment = experiment_of(options)
+    describe = partial(_described, experiment.robot, experiment.score)
+    with display(describe) as on_event:
+        progress = Progress(
+            experiment.folder,
+            experiment.robot,
+            on_event,
+            experiment.threads,
+            reports=options.report,
+        )
+        with progress.kept_on_failure():
+            outcome = run(experiment, progress)
+    result = recovery_result(experiment, outcome)
+    try:
+        write_searches(experiment.folder, progress.searches)
+        logs = [Path(trial.path) for trial in outcome.recovery.trials]
+        digests = {relpath(one, experiment.folder): file_digest(one) for one in logs}
+        content = result.as_file(experiment.settings, digests)
+        replace_file(experiment.folder / RESULT, result_bytes(content))
+    finally:  # the result is printed even if the disk is full
+        if options.as_json:
+            print_json(values_of(result))
+        else:
+            _print(values_of(result), outcome.recovery.diagnosis, experiment.folder)
+    if options.report:
+        subject = subject_of_run(
+            experiment.folder, experiment.threads, options.comparator, experiment.kinds
+        )
+        replace_file(experiment.folder / REPORT, html_of(report_of(subject)))
+        print_notes(f"report: {experiment.folder / REPORT}")
+
+
+def experiment_of(options: Recover) -> Experiment:
+    """Returns the experiment of the options; refuses what is wrong before any work."""
     entry = arguments.robot_entry(options.robot, options.model_settings or ())
-    considered = plugins.kinds(options.kinds)
-    damaged = inputs.case_notation(entry.cases, options.case, options.damage)
-    made = entry.robot()
-    design = plugins.design(options.controller, made, options.neurons)
-    truth = HypothesisSpace(made.anatomy, considered).parse(damaged)
+    kinds = plugins.kinds(options.kinds)
+    damage = inputs.case_notation(entry.cases, options.case, options.damage)
+    robot = entry.robot()
+    design = plugins.design(options.controller, robot, options.neurons)
+    truth = HypothesisSpace(robot.anatomy, kinds).parse(damage)
     check_silent_neurons(design, silent_neurons(truth))
-    gaits = repertoire_of(options.repertoire, made, design)
-    plugins.repair(
-        options.repair, options.search, gaits
-    )  # an unknown name is refused before any work
-    settings = Settings(
-        steps=options.steps, trials=options.trials, generations=options.generations
-    ).scaled(options.population)
-    chosen = choose_score(
+    gaits = arguments.repertoire_of(options.repertoire, robot, design)
+    plugins.repair(options.repair, options.search, gaits)
+    score = choose_score(
         options.score or plugins.DEFAULT_SCORES[options.repair],
         entry,
         design,
@@ -59,58 +100,33 @@ def recover(options: Recover) -> None:
         max_torque=options.max_joint_torque,
         max_self_collision=options.max_self_collision,
     )
-    if chosen.gait is not None:
+    if score.gait is not None:
         print_notes(
             f"note: no --reference is given, so the robot is to repeat the motion of its first "
-            f"controller, a {design.name} with random weights: the {chosen.score.name} before the "
+            f"controller, a {design.name} with random weights: the {score.score.name} before the "
             f"failure is 0, except for a reality gap"
         )
-    experiment = Experiment(
-        robot=made,
+    return Experiment(
+        robot=robot,
         case=options.case,
         truth=truth,
-        choose_comparator=comparator_choice(options.comparator),
-        kinds=considered,
+        choose_comparator=arguments.comparator_choice(options.comparator),
+        kinds=kinds,
         calibrated=options.calibrate,
-        settings=settings,
+        settings=settings_of(options, options.steps),
         seed=options.seed,
         threads=thread_count(options.threads),
-        folder=options.out or _new_folder(made.name),
+        folder=options.out or _new_folder(robot.name),
         gap=options.gap,
         next_trial=plugins.next_trial(options.next_trial),
         design=design,
-        gait=chosen.gait,
-        score=chosen.score,
+        gait=score.gait,
+        score=score.score,
         physical=entry.physical,
         repair=options.repair,
         search=options.search,
         repertoire=gaits,
     )
-    with display(partial(_described, made, chosen.score)) as on_event:
-        progress = Progress(
-            experiment.folder, made, on_event, experiment.threads, reports=options.report
-        )
-        with progress.kept_on_failure():
-            outcome = run(experiment, progress)
-    result = recovery_result(experiment, outcome)
-    try:
-        write_searches(experiment.folder, progress.searches)
-        logs = [Path(trial.path) for trial in outcome.recovery.trials]
-        content = result.as_file(
-            settings, {relpath(one, experiment.folder): file_digest(one) for one in logs}
-        )
-        replace_file(experiment.folder / RESULT, result_bytes(content))
-    finally:  # the result is printed even if the disk is full
-        if options.as_json:
-            print_json(values_of(result))
-        else:
-            print_report(values_of(result), outcome.recovery.diagnosis, experiment.folder)
-    if options.report:
-        subject = subject_of_run(
-            experiment.folder, experiment.threads, options.comparator, considered
-        )
-        replace_file(experiment.folder / REPORT, html_of(report_of(subject)))
-        print_notes(f"report: {experiment.folder / REPORT}")
 
 
 def _described(robot: Robot, score: Score, trial: Trial) -> str:
@@ -124,3 +140,107 @@ def _described(robot: Robot, score: Score, trial: Trial) -> str:
 def _new_folder(robot: str) -> Path:
     """Returns an unused folder in ``runs/``; its name does not contain the hidden failure."""
     return Path("runs") / f"{robot}-{datetime.now().astimezone():%Y%m%d-%H%M%S-%f}"
+
+
+def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
+    """Returns the outcome of a recovery as ``recover --json`` prints it."""
+    recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
+    design = experiment.design or network_for(experiment.robot)
+    columns = (recovery.trials, recovery.tried, recovery.scores, recovery.predicted, recovery.falls)
+    return RecoveryResult(
+        robot=experiment.robot.name,
+        model=self_model_digest(experiment.robot),
+        case=experiment.case,
+        truth=str(experiment.truth),
+        comparator=recovery.comparator.comparator.name,
+        comparator_reason=recovery.comparator.reason,
+        kinds=tuple(kind.name for kind in experiment.kinds),
+        gap=experiment.gap,
+        next_trial=experiment.next_trial,
+        repair=experiment.repair,
+        search=plugins.search_name(experiment.repair, experiment.search, gaits),
+        repertoire=dataclasses.asdict(gaits.origin) if gaits else None,
+        controller=design.name,
+        neurons=design.hidden,
+        seed=experiment.seed,
+        trials=tuple(
+            TrialResult(
+                log=trial.path,
+                stage=trial.plan.stage,
+                displacement=trial.displacement,
+                steps=trial.behaviour.steps,
+                ended_early=trial.early_end != "",
+                score=score,
+                predicted_score=predicted if math.isfinite(predicted) else None,
+                fell_at_step=fall,
+                hypothesis=str(tried),
+            )
+            for trial, tried, score, predicted, fall in zip(*columns, strict=True)
+        ),
+        **output_of(recovery.diagnosis),
+        calibration=recovery.calibration.to_dict() if recovery.calibration else None,
+        correct=outcome.correct,
+        displacement={name: getattr(recovery, name) for name in ("before", "after", "recovered")},
+        score=ScoreResult(
+            name=recovery.score.name,
+            unit=recovery.score.unit,
+            before=recovery.scores[0],
+            after=recovery.scores[1],
+            recovered=recovery.best_score,
+        ),
+        fell=recovery.fell,
+        recovery=recovery.recovered / recovery.before if recovery.before > 0 else None,
+        physical_trials=len(recovery.trials) - 2,
+        evaluations={
+            "repair": recovery.repair_evaluations,
+            "diagnostic": recovery.diagnostic_evaluations,
+            "distinct_hypotheses": recovery.distinct_hypotheses,
+            "simulated_steps": stats.steps,
+            "diverged": stats.diverged,
+        },
+        seconds=outcome.seconds,
+    )
+
+
+def _print(found: dict[str, Any], diagnosis: Diagnosis, folder: Path) -> None:
+    """Prints the trials, the diagnosis, and the true hypothesis.
+
+    Args:
+        found: The result as JSON values.
+        diagnosis: The last diagnosis.
+        folder: Folder of the recovery.
+    """
+    score, evaluations = found["score"], found["evaluations"]
+    column, key = f"{score['name']}, {score['unit']}".removesuffix(", "), "score"
+    whens = ("before", "after", "recovered")
+    results = [f"{score[when]:.4f} {score['unit']}".rstrip() for when in whens]
+    subject = f"The score {score['name']} was"
+    if score["name"] == DISPLACEMENT.name:
+        column, key = "forward, m", "displacement"
+        results = [f"{value:.2f} m" for value in found["displacement"].values()]
+        subject = "The robot went"
+    before, after, recovered = results
+    rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in found["trials"]]
+    trials = folding(
+        ("trial", "best hypothesis so far", column), rows, title="physical trials", texts=2
+    )
+    print_tables(trials, ranking_table(found["diagnosis"], found["truth"]))
+    gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
+    print_lines(
+        f"truth: {found['truth']}{gap}; the diagnosis is "
+        f"{right_or_wrong(str(diagnosis.best), found['truth'], correct=found['correct'])}.",
+        verdict_sentences(diagnosis),
+        f"{subject} {before} before, {after} after the failure, and {recovered} at best in "
+        f"{counted(found['physical_trials'], 'trial')} since.",
+        *(["The robot fell in that trial, which is no recovery."] if found["fell"] else []),
+        f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
+        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.",
+        f"Logs: {folder}",
+    )
+
+
+def _result(trial: dict[str, Any], key: str) -> str:
+    """Returns the result of a trial, with its early end or its fall."""
+    fall = trial["fell_at_step"]
+    end = f", ended at step {trial['steps']}" if trial["ended_early"] else ""
+    return f"{trial[key]:.3f}" + ("" if fall is None else f", fell at step {fall}") + end

@@ -19,17 +19,16 @@ from PIL import Image
 from rich.progress import track
 
 from selfmodel.cli.commands import Render
-from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.output.console import text_console
-from selfmodel.cli.output.plain import counted, plain
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
+from selfmodel.cli.inputs import check_new_file
+from selfmodel.cli.output import counted, plain, print_json, print_lines, print_notes
+from selfmodel.cli.tables import text_console
 from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.files import refuse_existing, replace_file
+from selfmodel.logs.files import replace_file
 from selfmodel.logs.results import best_hypothesis
 
 if TYPE_CHECKING:
     from selfmodel.cli.film import Film
-    from selfmodel.cli.replayed_log import ReplayedLog
+    from selfmodel.cli.replay import ReplayedLog
 
 STRIPS = (".png", ".svg", ".pdf")
 """File extensions of a strip of pictures."""
@@ -66,12 +65,13 @@ Frames = Iterator[NDArray[np.uint8]]
 
 def render(options: Render) -> None:
     """Draw a logged trial beside a simulation of the same controller."""
-    out = options.out
     if not options.file.name:
         raise InputError(f"expected a trial log, NAME.mcap, got the folder {options.file}")
-    out = options.file.with_suffix(".gif") if out is None else out
+    out = options.out or options.file.with_suffix(".gif")
     kind = out.suffix.lower()
-    _check_name(out, kind, stick=options.stick)
+    check_new_file(out, *FILMS, *STRIPS)
+    if options.stick and kind in STRIPS:
+        raise InputError(f"--stick is for films: a strip such as {out.name} has stick figures")
     if options.hypothesis and options.diagnosis is not None:
         raise InputError("expected --hypothesis or --diagnosis, got both: leave one out")
     if kind == ".mp4":
@@ -81,15 +81,13 @@ def render(options: Render) -> None:
         os.environ[GL] = "disable"
     # MuJoCo reads MUJOCO_GL as it is imported, so the library is chosen before.
     from selfmodel.cli.film import filmed  # noqa: PLC0415
-    from selfmodel.cli.replayed_log import replayed_log  # noqa: PLC0415
+    from selfmodel.cli.replay import replayed_log  # noqa: PLC0415
 
-    notation = (
-        (options.hypothesis or "intact")
-        if options.diagnosis is None
-        else best_hypothesis(options.diagnosis)
-    )
-    given = replayed_log(options.file, notation, kinds=options.kinds, model=options.self_model)
-    film, facts = _film(given, options.pictures if kind in STRIPS else None, options.threads)
+    notation = options.hypothesis or "intact"
+    if options.diagnosis is not None:
+        notation = best_hypothesis(options.diagnosis)
+    given = replayed_log(options, notation)
+    film, facts = _film(given, options.pictures if kind in STRIPS else None)
     print_notes(*(f"note: {note}" for note in facts["notes"]))
     if library is None:
         from selfmodel.cli.sticks import stick_frames, strip  # noqa: PLC0415  # matplotlib
@@ -104,14 +102,10 @@ def render(options: Render) -> None:
     replace_file(out, data)
     drawn_by = "matplotlib" if library is None else "mujoco"
     if options.as_json:
-        told = {
-            "log": str(options.file),
-            "robot": given.robot.name,
-            "model": options.self_model,
-            **facts,
-        }
-        told |= {"out": str(out), "frames": len(film.time), "bytes": len(data)}
-        print_json(told | {"drawn_by": drawn_by, "gl": library})
+        facts |= {"out": str(out), "frames": len(film.time), "bytes": len(data)}
+        facts |= {"drawn_by": drawn_by, "gl": library}
+        logged = {"log": str(options.file), "robot": given.robot.name, "model": options.self_model}
+        print_json(logged | facts)
         return
     print_lines(
         f"{out}: {counted(len(film.time), 'picture')} of {given.robot.name}, as logged and as "
@@ -119,26 +113,12 @@ def render(options: Render) -> None:
     )
 
 
-def _check_name(out: Path, kind: str, *, stick: bool) -> None:
-    if kind not in (*FILMS, *STRIPS):
-        raise InputError(
-            f"--out needs a name that ends in {', '.join((*FILMS, *STRIPS))}, got {str(out)!r}"
-        )
-    check_folder(out)
-    if stick and kind in STRIPS:
-        raise InputError(f"--stick is for films: a strip such as {out.name} has stick figures")
-    refuse_existing(out)
-
-
-def _film(
-    given: "ReplayedLog", pictures: int | None, threads: int
-) -> tuple["Film", dict[str, Any]]:
+def _film(given: "ReplayedLog", pictures: int | None) -> tuple["Film", dict[str, Any]]:
     """Returns the film of a trial and its simulation, and facts about it as JSON values.
 
     Args:
         given: The log, and what to simulate.
         pictures: Pictures of a strip; None for a film.
-        threads: Threads of the physics; 0 for one per processor.
     """
     from selfmodel.cli.film import evenly, film_of  # noqa: PLC0415  # as above
 
@@ -148,12 +128,12 @@ def _film(
             f"{trial.path}: the trial takes {time[-1]:g} s, and a film takes at most "
             f"{MAX_FRAMES / RATE:g} s: write a strip of pictures, such as trial.png"
         )
-    found = given.replayed(threads)
-    whole = np.arange(int(float(time[-1]) * RATE) + 1) / RATE
+    found = given.drawable()
     motions = [
         (plain(f"logged: {trial.plan.name}"), trial.behaviour),
         (plain(f"model: {given.hypothesis}"), found.simulated),
     ]
+    whole = np.arange(int(float(time[-1]) * RATE) + 1) / RATE
     moments = whole if pictures is None else evenly(time, pictures)
     film = film_of(given.robot, given.hypothesis, motions, moments)
     held = int(film.shots[0].held.sum())
@@ -178,9 +158,8 @@ def _film(
 def _shown(frames: Frames, total: int) -> Frames:
     """Yields the frames; shows a progress bar on a terminal."""
     console = text_console(stderr=True)
-    yield from track(
-        frames, "drawing", total, console=console, disable=not console.is_terminal, transient=True
-    )
+    hidden = not console.is_terminal
+    yield from track(frames, "drawing", total, console=console, disable=hidden, transient=True)
 
 
 def choose_gl() -> str:
@@ -230,15 +209,8 @@ def draws(library: str) -> bool:
 def gif(frames: Frames) -> bytes:
     """Returns a GIF that repeats for ever."""
     pictures = (_indexed(frame) for frame in frames)
-    file = BytesIO()
-    next(pictures).save(
-        file,
-        format="GIF",
-        save_all=True,
-        append_images=pictures,
-        duration=1000 // RATE,
-        loop=0,
-    )
+    file, first, more = BytesIO(), next(pictures), {"duration": 1000 // RATE, "loop": 0}
+    first.save(file, format="GIF", save_all=True, append_images=pictures, **more)
     return file.getvalue()
 
 

@@ -1,6 +1,7 @@
 """``selfmodel repertoire``: files with many diverse gaits of one robot."""
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,9 @@ import numpy as np
 
 from selfmodel import arguments, plugins
 from selfmodel.cli.commands import MakeRepertoire, RepertoireInfo
-from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.errors import InputError
+from selfmodel.cli.inputs import check_new_file
+from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
 from selfmodel.recovery.repertoire import (
     Filling,
@@ -28,71 +27,66 @@ NOTES = 10
 
 def make(options: MakeRepertoire) -> None:
     """Search for gaits with diverse duty factors of the feet, and keep the best of each cell."""
-    if options.out.suffix.lower() != ".npz":
-        raise InputError(f"--out needs a name that ends in .npz, got {str(options.out)!r}")
-    check_folder(options.out)
-    refuse_existing(options.out)
-    made = arguments.robot_entry(options.robot, options.model_settings or ()).robot()
-    simulator = Simulator(made, options.threads)
+    check_new_file(options.out, ".npz")
+    robot = arguments.robot_entry(options.robot, options.model_settings or ()).robot()
+    simulator = Simulator(robot, options.threads)
     repertoire = make_repertoire(
-        made,
-        plugins.design(options.controller, made, options.neurons),
+        robot,
+        plugins.design(options.controller, robot, options.neurons),
         simulated_evaluation(simulator, INTACT, options.steps),
         steps=options.steps,
         seed=options.seed,
         evaluations=options.evaluations,
         levels=options.levels,
-        on_filling=_Notes(),
+        on_filling=_notes(),
     )
     save_repertoire(options.out, repertoire)
-    facts = {**facts_of(options.out, repertoire), "simulated_steps": simulator.stats.steps}
-    if options.as_json:
-        print_json(facts)
-    else:
-        print_facts(facts)
+    _print(
+        {**_facts(options.out, repertoire), "simulated_steps": simulator.stats.steps},
+        as_json=options.as_json,
+    )
 
 
-class _Notes:
-    """Prints a line of progress after each part of the evaluations."""
+def _notes() -> Callable[[Filling], None]:
+    """Returns a function that prints a line of progress after each part of the evaluations."""
+    printed = 0
 
-    def __init__(self) -> None:
-        self._printed = 0
-
-    def __call__(self, filling: Filling) -> None:
+    def note(filling: Filling) -> None:
+        nonlocal printed
         part = filling.evaluations * NOTES // filling.total
-        if part > self._printed:
-            self._printed = part
+        if part > printed:
+            printed = part
             print_notes(
                 f"{filling.evaluations} of {filling.total} gaits evaluated, {filling.gaits} kept, "
                 f"best {filling.best:.2f} m, {filling.seconds:.0f} s"
             )
 
+    return note
+
 
 def info(options: RepertoireInfo) -> None:
     """Verify a repertoire file, and show its robot, its gaits and how it was made."""
-    facts = facts_of(options.file, load_repertoire(options.file))
-    if options.as_json:
-        print_json(facts)
-    else:
-        print_facts(facts)
+    _print(_facts(options.file, load_repertoire(options.file)), as_json=options.as_json)
 
 
-def facts_of(path: Path, repertoire: Repertoire) -> dict[str, Any]:
-    """Returns the facts of a repertoire as JSON."""
+def _facts(path: Path, repertoire: Repertoire) -> dict[str, Any]:
+    feet = repertoire.descriptors.shape[1]
     return {
         "repertoire": str(path),
         **dataclasses.asdict(repertoire.origin),
         "controller": repertoire.design.name,
         "gaits": len(repertoire),
-        "feet": repertoire.descriptors.shape[1],
-        "cells": repertoire.origin.levels ** repertoire.descriptors.shape[1],
+        "feet": feet,
+        "cells": repertoire.origin.levels**feet,
         "best": float(repertoire.scores[0]),
         "median": float(np.median(repertoire.scores)),
     }
 
 
-def print_facts(facts: dict[str, Any]) -> None:
-    """Prints the facts of a repertoire."""
+def _print(facts: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(facts)
+        return
     print_lines(
         f"{facts['repertoire']}: {facts['gaits']} gaits of {facts['robot']}, one per cell of duty "
         f"factors ({facts['feet']} feet, {facts['levels']} levels each)",

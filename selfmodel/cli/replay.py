@@ -1,21 +1,29 @@
 """``selfmodel replay``: a logged trial simulated again, and compared with its log."""
 
+import io
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
+import numpy as np
 
-from selfmodel.cli.commands import ReplayTrial
-from selfmodel.cli.output.plain import counted
-from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.cli.output.replay_figure import check_figure, draw
-from selfmodel.cli.output.tables import show
-from selfmodel.cli.replayed_log import replayed_log
+from selfmodel import arguments, plugins
+from selfmodel.cli.commands import ReplayTrial, Simulated
+from selfmodel.cli.inputs import check_new_file
+from selfmodel.cli.output import counted, figure_text, print_json, print_lines
+from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
+from selfmodel.logs.files import replace_file
+from selfmodel.robot.motion import POSE
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay, replay as simulate
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trial import check_magnitudes
 
 TOLERANCE = 1e-6
 """Largest difference that counts as equal between versions of MuJoCo or after an import, SI
@@ -32,40 +40,90 @@ COLUMNS: tuple[tuple[Signal, str], ...] = (
     ("sensors", "sensors"),
 )
 
+LINES: tuple[tuple[Signal, str], ...] = (
+    ("base_position", "base position, m"),
+    ("joint_positions", "joint angles, rad"),
+    ("commands", "commands"),
+    ("sensors", "sensor readings"),
+)
+"""Signals in the figure, and their titles."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedLog:
+    """A log, and what its trial is simulated with.
+
+    Attributes:
+        log: The log.
+        robot: The self-model.
+        hypothesis: The hypothesis to simulate.
+        threads: Threads of the physics; 0 for one per processor.
+    """
+
+    log: TrialLog
+    robot: Robot
+    hypothesis: Hypothesis
+    threads: int
+
+    def simulated(self, tolerance: float = 0.0) -> Replay:
+        """Returns the simulation of the trial under the hypothesis, compared with the log."""
+        simulator = Simulator(self.robot, thread_count(self.threads))
+        return simulate(self.log.trial, self.hypothesis, simulator, tolerance)
+
+    def drawable(self) -> Replay:
+        """Returns the simulation; see ``simulated``.
+
+        Raises:
+            InputError: A pose in the log is too large to draw.
+        """
+        check_magnitudes(self.log.trial, POSE)
+        return self.simulated()
+
+
+def replayed_log(options: Simulated, hypothesis: str) -> ReplayedLog:
+    """Returns a log, and what its trial is simulated with.
+
+    Raises:
+        InputError: The log, the hypothesis or the model cannot be used.
+    """
+    (log,) = arguments.read_logs([options.file])
+    robot = arguments.robot_of_logs([log], options.self_model)
+    assumed = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds)).parse(hypothesis)
+    return ReplayedLog(log, robot, assumed, options.threads)
+
 
 def replay(options: ReplayTrial) -> None:
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
     if options.out is not None:
-        check_figure(options.out)
-    given = replayed_log(
-        options.file, options.hypothesis, kinds=options.kinds, model=options.self_model
-    )
-    log, robot, assumed = given.log, given.robot, given.hypothesis
+        check_new_file(options.out, ".png", ".svg", ".pdf")
+    given = replayed_log(options, options.hypothesis)
+    log = given.log
     logged = log.software.get("mujoco", "unknown")
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
-    simulator = Simulator(robot, thread_count(options.threads))
-    found = simulate(log.trial, assumed, simulator, tolerance)
+    found = given.simulated(tolerance)
     if not found.observed:
         raise InputError(
             f"{options.file}: nothing was observed: every number of the log is NaN, so there "
             f"is nothing to compare a simulation with: give a log with observations"
         )
+    errors = {signal: found.rms(signal) for signal in SIGNALS}
     result = {
         "log": str(options.file),
-        "robot": robot.name,
+        "robot": given.robot.name,
         "model": options.self_model,
-        "hypothesis": str(assumed),
+        "hypothesis": str(given.hypothesis),
         "steps": log.trial.behaviour.steps,
         "identical": found.identical,
         "first_divergence_step": found.first_divergence_step,
-        "rms": {signal: _finite(found.rms(signal)) for signal in SIGNALS},
+        "rms": {key: one if math.isfinite(one) else None for key, one in errors.items()},
         "tolerance": tolerance,
         "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
     if options.out is not None:
-        draw(options.out, log, found, str(assumed))
+        kind = options.out.suffix.lower().removeprefix(".")
+        replace_file(options.out, figure(log, found, str(given.hypothesis), kind))
         result["figure"] = str(options.out)
     if options.as_json:
         print_json(result)
@@ -73,25 +131,17 @@ def replay(options: ReplayTrial) -> None:
         _print(result, log, found)
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
     print_lines(
         f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}, replayed as "
         f"{result['hypothesis']}"
     )
-    versions = result["mujoco"]
-    if versions["logged"] != versions["running"]:
-        print_lines(
-            f"The log was made with MuJoCo {versions['logged']}, this is "
-            f"{versions['running']}: differences below {TOLERANCE:g} count as equal."
-        )
+    logged, running = result["mujoco"].values()
+    equal = f"differences below {TOLERANCE:g} count as equal."
+    if logged != running:
+        print_lines(f"The log was made with MuJoCo {logged}, this is {running}: {equal}")
     if log.imported:
-        print_lines(
-            f"The log was imported, and resampled: differences below {TOLERANCE:g} count as equal."
-        )
+        print_lines(f"The log was imported, and resampled: {equal}")
     if found.diverged:
         print_lines("The simulation diverged: with this hypothesis the model is unstable.")
     if found.identical:
@@ -108,13 +158,48 @@ def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
 
 def _rows(log: TrialLog, found: Replay) -> list[tuple[str, ...]]:
     """Returns the error of each signal in each window of the trial."""
-    steps = log.trial.behaviour.steps
+    steps, timestep = log.trial.behaviour.steps, log.control_timestep
     windows = min(WINDOWS, steps)
     rows = []
     for k in range(windows):
         first, last = steps * k // windows, steps * (k + 1) // windows
         errors = [found.rms(signal, slice(first, last)) for signal, _ in COLUMNS]
-        start, end = first * log.control_timestep, (last - 1) * log.control_timestep
         texts = ("-" if math.isnan(error) else f"{error:.3g}" for error in errors)
-        rows.append((f"{start:.2f}-{end:.2f}", *texts))
+        rows.append((f"{first * timestep:.2f}-{(last - 1) * timestep:.2f}", *texts))
     return rows
+
+
+def figure(log: TrialLog, found: Replay, hypothesis: str, kind: str) -> bytes:
+    """Returns a figure of the path of the base, logged and simulated, and of the errors.
+
+    Args:
+        log: The logged trial.
+        found: Its replay.
+        hypothesis: Notation of the simulated hypothesis.
+        kind: File format, such as ``png``.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415  # most replays draw nothing
+
+    logged, simulated = log.trial.behaviour, found.simulated
+    drawn = Figure(figsize=(8, 6), layout="constrained")
+    path, error = drawn.subplots(2, 1, sharex=True)
+    path.plot(logged.time, logged["base_position"][:, 0], label="logged")
+    label = figure_text(f"simulated: {hypothesis}")
+    path.plot(logged.time, simulated["base_position"][:, 0], "--", label=label)
+    path.set_ylabel("base, forward, m")
+    for signal, title in LINES:
+        # Identical steps have an error of 0, which a logarithmic axis cannot show.
+        shown = np.where(found.errors[signal] > 0, found.errors[signal], np.nan)
+        error.plot(logged.time, shown, label=title)
+    error.set(yscale="log", ylabel="difference, root mean square", xlabel="time, s")
+    step, end = found.first_divergence_step, "equal at every step"
+    if step is not None:
+        end = f"they differ from step {step}"
+        for axes in (path, error):
+            axes.axvline(logged.time[step], color="0.6", linewidth=1)
+    path.legend()
+    error.legend()
+    path.set_title(f"{figure_text(f'{log.trial.robot}, {log.trial.plan.name}')}: {end}")
+    data = io.BytesIO()
+    drawn.savefig(data, format=kind, dpi=150)
+    return data.getvalue()

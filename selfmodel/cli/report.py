@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from selfmodel import plugins
-from selfmodel.arguments import comparator_choice
 from selfmodel.cli.commands import MakeReport
 from selfmodel.cli.diagnose import diagnose_logs
-from selfmodel.cli.inputs import check_folder
-from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.cli.inputs import check_new_file
+from selfmodel.cli.output import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
-from selfmodel.logs.files import refuse_existing, write_new
+from selfmodel.logs.files import write_new
 from selfmodel.report.campaign import is_campaign, report_of_campaign
 from selfmodel.report.charts import REPORT, Report, html_of
 from selfmodel.report.content import report_of
@@ -22,7 +21,6 @@ from selfmodel.trials.trial import trial_names
 
 def report(options: MakeReport) -> None:
     """Write a report of a run, of logs or of a campaign: one HTML file, which needs no network."""
-    out = options.out
     folder = options.sources[0] if options.sources[0].is_dir() else None
     if folder is not None and len(options.sources) > 1:
         raise InputError(
@@ -33,61 +31,25 @@ def report(options: MakeReport) -> None:
             f"--diagnosis is for logs, and {folder} is a folder, which has its diagnosis: leave "
             f"--diagnosis out, or give the logs"
         )
-    out = (folder / REPORT if folder else Path(REPORT)) if out is None else out
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out needs a name that ends in .html, got {str(out)!r}")
-    check_folder(out)
-    refuse_existing(out)
-    searched = plugins.kinds(options.kinds)
-    if folder is not None:
-        made = _of_folder(folder, options.threads, options.comparator, searched)
-    elif options.diagnosis is not None:
-        subject = subject_of_logs(
-            options.sources,
-            options.diagnosis,
-            robot=options.self_model,
-            threads=options.threads,
-            comparator=options.comparator,
-            kinds=searched,
-        )
-        made = report_of(subject)
-    else:
-        found = diagnose_logs(
-            options.sources,
-            robot=options.self_model,
-            choose_comparator=comparator_choice(options.comparator),
-            kinds=searched,
-            calibrate=options.calibrate,
-            population=options.population,
-            generations=options.generations,
-            seed=options.seed,
-            threads=options.threads,
-        )
-        made = report_of(
-            Subject(
-                name=", ".join(trial_names(found.inputs.damaged).values()),
-                robot=found.robot,
-                healthy=found.inputs.healthy,
-                damaged=found.inputs.damaged,
-                diagnoses=(found.diagnosis,),
-                comparator=found.inputs.comparator.comparator,
-                calibration=found.inputs.calibration,
-                made_with=found.explained[0].software,
-                threads=thread_count(options.threads),
-            )
-        )
-    data = html_of(made)
+    out = options.out or (folder or Path()) / REPORT
+    check_new_file(out, ".html", ".htm")
+    kinds = plugins.kinds(options.kinds)
+    found = _of_logs(options, kinds) if folder is None else _of_folder(folder, options, kinds)
+    data = html_of(found)
     kept = write_new(out, data)
     if kept != out:
         raise WorkError(
             f"{out} was created meanwhile, and is not overwritten; the finished report is {kept}"
         )
-    _print(made, out, len(data), as_json=options.as_json)
+    if options.as_json:
+        print_json({"out": str(out), "bytes": len(data), "headline": found.headline})
+    else:
+        print_lines(found.headline, f"{out}: {len(data) / 1e6:.1f} MB; open it in a browser.")
 
 
-def _of_folder(folder: Path, threads: int, comparator: str, kinds: Sequence[FaultKind]) -> Report:
+def _of_folder(folder: Path, options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
     if is_run(folder):
-        return report_of(subject_of_run(folder, threads, comparator, kinds))
+        return report_of(subject_of_run(folder, options.threads, options.comparator, kinds))
     if is_campaign(folder):
         return report_of_campaign(folder)
     raise InputError(
@@ -96,8 +58,27 @@ def _of_folder(folder: Path, threads: int, comparator: str, kinds: Sequence[Faul
     )
 
 
-def _print(made: Report, out: Path, size: int, *, as_json: bool) -> None:
-    if as_json:
-        print_json({"out": str(out), "bytes": size, "headline": made.headline})
-    else:
-        print_lines(made.headline, f"{out}: {size / 1e6:.1f} MB; open it in a browser.")
+def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
+    if options.diagnosis is not None:
+        subject = subject_of_logs(
+            options.sources,
+            options.diagnosis,
+            robot=options.self_model,
+            threads=options.threads,
+            comparator=options.comparator,
+            kinds=kinds,
+        )
+        return report_of(subject)
+    found = diagnose_logs(options.sources, options)
+    subject = Subject(
+        name=", ".join(trial_names(found.inputs.damaged).values()),
+        robot=found.robot,
+        healthy=found.inputs.healthy,
+        damaged=found.inputs.damaged,
+        diagnoses=(found.diagnosis,),
+        comparator=found.inputs.comparator.comparator,
+        calibration=found.inputs.calibration,
+        made_with=found.explained[0].software,
+        threads=thread_count(options.threads),
+    )
+    return report_of(subject)

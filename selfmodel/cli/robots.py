@@ -4,10 +4,13 @@ from typing import Any
 
 from selfmodel.arguments import is_model, notes_on, robot_entry
 from selfmodel.cli.commands import Robots
-from selfmodel.cli.output.printing import print_json, print_lines
-from selfmodel.cli.output.robot_parts import parts, print_parts
-from selfmodel.cli.output.tables import folding, print_tables
+from selfmodel.cli.output import print_json, print_lines
+from selfmodel.cli.tables import folding, print_tables
+from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.robot.actuators import command_ranges, motor_joints
 from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from selfmodel.robot.state import FixedBase, FreeBase, read_base
 from selfmodel.tasks import ROBOTS, Entry
 
 
@@ -20,28 +23,29 @@ def robots(options: Robots) -> None:
         else:
             _print_all(every)
         return
-    entry = robot_entry(options.robot, options.model_settings or ())
-    notes = notes_on(options.robot, options.model_settings or ()) if is_model(options.robot) else ()
-    facts = {**_facts(entry), **parts(entry.robot()), "notes": list(notes)}
+    settings = options.model_settings or ()
+    entry = robot_entry(options.robot, settings)
+    notes = notes_on(options.robot, settings) if is_model(options.robot) else ()
+    facts = {**_facts(entry), **_parts(entry.robot()), "notes": list(notes)}
     if options.as_json:
         print_json(facts)
         return
-    print_parts(facts)
+    _print_parts(facts)
     print_lines(*(f"note: {note}" for note in notes))
 
 
 def _facts(entry: Entry) -> dict[str, Any]:
-    made = entry.robot()
-    network = network_for(made)
+    robot = entry.robot()
+    network = network_for(robot)
     return {
-        "robot": made.name,
-        "joints": [joint.name for joint in made.anatomy.joints],
-        "hinges": list(made.anatomy.hinges),
-        "sensors": [sensor.name for sensor in made.anatomy.sensors],
-        "motors": list(made.anatomy.motors),
+        "robot": robot.name,
+        "joints": [joint.name for joint in robot.anatomy.joints],
+        "hinges": list(robot.anatomy.hinges),
+        "sensors": [sensor.name for sensor in robot.anatomy.sensors],
+        "motors": list(robot.anatomy.motors),
         "hidden_neurons": network.hidden,
         "weights": network.weights,
-        "control_timestep": made.control_timestep,
+        "control_timestep": robot.control_timestep,
         "tasks": list(entry.suite),
         "cases": {str(number): notation for number, notation in entry.cases.items()},
     }
@@ -64,3 +68,96 @@ def _print_all(facts: list[dict[str, Any]]) -> None:
         "`selfmodel robots ROBOT` lists its parts and cases; `selfmodel suite list` the bodies of "
         "dm_control's suite."
     )
+
+
+def _parts(robot: Robot) -> dict[str, Any]:
+    """Returns root body, joints, sensors, motors and applicable faults as JSON values."""
+    anatomy, model = robot.anatomy, robot.model
+    base = read_base([model], robot.root)
+    motors = zip(anatomy.motors, command_ranges(model), strict=True)
+    kinds = {kind.name: kind.candidates(anatomy) for kind in ALL_KINDS}
+    return {
+        "root": {
+            "body": robot.root,
+            "floats": isinstance(base, FreeBase),
+            "fixed": isinstance(base, FixedBase),
+        },
+        "physics_timestep": float(model.opt.timestep),
+        "joint_details": [
+            {
+                "name": joint.name,
+                "hinges": list(joint.hinges),
+                "limits": [list(ends) for ends in joint.limits],
+                "limited": [bool(model.joint(hinge).limited[0]) for hinge in joint.hinges],
+                "motors": list(joint.motors),
+                "limb": sorted(joint.bodies, key=lambda name: int(model.body(name).id)),
+            }
+            for joint in anatomy.joints
+        ],
+        "sensor_details": [
+            {"name": s.name, "kind": s.kind, "of": s.hinge or s.body} for s in anatomy.sensors
+        ],
+        "motor_details": [
+            {
+                "name": name,
+                "drives": [model.joint(j).name for j in sorted(motor_joints(model, motor))],
+                "commands": [centre - half, centre + half],
+                "force": model.actuator_forcerange[motor].tolist()
+                if model.actuator_forcelimited[motor]
+                else None,
+            }
+            for motor, (name, (centre, half)) in enumerate(motors)
+        ],
+        "faults": [
+            {"kind": name, "parts": len(found), "example": str(found[-1])}
+            for name, found in kinds.items()
+            if found
+        ],
+    }
+
+
+def _print_parts(facts: dict[str, Any]) -> None:
+    """Prints the parts and the cases of Table I."""
+    root = "slides, and turns about one axis"
+    if facts["root"]["floats"] or facts["root"]["fixed"]:
+        root = "floating" if facts["root"]["floats"] else "fixed to the world"
+    about = (
+        ("root", f"{facts['root']['body']}, {root}"),
+        ("commands", f"every {facts['control_timestep']:g} s"),
+        ("physics", f"every {facts['physics_timestep']:g} s"),
+        ("controller", f"{facts['hidden_neurons']} neurons, {facts['weights']} weights"),
+    )
+    joints = (
+        (one["name"], _limits(one), ", ".join(one["motors"]), ", ".join(one["limb"]))
+        for one in facts["joint_details"]
+    )
+    sensors = ((one["name"], one["kind"], one["of"]) for one in facts["sensor_details"])
+    motors = (
+        (one["name"], ", ".join(one["drives"]), _span(one["commands"]), _span(one["force"]))
+        for one in facts["motor_details"]
+    )
+    faults = ((one["kind"], str(one["parts"]), one["example"]) for one in facts["faults"])
+    limits = ("joint", "hinges, rad", "motors", "limb beyond it")
+    drives = ("motor", "drives", "commands", "force")
+    tables = [
+        folding(("part", "value"), about, title=facts["robot"]),
+        folding(limits, joints, title="joints, which can break or jam"),
+        folding(("sensor", "kind", "of"), sensors, title="sensors, which can fail"),
+        folding(drives, motors, title="motors"),
+        folding(("kind", "faults", "such as"), faults, title="faults that can be hypothesised"),
+    ]
+    if cases := facts["cases"]:
+        tables.append(folding(("case", "damage"), cases.items(), title="failures of Table I"))
+    print_tables(*tables)
+
+
+def _limits(joint: dict[str, Any]) -> str:
+    hinges = zip(joint["hinges"], joint["limits"], joint["limited"], strict=True)
+    return ", ".join(
+        f"{hinge} {_span(ends)}" if limited else f"{hinge}, no limits"
+        for hinge, ends, limited in hinges
+    )
+
+
+def _span(ends: list[float] | None) -> str:
+    return f"{ends[0]:.3g} to {ends[1]:.3g}" if ends else "no limits"

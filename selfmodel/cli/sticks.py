@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.film import HEIGHT, LINE_LENGTH, WIDTH, Film, Shot
-from selfmodel.cli.output.plain import figure_text
+from selfmodel.cli.output import figure_text
 from selfmodel.robot.motion import shapes_of, stick_geoms
 
 CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -1,12 +1,16 @@
 """Commands that run and compare studies: ``ablate``, ``suite``, ``paper`` and ``compare``."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from itertools import groupby
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import pandas as pd
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from selfmodel.arguments import robot_entry
 from selfmodel.cli import inputs
@@ -18,15 +22,18 @@ from selfmodel.cli.commands import (
     Study as StudyOptions,
     settings_of,
 )
-from selfmodel.cli.output.grid_display import as_objects, end, run_shown
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.tables import show
+from selfmodel.cli.output import print_json, print_lines, print_notes
+from selfmodel.cli.progress import Lines, progress_bar
+from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
+from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.registry import kind_names
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import figures, plans
 from selfmodel.studies.comparisons import balance_warnings
+from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor
 from selfmodel.studies.paper_page import tables_of, write_results
 from selfmodel.studies.rows import outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import Interval
@@ -43,6 +50,9 @@ from selfmodel.studies.tables import (
     write_files,
 )
 from selfmodel.tasks import ROBOTS
+
+PROCESSES, DASK = EXECUTORS = ("processes", "dask")
+"""What may compute the cells of a study: processes of this machine, or a Dask cluster's workers."""
 
 
 def ablate(options: Ablate) -> None:
@@ -219,7 +229,8 @@ def _finish(
         paths += write_files(study.folder / "tables", table_files(tables, options.table))
     files = [str(path) for path in paths]
     if options.as_json:
-        print_json(json_of({**facts, "failures": as_objects(failed), "files": files}), indent=1)
+        failures = [{"run": one.name, "error": one.error} for one in failed]
+        print_json(json_of({**facts, "failures": failures, "files": files}), indent=1)
     else:
         if len(shown.shown):
             _show(shown.shown, shown.texts)
@@ -242,7 +253,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
             "comparator": one["comparator"],
             "trials": str(one["trials"]),
             "right": f"{one['right']} of {one['runs']}",
-            "right, %": _interval(one["correct"], 100, "{:.0f}"),
+            "right, %": _interval(one["correct"], 100, ".0f"),
             "time": _interval(one["time"]),
             **({"recovered ÷ before": _interval(one["recovery"])} if has_recovery else {}),
         }
@@ -294,10 +305,119 @@ def _ranges(numbers: list[int]) -> str:
     )
 
 
-def _interval(interval: Interval | None, factor: float = 1, form: str = "{:.2f}") -> str:
+def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -> str:
     if interval is None:
         return "-"
-    text: Callable[[float], str] = lambda value: form.format(factor * value)  # noqa: E731
-    if math.isnan(interval.low) or math.isnan(interval.high):
-        return text(interval.estimate)
-    return f"{text(interval.estimate)} ({text(interval.low)} to {text(interval.high)})"
+    estimate, low, high = (
+        format(factor * one, form) for one in (interval.estimate, interval.low, interval.high)
+    )
+    known = not math.isnan(interval.low + interval.high)
+    return f"{estimate} ({low} to {high})" if known else estimate
+
+
+def run_shown(study: Study, options: StudyOptions) -> Sequence[CellEnds]:
+    """Computes the cells of a study with a progress display; returns the failed ones.
+
+    Ctrl-C and the other stop signals end the command with a line on how to continue.
+
+    Raises:
+        InputError: The executor is unknown, the scheduler is missing or does not answer, or the
+            folder contains another study.
+    """
+    executor, scheduler = options.executor, options.scheduler
+    if executor not in EXECUTORS:
+        raise unknown_name("executor", executor, EXECUTORS)
+    if (scheduler is None) == (executor == DASK):
+        raise InputError(
+            f"expected --scheduler ADDRESS with --executor {DASK}, and with no other: give both, "
+            f"such as --executor {DASK} --scheduler 192.0.2.1:8786"
+        )
+    opened = nullcontext() if scheduler is None else dask_executor(scheduler)
+    workers = thread_count(options.workers)
+    with opened as given, grid_display() as shown:
+        try:
+            return study.run(executor=given, workers=workers, on_progress=shown)
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(
+                f"{shown.done} of {shown.total} are done and kept in {study.folder}; the same "
+                f"command continues with the rest"
+            )
+            raise
+
+
+@contextmanager
+def grid_display() -> Iterator["GridDisplay"]:
+    """Yields a display of grid events on standard error."""
+    speed = TextColumn("{task.description}")
+    bar = BarColumn(bar_width=None)
+    with progress_bar(bar, MofNCompleteColumn(), TimeElapsedColumn(), speed) as progress:
+        yield GridDisplay(progress)
+
+
+class GridDisplay(Lines):
+    """Displays the events of a grid: above a bar, only failures are lines.
+
+    Attributes:
+        done: Cells that are done or have failed.
+        total: All cells.
+    """
+
+    def __init__(self, bar: Progress | None) -> None:
+        super().__init__(bar)
+        self.done = self.total = 0
+        self._before, self._start = 0, monotonic()
+
+    def __call__(self, event: GridBegins | CellEnds) -> None:
+        """Displays an event."""
+        match event:
+            case GridBegins():
+                self.done, self.total = event.finished, event.total
+                self._before, self._start = event.finished, monotonic()
+                if self.bar:
+                    self.bar.add_task("", total=event.total, completed=event.finished)
+                elif event.finished:
+                    self.print_line(f"{event.finished} of {event.total} were done before")
+            case CellEnds():
+                self.done = event.number
+                seconds = monotonic() - self._start
+                speed = pace(event.number - self._before, event.total - event.number, seconds)
+                if self.bar:
+                    task = self.bar.task_ids[0]
+                    self.bar.update(task, completed=event.number, description=speed)
+                if event.error is not None or not self.bar:
+                    end = (
+                        f"failed: {event.error}"
+                        if event.error
+                        else f"done in {event.seconds:.1f} s"
+                    )
+                    line = f"[{event.number}/{event.total}] {event.name}: {end}"
+                    self.print_line("; ".join(filter(None, (line, speed))))
+
+
+def pace(done: int, left: int, seconds: float) -> str:
+    """Returns the rate of cells and the time left as text; nothing at the end.
+
+    Args:
+        done: Cells that ended since the start.
+        left: Cells that have not ended.
+        seconds: Time since the start, s.
+
+    Examples:
+        >>> pace(10, 35, 600.0)
+        '60 an hour, 0 h 35 min left'
+    """
+    if not (done and left and seconds > 0):
+        return ""
+    rate = done / seconds
+    minutes = math.ceil(left / rate / 60)
+    return f"{3600 * rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
+
+
+def end(failed: Sequence[CellEnds]) -> None:
+    """Ends the command with status 1 and a line if a cell failed."""
+    if failed:
+        print_notes(
+            f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
+            f"same command tries them again"
+        )
+        raise typer.Exit(1)

@@ -8,7 +8,7 @@ import numpy as np
 from selfmodel import arguments, plugins
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import RunTrial
-from selfmodel.cli.output.printing import print_json, print_lines
+from selfmodel.cli.output import print_json, print_lines
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
@@ -23,33 +23,31 @@ from selfmodel.trials.trial import TrialPlan
 
 def trial(options: RunTrial) -> None:
     """Run one trial of the simulated physical robot and write its log."""
-    kind = "network" if options.controller is None else options.controller
-    made = arguments.robot_entry(options.robot, options.model_settings or ()).robot()
+    robot = arguments.robot_entry(options.robot, options.model_settings or ()).robot()
     inputs.check_log_name(options.out)
-    hidden = HypothesisSpace(made.anatomy, plugins.kinds(options.kinds)).parse(
-        "intact" if options.damage is None else options.damage
-    )
-    reality = draw_reality(made, options.seed, options.gap)
+    space = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds))
+    hidden = space.parse("intact" if options.damage is None else options.damage)
+    reality = draw_reality(robot, options.seed, options.gap)
+    kind = "network" if options.controller is None else options.controller
     if kind in DESIGNS:
-        design = plugins.design(kind, made, options.neurons)
-        driver = Controller(
-            design, draw_genomes(np.random.default_rng(options.seed), (design.weights,))
-        )
+        design = plugins.design(kind, robot, options.neurons)
+        weights = draw_genomes(np.random.default_rng(options.seed), (design.weights,))
+        driver = Controller(design, weights)
     else:
-        driver = arguments.read_controller(Path(kind), made, options.neurons)
+        driver = arguments.read_controller(Path(kind), robot, options.neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
     plan = TrialPlan("trial", inputs.stage(options.stage), driver, settings.steps, options.seed)
     header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
     try:
-        logged = run_trial(reality.robot(made, hidden), plan, options.out, made, header)
+        logged = run_trial(reality.robot(robot, hidden), plan, options.out, robot, header)
     except KeyboardInterrupt as interruption:
         if (part := partial_path(options.out)).exists():
             interruption.add_note(f"the steps so far are in {part}")
         raise
     facts = {
         "log": str(options.out),
-        "robot": made.name,
+        "robot": robot.name,
         "truth": str(hidden),
         "gap": options.gap,
         "structure": False,  # readers of 0.1 expect the key
@@ -60,6 +58,5 @@ def trial(options: RunTrial) -> None:
     if options.as_json:
         print_json(facts)
     else:
-        print_lines(
-            f"{made.name} ({hidden}) went {logged.displacement:.3f} m forward: {options.out}"
-        )
+        went = f"{robot.name} ({hidden}) went {logged.displacement:.3f} m forward"
+        print_lines(f"{went}: {options.out}")

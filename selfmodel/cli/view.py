@@ -16,12 +16,12 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.cli.commands import View
 from selfmodel.cli.film import Film, film_of
-from selfmodel.cli.inputs import check_folder
+from selfmodel.cli.inputs import check_new_file
 from selfmodel.cli.logs import layout_path
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.replayed_log import ReplayedLog, replayed_log
+from selfmodel.cli.output import print_json, print_lines, print_notes
+from selfmodel.cli.replay import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
-from selfmodel.logs.files import refuse_existing, replace_file
+from selfmodel.logs.files import replace_file
 from selfmodel.robot.motion import (
     Shape,
     bodies_of,
@@ -63,34 +63,30 @@ def view(options: View) -> None:
     if options.out is None:
         check_display()
     else:
-        if options.out.suffix.lower() != ".rrd":
-            raise InputError(f"--out needs a name that ends in .rrd, got {str(options.out)!r}")
-        check_folder(options.out)
-        refuse_existing(options.out)
+        check_new_file(options.out, ".rrd")
     import_rerun()  # a missing package is an error before any work is done
-    given = replayed_log(
-        options.file, options.hypothesis, kinds=options.kinds, model=options.self_model
-    )
-    found = given.replayed(options.threads)
+    given = replayed_log(options, options.hypothesis)
+    found = given.drawable()
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")
+    written = None
     if options.out is None:
         open_viewer(given, found, options.port)
-    written = write_recording(options.out, given, found) if options.out else None
+    else:
+        written = write_recording(options.out, given, found)
     layout = layout_path()
     if options.as_json:
-        print_json(
-            {
-                "log": str(options.file),
-                "robot": given.robot.name,
-                "hypothesis": str(given.hypothesis),
-                "steps": given.log.trial.behaviour.steps,
-                "diverged": found.diverged,
-                "out": str(options.out) if options.out else None,
-                "bytes": written,
-                "foxglove_layout": str(layout),
-            }
-        )
+        facts = {
+            "log": str(options.file),
+            "robot": given.robot.name,
+            "hypothesis": str(given.hypothesis),
+            "steps": given.log.trial.behaviour.steps,
+            "diverged": found.diverged,
+            "out": str(options.out) if options.out else None,
+            "bytes": written,
+            "foxglove_layout": str(layout),
+        }
+        print_json(facts)
         return
     body = f"{given.robot.name} as logged, and simulated as {given.hypothesis}, transparent"
     print_lines(
@@ -291,33 +287,28 @@ def archetype(model: mujoco.MjModel, shape: Shape, colour: Colour, *, transparen
         transparent: Whether faces are transparent and edges drawn; a mesh always has faces.
     """
     rr = import_rerun()
-    modes = rr.components.FillMode
     place, turn, size = shape.position, shape.quaternion, shape.size
-    look = {
-        "colors": [colour],
-        "fill_mode": modes.TransparentFillMajorWireframe if transparent else modes.Solid,
-        "quaternions": [xyzw(turn)],
-    }
+    if shape.kind == "mesh":
+        vertices, faces = triangles_of(model, shape.mesh)
+        return rr.Mesh3D(
+            vertex_positions=rotated(vertices, turn) + place,
+            triangle_indices=faces,
+            albedo_factor=colour,
+        )
+    modes = rr.components.FillMode
+    fill = modes.TransparentFillMajorWireframe if transparent else modes.Solid
+    look = {"colors": [colour], "fill_mode": fill, "quaternions": [xyzw(turn)]}
+    round_ = {"lengths": [2 * size[1]], "radii": [size[0]]}
     match shape.kind:
         case "capsule":
             # A capsule of Rerun begins at its origin; MuJoCo's has the origin in the middle.
             start = place - rotated(np.array([0.0, 0.0, size[1]]), turn)
-            length, radius = [2 * size[1]], [size[0]]
-            return rr.Capsules3D(lengths=length, radii=radius, translations=[start], **look)
+            return rr.Capsules3D(translations=[start], **round_, **look)
         case "cylinder":
-            length, radius = [2 * size[1]], [size[0]]
-            return rr.Cylinders3D(lengths=length, radii=radius, centers=[place], **look)
-        case "sphere":
-            return rr.Ellipsoids3D(half_sizes=[np.repeat(size[0], 3)], centers=[place], **look)
-        case "ellipsoid":
-            return rr.Ellipsoids3D(half_sizes=[size], centers=[place], **look)
-        case "mesh":
-            vertices, faces = triangles_of(model, shape.mesh)
-            return rr.Mesh3D(
-                vertex_positions=rotated(vertices, turn) + place,
-                triangle_indices=faces,
-                albedo_factor=colour,
-            )
+            return rr.Cylinders3D(centers=[place], **round_, **look)
+        case "sphere" | "ellipsoid":
+            half = np.repeat(size[0], 3) if shape.kind == "sphere" else size
+            return rr.Ellipsoids3D(half_sizes=[half], centers=[place], **look)
     return rr.Boxes3D(half_sizes=[size], centers=[place], **look)
 
 

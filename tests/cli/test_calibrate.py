@@ -23,7 +23,6 @@ from tests.helpers.drivers import random_motion
 
 STEPS = 150
 SETTINGS = Settings(generations=2).scaled(8)
-BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
 
 
 def write(
@@ -60,8 +59,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     quadruped = ROBOTS["quadruped"].robot()
     write(made / "intact.mcap", quadruped, stage="before", level=0.1)
     write(made / "after.mcap", quadruped, stage="after", level=0.1)
-    write(made / "unseen.mcap", quadruped, stage="before", level=0.1, lost=BASE)
-    write(made / "unseen-after.mcap", quadruped, stage="after", level=0.1, lost=BASE)
     write(made / "numb.mcap", quadruped, stage="before", lost=("joint_velocities",))
     write(made / "exact.mcap", quadruped)
     contacts = replace(nominal(quadruped), contact_stiffness=2.0, contact_damping=0.25)
@@ -165,25 +162,6 @@ def test_what_cannot_be_used_is_said_in_one_sentence(
     assert "Traceback" not in done.stderr
     assert not (folder / "a.xml").exists()
     assert (folder / "taken.xml").read_text(encoding="utf-8") == "mine"
-
-
-@pytest.mark.search
-def test_a_robot_that_nobody_sees_is_calibrated_and_diagnosed(folder: Path):
-    fit = selfmodel("calibrate", "unseen.mcap", "-o", "unseen.xml", "--json", cwd=folder)
-    done = selfmodel(
-        *("diagnose", "unseen.mcap", "unseen-after.mcap", "--json"),
-        *("--comparator", "segment-prediction-onboard"),
-        cwd=folder,
-    )
-
-    assert [fit.returncode, done.returncode] == [0, 0], fit.stderr + done.stderr
-    found = json.loads(fit.stdout)
-    assert found["error"] < found["error_before"]
-    assert json.loads(done.stdout)["calibration"]["delay"] == found["delay"]
-
-
-def test_no_log_is_a_wrong_usage(folder: Path):
-    assert selfmodel("calibrate", "-o", "a.xml", cwd=folder).returncode == 2
 
 
 def test_a_diagnosis_that_cannot_calibrate_says_how_to_do_without(folder: Path):

@@ -1,7 +1,6 @@
 """``selfmodel compare``: paired comparisons of a study, as text, tables and figures."""
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
@@ -55,17 +54,6 @@ def test_tables_are_written_in_the_format_of_choice(folder: Path, name: str, fil
 
     assert told.returncode == 0, told.stderr
     assert (folder / "out" / file).stat().st_size > 100
-
-
-def test_unbalanced_cells_are_a_warning_with_their_numbers(tmp_path: Path):
-    write(tmp_path, [row for row in ROWS if row["comparator"] == "a" or row["seed"] < 2])
-    told = selfmodel("compare", "rows.csv", "-o", "out", "--json", cwd=tmp_path)
-    found = json.loads(told.stdout)
-
-    (warning,) = found["warnings"]
-    assert warning.startswith("quadruped, 1 trial: the cells are unbalanced (runs: a 12, b 6)")
-    assert found["comparisons"][0]["n"] == 6
-    assert [mean["n"] for mean in found["marginal_means"]] == [12, 6]
 
 
 def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):

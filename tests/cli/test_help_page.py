@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from selfmodel import __version__, cli
-from tests.helpers.command import selfmodel, selfmodel_process
+from tests.helpers.command import selfmodel
 
 GROUPS = {(): cli.app, ("logs",): cli.LOGS, ("suite",): cli.SUITE}
 GROUPS[("repertoire",)] = cli.REPERTOIRE
@@ -97,13 +97,6 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path):
     script = selfmodel(cwd=tmp_path, _SELFMODEL_COMPLETE="source_bash").stdout
     assert "_SELFMODEL_COMPLETE=complete_bash" in script
     assert script.rstrip().endswith("selfmodel")
-
-
-@pytest.mark.process
-def test_the_module_and_the_command_have_the_same_usage_line(tmp_path: Path):
-    done = selfmodel_process("recover", "--help", cwd=tmp_path)
-
-    assert done.stdout.startswith("Usage: selfmodel recover [OPTIONS] ROBOT\n")
 
 
 @pytest.mark.parametrize(

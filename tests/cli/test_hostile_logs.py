@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.logs.records import MODEL_FILE, TRIAL, TrialHeader
+from selfmodel.logs.records import MODEL_FILE, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
@@ -17,7 +17,7 @@ from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
 from tests.helpers.command import Done, selfmodel
 from tests.logs.conftest import MJCF, plan_of
-from tests.logs.edits import attach, rewritten, says
+from tests.logs.edits import attach
 
 BOX = '<geom type="box" size="0.3 0.3 0.3" {}/>'
 CROWD = MJCF.replace('<body name="torso"', 120 * BOX.format('pos="0 0 0.6"') + '<body name="torso"')
@@ -131,13 +131,3 @@ def test_an_impossible_gravity_is_refused_before_any_search(make: Make, gravity:
         assert (
             "expected finite numbers of at most 1e+10 in the model's option gravity" in done.stderr
         )
-
-
-def test_a_negative_seed_is_refused_by_every_command(make: Make):
-    log = make()
-    rewritten(log, says(TRIAL, seed="-5"))
-    for command in (["diagnose"], ["replay"]):
-        done = run(log, *command)
-        assert done.returncode == 2
-        assert "selfmodel.trial is wrong" in done.stderr
-        assert "seed" in done.stderr

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.faults.registry import DEFAULT_KINDS
 from tests.helpers.command import SMALL, selfmodel
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -86,20 +85,6 @@ def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
     assert "gravity" in unknown.stderr
 
 
-@pytest.mark.search
-def test_kinds_of_body_and_environment_are_the_default(tmp_path: Path):
-    few = (*SMALL, "--steps", "200", "--trials", "1", "--out", "run", "--json")
-    done = selfmodel("recover", "quadruped", "--case", "1", *few, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    default = [kind.name for kind in DEFAULT_KINDS]
-
-    assert told["kinds"] == default
-    assert {"break", "jam", "sensor", "motor", "friction", "slope", "wind"} <= set(default)
-    assert words(told["diagnosis"]) <= {*default, "intact"}
-    assert any("=" in one["hypothesis"] for one in told["diagnosis"])
-
-
 @pytest.mark.parametrize("command", [["recover", "quadruped", "--case", "1"], ["diagnose", "a"]])
 def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_path: Path):
     done = selfmodel(*command, "--kinds", "break,frction", cwd=tmp_path)
@@ -108,15 +93,3 @@ def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_pa
     assert "unknown kind 'frction': did you mean friction, joint-friction?" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_trial_takes_an_environment_beside_a_fault_and_replays(tmp_path: Path):
-    damage = "break:front_left_knee+slope=0.1+friction=0.4"
-    done = selfmodel(
-        *("trial", "quadruped", "--damage", damage, "--out", "a.mcap", "--json"), cwd=tmp_path
-    )
-    truth = json.loads(done.stdout)["truth"]
-    again = selfmodel("replay", "a.mcap", "--hypothesis", truth, "--json", cwd=tmp_path)
-
-    assert truth == "break:front_left_knee+friction=0.4+slope=0.1"
-    assert json.loads(again.stdout)["identical"]

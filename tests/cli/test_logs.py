@@ -99,15 +99,6 @@ def test_damage_is_told_with_what_can_be_saved_and_how(
     assert (told["identical"], told["steps"]) == (True, steps)
 
 
-def test_a_file_that_is_not_there_hides_nothing_of_the_others(folder: Path):
-    done = selfmodel("logs", "info", "a.mcap", "no.mcap", "pipe", "--json", cwd=folder)
-    there, missing, pipe = json.loads(done.stdout)["files"]
-
-    assert done.returncode == 1
-    assert there["steps"] == 1000
-    assert missing["kind"] == pipe["kind"] == "InputError"
-
-
 def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
     folder: Path, tmp_path: Path
 ):
@@ -131,12 +122,6 @@ def test_a_narrow_terminal_loses_no_number(folder: Path, arguments: tuple[str, .
     assert len(cells) > 20
     assert "…" not in narrow
     assert all(cell in narrow for cell in cells)
-
-
-def test_verify_loads_the_model_too(folder: Path):
-    done = selfmodel("logs", "verify", "a.mcap", "--json", cwd=folder)
-
-    assert json.loads(done.stdout)["files"][0]["model_loaded"] is True
 
 
 def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
@@ -281,20 +266,6 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
 
 
 @pytest.mark.search
-def test_the_papers_way_is_the_ea_alone_ranked_by_distance_from_a_model_as_it_is(
-    recovered_as_the_paper_did: tuple[Path, dict],
-):
-    _, told = recovered_as_the_paper_did
-    ranked = [one["distance"] for one in told["diagnosis"]]
-
-    assert told["calibration"] is None
-    assert told["test"] == "equal distances"
-    assert told["evaluations"]["diagnostic"] == 4 * (8 + 4)
-    assert told["evaluations"]["distinct_hypotheses"] <= 4 * (8 + 4) + 1
-    assert ranked == sorted(ranked)
-
-
-@pytest.mark.search
 def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     recovered: tuple[Path, dict], tmp_path: Path
 ):
@@ -355,9 +326,3 @@ def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
     assert sorted(path.name for path in folder.iterdir()) == before
-
-
-def test_help_names_every_command_on_logs():
-    told = selfmodel("logs", "--help", cwd=Path.cwd()).stdout
-
-    assert all(command in told for command in ("info", "verify", "salvage", "import"))

@@ -65,20 +65,6 @@ def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
         assert "is a diagnosis of other logs: expected after.mcap, before.mcap" in done.stderr
 
 
-def test_a_diagnosis_with_another_self_model_is_refused(logs: Path, diagnosed: Path):
-    values = json.loads(diagnosed.read_text())
-    (logs / "other.json").write_text(json.dumps({**values, "model": "0" * 64}))
-
-    refused = selfmodel(
-        *("report", "before.mcap", "after.mcap", "-o", "refused.html"),
-        *("--diagnosis", "other.json"),
-        cwd=logs,
-    )
-
-    assert refused.returncode == 2
-    assert "other.json is a diagnosis with another self-model of the name" in refused.stderr
-
-
 def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
     (tmp_path / "results.csv").write_text("robot,correct\nquadruped,true\n")
 

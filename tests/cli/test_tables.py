@@ -14,7 +14,6 @@ from tests.helpers.go2 import STAND, recorded
 pytestmark = pytest.mark.process
 
 ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
-SEARCH = ("--generations", "2", "--population", "10", "--seed", "1", "--json")
 
 
 @pytest.fixture(scope="module")
@@ -48,24 +47,6 @@ def test_an_exported_trial_is_imported_as_the_same_trial(form: str, folder: Path
     )
     for signal, values in original.signals.items():
         assert values.tobytes() == again[signal].tobytes(), signal
-
-
-@pytest.mark.search
-def test_an_imported_table_has_the_diagnosis_of_its_log(folder: Path):
-    for name in ("d.npz", "d.mcap"):
-        (folder / name).unlink(missing_ok=True)
-    selfmodel("logs", "export", "after.mcap", "-o", "d.npz", cwd=folder)
-    done = selfmodel("logs", "import", "d.npz", "--suggest", "--robot", "ant.xml", cwd=folder)
-    (folder / "d.toml").write_text(done.stdout)
-    selfmodel("logs", "import", "d.npz", "--mapping", "d.toml", "-o", "d.mcap", cwd=folder)
-
-    first, second = (
-        json.loads(selfmodel("diagnose", name, *SEARCH, cwd=folder).stdout)
-        for name in ("after.mcap", "d.mcap")
-    )
-
-    assert first["diagnosis"] == second["diagnosis"]
-    assert first["verdict"] == second["verdict"]
 
 
 def test_an_existing_table_and_an_unknown_format_are_refused(folder: Path):

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from selfmodel.cli import view
-from selfmodel.cli.replayed_log import replayed_log
+from selfmodel.cli.commands import Simulated
+from selfmodel.cli.replay import replayed_log
 from selfmodel.cli.view import HOST, LOGGED, SIMULATED, archetype, is_listening, open_viewer
 from selfmodel.errors import InputError, WorkError
 from selfmodel.robot.motion import shapes_of
@@ -58,8 +59,8 @@ def shown(folder: Path) -> Shown:
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             values[chunk.entity_path, name] = batch.column(name).to_pylist()
-    given = replayed_log(log, hypothesis, kinds="all", model=None)
-    return values, given.log.trial.behaviour, given.replayed(1).simulated
+    given = replayed_log(Simulated(file=log, threads=1), hypothesis)
+    return values, given.log.trial.behaviour, given.simulated().simulated
 
 
 def test_both_bodies_move_as_logged_and_as_simulated(shown: Shown, quadruped: Robot):

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.cli.output.plain import counted
+from selfmodel.cli.output import counted
 from selfmodel.logs.inspection import verify
 from selfmodel.tasks.walking import environment, motion_capture
 from tests.helpers.code_blocks import blocks
@@ -188,18 +188,6 @@ def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
     assert (first, last) == (STOP, STOP)
     assert commands == list(range(len(commands)))
     assert len(commands) - 1 <= log.trial.behaviour.steps <= len(commands)
-
-
-def test_the_driver_that_the_docs_show_is_the_example_s_and_has_forty_lines():
-    begin, end = "# The driver begins here: the docs show it.", "# The driver ends here."
-    text = EXAMPLE.read_text(encoding="utf-8")
-    shown = text.split(f"{begin}\n")[1].split(f"\n\n{end}\n")[0].strip()
-    code = [line for line in shown.splitlines() if line.strip() and '"""' not in line]
-
-    assert len(code) <= 40
-    (included,) = (b for b in blocks(PAGE) if b.language == "{literalinclude}")
-    assert (PAGE.parent / included.argument).resolve() == EXAMPLE
-    assert f':start-after: "{begin}"\n:end-before: "{end}"\n' in included.text
 
 
 @pytest.mark.process

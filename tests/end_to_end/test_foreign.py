@@ -15,7 +15,6 @@ from benchmarks.foreign.model import compiled, draw_gap
 from benchmarks.foreign.robots import NAMES, Robot, robot
 from benchmarks.foreign.scoring import is_expressible, judged, terms
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.robot import Robot as Body
 from tests.helpers.command import selfmodel
@@ -60,30 +59,6 @@ def test_a_lost_limb_is_deleted_with_its_mass_hinges_and_motors(machine: Robot):
     assert lost == len(part.beyond) == whole.nu - left.nu
     assert mujoco.mj_name2id(left, mujoco.mjtObj.mjOBJ_BODY, part.body) == -1
     assert left.body_mass.sum() < whole.body_mass.sum() - 0.01
-
-
-def test_feet_at_rest_are_felt():
-    model = model_of(robot("ant"))
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 300)
-
-    assert (data.sensordata > 0).sum() >= 3
-
-
-def test_debris_is_the_lost_limb_as_a_free_body_in_its_place(machine: Robot):
-    part = machine.parts[0]
-    fault = Fault("lost", part.name, debris=True)
-    whole, left = model_of(machine), model_of(machine, fault)
-    data, fallen = mujoco.MjData(whole), mujoco.MjData(left)
-    mujoco.mj_forward(whole, data)
-    mujoco.mj_forward(left, fallen)
-
-    debris, limb = left.body("debris").id, whole.body(part.body).id
-    assert left.body_mass.sum() == pytest.approx(whole.body_mass.sum())
-    assert left.body_mass[debris] == pytest.approx(whole.body_subtreemass[limb])
-    assert fallen.subtree_com[debris] == pytest.approx(data.subtree_com[limb], abs=1e-9)
-    assert left.jnt_type[left.body_jntadr[debris]] == mujoco.mjtJoint.mjJNT_FREE
-    assert left.jnt_qposadr[left.body_jntadr[debris]] == left.nq - 7
 
 
 def test_a_jam_fixes_the_body_at_the_angle_of_its_hinge(machine: Robot):
@@ -153,20 +128,6 @@ def test_the_encoder_of_a_limb_that_is_lost_in_mid_trial_moves_before_and_is_fro
     assert truth["truth"] == [f"break:{fault['part']}"]
     assert column[time < truth["onset"]].std() > 0.05
     assert np.ptp(column[time > truth["onset"] + 0.02]) == 0
-
-
-@pytest.mark.search
-def test_the_recording_of_a_plan_is_always_the_same(recording: Path, tmp_path: Path):
-    again = generate(tmp_path, Plan("quadruped", "onset-break", 5, "large", duration=8.0, trials=1))
-
-    for name in ("before", "after-1"):
-        (_, time, angles), (_, times, repeated) = (
-            joint_states(recording / name),
-            joint_states(again / name),
-        )
-        np.testing.assert_array_equal(time, times)
-        np.testing.assert_array_equal(angles, repeated)
-    assert (recording / "truth.json").read_text() == (again / "truth.json").read_text()
 
 
 @pytest.mark.process
@@ -245,27 +206,3 @@ def test_a_fault_is_expressible_if_its_own_kind_is_considered(kind: FaultKind, q
 
     assert is_expressible(read, [kind.name])
     assert not is_expressible(read, others)
-
-
-def test_an_encoder_slip_is_a_fault_of_its_own_with_an_error_in_rad(quadruped: Body):
-    (part, other) = quadruped.anatomy.hinges[:2]
-    slip = [Fault("encoder-slip", part, -0.15).notation]
-    offset = [Fault("encoder-offset", part, -0.15).notation]
-    kinds = {"kinds": ["encoder-offset", "encoder-slip"]}
-
-    found = judged(row(slip, f"encoder-offset:{part}=slip-0.1", "explained", **kinds))
-
-    assert found.verdict_right
-    assert found.severity_error == pytest.approx(0.05)
-    assert parse(slip[0], quadruped.anatomy).faults[0].severity == -0.15
-    for wrong in (offset[0], f"encoder-offset:{other}=slip-0.15"):
-        assert not judged(row(slip, wrong, "explained", **kinds)).right
-    assert judged(row(slip, "intact", "unexplained", kinds=["encoder-offset"])).right is None
-
-
-def test_terms_are_read_from_the_notation():
-    assert terms(["break:a", "motor:b=0.5", "wind=-3.0", "intact"]) == {
-        ("break", "a"): None,
-        ("motor", "b"): 0.5,
-        ("wind", ""): -3.0,
-    }

@@ -1,7 +1,6 @@
 """The robots in PyBullet: bodies, damage, servos, noise, trials through ``EnvironmentRobot``."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -22,14 +21,13 @@ from benchmarks.other_engine.reality import (
 )
 from selfmodel.controllers.controller import Controller, draw_genomes
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.behaviour import Behaviour, collect
 
-CASES = [(name, case) for name in ROBOTS for case in range(1, 10)]
+CASES = [(name, case) for name in ROBOTS for case in range(1, 10, 3)]
 
 
 def random_gait(robot: Robot, seed: int = 1) -> Controller:
@@ -83,10 +81,6 @@ def test_bodies_are_where_mujoco_has_them_in_random_poses(
             np.testing.assert_allclose(positions[name], data.body(name).xpos, atol=1e-6)
 
 
-def test_the_mass_is_that_of_the_model(robot: Robot, bullet: Callable[..., Bullet]):
-    assert bullet(robot).mass() == pytest.approx(robot.model.body_mass.sum(), rel=1e-6)
-
-
 def test_a_broken_joint_removes_its_links_and_their_mass(
     robot: Robot, bullet: Callable[..., Bullet]
 ):
@@ -133,13 +127,6 @@ def test_every_case_of_table_one_is_a_damage_under_which_a_walk_stays_finite(nam
         assert not behaviour["sensors"][:, behaviour.names.sensors.index(sensor)].any()
 
 
-def test_other_kinds_of_faults_are_refused(quadruped: Robot):
-    with pytest.raises(InputError, match="break, jam, sensor"):
-        damage_of("friction=0.4", quadruped.anatomy)
-    with pytest.raises(InputError, match="front_left_knee"):
-        damage_of("break:front_left_kne", quadruped.anatomy)
-
-
 def test_the_encoder_of_an_absent_joint_holds_its_last_value(quadruped: Robot):
     damage = damage_of("break:front_left_shoulder", quadruped.anatomy)
 
@@ -152,49 +139,6 @@ def test_the_encoder_of_an_absent_joint_holds_its_last_value(quadruped: Robot):
     assert not np.ptp(behaviour["sensors"][:, reading])
     others = np.delete(behaviour["joint_positions"], held, axis=1)
     assert np.ptp(others, axis=0).min() > 0.01
-
-
-def test_the_touch_sensor_of_an_absent_foot_reads_0(quadruped: Robot):
-    damage = damage_of("break:front_left_knee", quadruped.anatomy)
-    flipping = replace(ideal_reality(quadruped), touch_flips=0.5)
-
-    readings = walked(quadruped, flipping, damage)["sensors"]
-
-    assert readings[:, 0].tolist() == [0.0] * 60
-    assert 0 < readings[:, 1].mean() < 1
-
-
-def test_a_dead_sensor_reads_0_and_leaves_the_noise_of_the_others_unchanged(quadruped: Robot):
-    reality = draw_reality(quadruped, 0)
-    starts = []
-    for notation in ("intact", "sensor:front_right_angle"):
-        damage = damage_of(notation, quadruped.anatomy)
-        with BulletEnvironment(quadruped, reality, damage) as environment:
-            starts.append(environment.reset().observation["sensors"])
-
-    dead = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_right_angle")
-    assert starts[1][dead] == 0 != starts[0][dead]
-    np.testing.assert_array_equal(np.delete(starts[0], dead), np.delete(starts[1], dead))
-
-
-def test_nothing_but_gravity_moves_a_robot_in_the_air(robot: Robot, bullet: Callable[..., Bullet]):
-    body = bullet(robot)
-    body.place(np.array([0.0, 0.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(robot.model.nu))
-    for _ in range(300):
-        body.step(np.zeros(robot.model.nu))
-
-    _, _, velocity, turn = body.base()
-
-    np.testing.assert_allclose(velocity, [0, 0, -9.81 * 0.3], atol=1e-3)
-    np.testing.assert_allclose(turn, 0, atol=1e-3)
-
-
-def test_a_simulation_that_diverges_is_an_error(quadruped: Robot):
-    with BulletEnvironment(quadruped, ideal_reality(quadruped)) as environment:
-        environment.reset()
-
-        with pytest.raises(FloatingPointError, match=r"diverged before 0\.010 s"):
-            environment.step(np.full(8, np.nan))
 
 
 def test_observations_and_steps_keep_to_the_specs_of_the_environment(robot: Robot):
@@ -226,7 +170,7 @@ def test_a_robot_stands_for_a_second_at_the_height_that_it_has_in_mujoco(robot: 
     assert found["time"] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("number", [0])
 def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
     robot: Robot, number: int, bullet: Callable[..., Bullet]
 ):
@@ -283,20 +227,6 @@ def test_an_open_loop_walk_goes_as_far_as_in_mujoco_and_its_mirror_image_mirrors
     np.testing.assert_allclose(ways[0][-1], ways[1][-1] * [1, -1, 1], atol=0.005)
 
 
-def test_a_command_takes_effect_after_the_delay(quadruped: Robot):
-    ideal = ideal_reality(quadruped)
-    angles = []
-    for delay in (0, 20):
-        with BulletEnvironment(quadruped, replace(ideal, delay=delay)) as environment:
-            environment.reset()
-            target = np.full(8, 0.2)
-            angles.append([environment.step(target).observation["joint_positions"] for _ in "123"])
-
-    standing = np.abs(np.array(angles[1][:2])).max()
-    assert standing < 0.02 < np.abs(angles[0][1]).max()
-    assert np.abs(angles[1][2]).max() > standing
-
-
 def test_equal_seeds_walk_alike_to_the_bit_and_other_seeds_do_not(robot: Robot):
     first, second, other = (
         walked(robot, draw_reality(robot, seed), Damage(), steps=30)["base_position"]
@@ -305,25 +235,3 @@ def test_equal_seeds_walk_alike_to_the_bit_and_other_seeds_do_not(robot: Robot):
 
     np.testing.assert_array_equal(first, second)
     assert not np.array_equal(first, other)
-
-
-def test_the_episodes_and_the_streams_of_a_robot_differ_in_their_noise(quadruped: Robot):
-    reality = draw_reality(quadruped, 0)
-    starts = []
-    for stream in (0, 1):
-        with BulletEnvironment(quadruped, reality, Damage(), stream) as environment:
-            starts += [environment.reset().observation["joint_positions"] for _ in range(2)]
-
-    assert len(np.unique(np.array(starts), axis=0)) == 4
-
-
-def test_a_reality_is_drawn_within_its_bounds_from_its_seed(robot: Robot):
-    drawn = [draw_reality(robot, seed) for seed in range(30)]
-
-    assert drawn[4] == draw_reality(robot, 4)
-    for reality in drawn:
-        assert all(0.95 <= factor <= 1.05 for factor in reality.masses + reality.torques)
-        assert 0.7 <= reality.friction <= 1.1
-        assert 5 <= reality.delay <= 20
-        assert 0.01 <= reality.angle_noise <= 0.05
-        assert 0 <= reality.touch_flips <= 0.02

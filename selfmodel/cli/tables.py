@@ -1,17 +1,28 @@
-"""Tables that keep every character on a narrow terminal."""
+"""Tables and consoles of rich, which keep every character on a narrow terminal."""
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
+from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from selfmodel.cli.output.console import text_console
-from selfmodel.cli.output.plain import plain
-from selfmodel.cli.output.printing import print_lines
+from selfmodel.cli.output import plain, print_lines
+
+NARROWEST, WIDTH = 20, 80
+"""Smallest width of a terminal, in columns, and that of one that reports less, such as 0 in a
+container: rich would print nothing of a table, or a character a line."""
 
 
-def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 1) -> None:
+def text_console(*, stderr: bool = False) -> Console:
+    """Returns a console that prints text as it is: names may contain rich's markup."""
+    console = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+    if console.width < NARROWEST:
+        console.width = WIDTH
+    return console
+
+
+def show(columns: Sequence[str], rows: Iterable[Sequence[str]], *, texts: int = 1) -> None:
     """Prints a table; if it is too wide, each row as one line per cell.
 
     Args:
@@ -19,6 +30,7 @@ def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 
         rows: A text per column.
         texts: Number of leading columns that are left-justified texts; the others are numbers.
     """
+    rows = list(rows)
     table = Table()
     for place, title in enumerate(columns):
         table.add_column(title, justify="left" if place < texts else "right", no_wrap=True)
@@ -30,10 +42,8 @@ def show(columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: int = 
         console.print(table)
         return
     for row in rows:
-        print_lines(
-            f"{columns[0]}: {row[0]}",
-            *(f"  {title}: {cell}" for title, cell in zip(columns[1:], row[1:], strict=True)),
-        )
+        cells = zip(columns[1:], row[1:], strict=True)
+        print_lines(f"{columns[0]}: {row[0]}", *(f"  {title}: {cell}" for title, cell in cells))
 
 
 def folding(
@@ -63,3 +73,16 @@ def folding(
 def print_tables(*tables: Table) -> None:
     """Prints tables on standard output."""
     text_console().print(*tables)
+
+
+def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:
+    """Returns hypotheses, as JSON values, best first; the truth is marked where it is given."""
+    rows = [
+        (
+            str(rank),
+            one["hypothesis"] + (" (the truth)" if one["hypothesis"] == truth else ""),
+            "diverged" if one["distance"] is None else f"{one['distance']:.4f}",
+        )
+        for rank, one in enumerate(values, start=1)
+    ]
+    return folding(("", "hypothesis", "distance"), rows, title="diagnosis", texts=2)

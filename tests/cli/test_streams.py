@@ -15,7 +15,7 @@ from selfmodel import cli
 from selfmodel.cli import main
 from tests.helpers.command import SMALL, selfmodel
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 
 
 def shell(line: str, cwd: Path) -> subprocess.CompletedProcess[str]:

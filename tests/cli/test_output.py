@@ -2,16 +2,18 @@
 
 import ast
 import json
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.records import Attachment, Channel, McapRecord, Metadata
 
-from selfmodel.cli.output.grid_display import grid_display
-from selfmodel.cli.output.printing import print_json, print_lines, print_notes
-from selfmodel.cli.output.tables import folding, print_tables, show
+from selfmodel.cli.output import counted_warnings, print_json, print_lines, print_notes
+from selfmodel.cli.studies import grid_display, pace
+from selfmodel.cli.tables import WIDTH, folding, print_tables, show, text_console
 from selfmodel.logs import records
-from selfmodel.studies.grid import CellEnds
+from selfmodel.studies.grid import CellEnds, GridBegins
 from tests.helpers.command import SMALL, Done, selfmodel
 from tests.logs.conftest import MJCF
 from tests.logs.edits import rewritten, says
@@ -98,18 +100,14 @@ COMMANDS = [
     ("logs", "info", *LOGS),
     ("logs", "verify", *LOGS),
     ("logs", "salvage", f"cut {LOG}", "-o", f"saved {LOG}"),
-    ("logs", "salvage", LOG, "-o", f"again {LOG}"),
-    ("logs", "import", "bag", "--suggest", "--robot", "biped.xml"),
     ("logs", "import", "bag", "--suggest", "--robot", MODEL),
     ("logs", "import", "bag", "--mapping", f"map {EVIL}.toml", "-o", f"imported {LOG}"),
     ("logs", "import", "bag", "--mapping", "wrong.toml", "-o", "new.mcap"),
     ("logs", "import", "bag", "--mapping", "key.toml", "-o", "new.mcap"),
     ("logs", "import", f"no {EVIL}", "--mapping", f"map {EVIL}.toml", "-o", "new.mcap"),
-    ("replay", LOG),
     ("replay", LOG, "--out", f"{EVIL}.svg"),
     ("replay", LOG, "--hypothesis", EVIL),
     ("replay", LOG, "--robot", MODEL),
-    ("replay", LOG, "--json"),
     ("render", LOG, "--out", f"strip {EVIL}.svg", "--pictures", "2"),
     ("render", LOG, "--out", "new.svg", "--diagnosis", f"{EVIL}.json"),
     ("diagnose", f"after {LOG}", "before.mcap", *SMALL, *PICK),
@@ -117,24 +115,19 @@ COMMANDS = [
     ("calibrate", "before.mcap", "-o", f"fitted {MODEL}"),
     ("robots", MODEL),
     ("robots", MODEL, "--json"),
-    ("robots", EVIL),
     ("robots", MODEL, "--set", f"{EVIL}={EVIL}"),
     ("trial", MODEL, "--steps", "20", "--out", f"own {LOG}"),
     ("trial", "quadruped", "--damage", EVIL, "--out", "new.mcap"),
-    ("recover", "quadruped", "--case", EVIL),
     ("recover", "quadruped", "--damage", EVIL, "--next-trial", EVIL),
     ("recover", MODEL, "--damage", "friction=0.4", *SMALL, "--steps", "60", "--out", f"run {EVIL}"),
     ("ablate", "--out", EVIL, "--robots", EVIL),
-    ("suite", "run", "--out", EVIL, "--domains", EVIL),
     (EVIL,),
-    ("logs", EVIL),
     ("robots", f"--{EVIL}"),
-    ("robots", "quadruped", EVIL),
 ]
 
 
-ROOT = Path(__file__).parents[3]
-WAYS_OUT = {"typer.echo": "printing.py", "Console": "console.py", "print": ""}
+ROOT = Path(__file__).parents[2]
+WAYS_OUT = {"typer.echo": "output.py", "Console": "tables.py", "print": ""}
 """What writes to the terminal, and the one file that calls it."""
 
 
@@ -179,3 +172,67 @@ def test_tables_and_progress_print_names_as_they_are(capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize("arguments", COMMANDS, ids=lambda words: ascii(" ".join(words[:2])))
 def test_no_command_prints_a_forged_line(folder: Path, arguments: tuple[str, ...]):
     check(selfmodel(*arguments, cwd=folder))
+
+
+@pytest.mark.parametrize(
+    ("done", "left", "seconds", "text"),
+    [
+        (10, 35, 600.0, "60 an hour, 0 h 35 min left"),
+        (1, 200, 1800.0, "2 an hour, 100 h 00 min left"),
+        (3, 1, 0.5, "21600 an hour, 0 h 01 min left"),
+        (3, 0, 5.0, ""),
+        (0, 3, 5.0, ""),
+    ],
+)
+def test_the_pace_of_a_study_is_that_of_this_call_and_the_time_left(
+    done: int, left: int, seconds: float, text: str
+):
+    assert pace(done, left, seconds) == text
+
+
+def test_off_a_terminal_every_cell_is_a_line_with_rate_and_time_left(
+    capsys: pytest.CaptureFixture[str],
+):
+    with grid_display() as on_event:
+        on_event(GridBegins(total=3, finished=1))
+        on_event(CellEnds("run-1 auto", 2, 3, 1.25, None))
+        on_event(CellEnds("run-2 auto", 3, 3, 1.25, "it diverged"))
+    before, done, failed = capsys.readouterr().err.splitlines()
+
+    assert before == "1 of 3 were done before"
+    assert done.startswith("[2/3] run-1 auto: done in 1.2 s; ")
+    assert done.endswith(" an hour, 0 h 01 min left")
+    assert failed == "[3/3] run-2 auto: failed: it diverged"
+
+
+@pytest.mark.parametrize(("columns", "width"), [("0", WIDTH), ("40", 40)])
+def test_a_terminal_without_a_width_has_a_usual_one(
+    monkeypatch: pytest.MonkeyPatch, columns: str, width: int
+):
+    monkeypatch.setenv("COLUMNS", columns)
+
+    assert text_console().width == width
+
+
+def overflow() -> None:
+    with np.errstate(over="warn"):
+        np.square(np.array([1e308]))
+
+
+def test_each_warning_of_a_library_is_one_sentence_with_its_number_even_before_an_error(
+    capsys: pytest.CaptureFixture[str],
+):
+    with pytest.raises(SystemExit), counted_warnings():  # noqa: PT012  # what fails is the block
+        for _ in range(37):
+            overflow()
+        warnings.warn("a file is\nold \x1b[2J", RuntimeWarning, stacklevel=1)
+        assert capsys.readouterr() == ("", "")
+        raise SystemExit(2)
+    out, err = capsys.readouterr()
+
+    assert out == ""
+    assert "note: Python warned 37 times: RuntimeWarning: overflow encountered in square\n" in err
+    assert "note: Python warned 1 time: RuntimeWarning: a file is old \\x1b[2J\n" in err
+    assert ".py" not in err
+    with pytest.raises(RuntimeWarning):  # warnings are as before
+        overflow()

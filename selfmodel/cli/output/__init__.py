@@ -1,1 +1,0 @@
-"""Tables, reports and progress of the command line."""
