@@ -41,3 +41,14 @@ def test_no_help_page_imports_anything_heavy(
 
     assert not heavy & set(imported)
     assert not any(module.startswith("selfmodel.studies") for module in imported)
+
+
+@pytest.mark.process
+def test_a_recovery_imports_at_most_150_modules_of_selfmodel():
+    code = (
+        "import sys, selfmodel.cli.recover\n"
+        "print(sum(name.split('.')[0] == 'selfmodel' for name in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert int(done.stdout) <= 150
