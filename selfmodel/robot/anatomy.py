@@ -131,8 +131,8 @@ def control_delay(model: "MjModel", substeps: int) -> float:
     """
     delay = custom_numeric(model, CONTROL_DELAY) or 0.0
     allowed = 1 if model.na else substeps
-    error = abs(delay * allowed - round(delay * allowed))
-    if not 0 <= delay <= MAX_CONTROL_DELAY or error > _DELAY_TOLERANCE:
+    valid = 0 <= delay <= MAX_CONTROL_DELAY  # not for NaN, which cannot be rounded
+    if not valid or abs(delay * allowed - round(delay * allowed)) > _DELAY_TOLERANCE:
         parts = "a whole number" if allowed == 1 else f"a multiple of 1/{allowed}"
         raise ValueError(
             f"{CONTROL_DELAY} must be {parts} from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"

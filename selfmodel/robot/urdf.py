@@ -6,9 +6,7 @@ assets, so that it reads nothing else.
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from posixpath import join, normpath, splitext
-from urllib.parse import unquote
+from collections.abc import Collection, Mapping
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
@@ -20,10 +18,11 @@ from selfmodel.robot.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.pose import lowest_point
 from selfmodel.robot.mjcf.settings import JointValues, MjcfSettings, check_patterns, value_of
 from selfmodel.robot.mjcf.untrusted import MAX_DEPTH, Files
-from selfmodel.robot.mjcf.work import Work, add_asset, format_numbers
+from selfmodel.robot.mjcf.work import Work, format_numbers
 from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import MAX_NUMBER
 from selfmodel.robot.urdf_bodies import is_rigid, mesh_elements, world_elements
+from selfmodel.robot.urdf_meshes import SHAPES, quoted, read_meshes
 
 MAX_LINK_DEPTH = MAX_DEPTH - 10
 """Largest number of links from the root to an end; in MJCF, each link is nested in its parent."""
@@ -52,15 +51,7 @@ _REMEDIES = {
     "planar": 'replace it by revolute joints, or fix it with type="fixed"',
 }
 
-READABLE = (".stl", ".obj")
-"""Endings of the meshes of a URDF that MuJoCo reads."""
-
-_PACKAGE_SCHEMES = ("package://", "model://")
-_ABOVE = ("", "..", "../..", "../../..")
-"""Folders of a package, from the folder of its URDF: ``NAME/urdf/x.urdf``, and one level deeper."""
-
-_SHAPES = ("visual", "collision")
-_MAX_QUOTED, _MAX_LISTED = 80, 6
+_MAX_LISTED = 6
 
 _KEPT: Mapping[str, tuple[str, ...]] = {
     "link": ("name",),
@@ -110,7 +101,7 @@ def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
     """
     work = Work(ET.Element("mujoco", {"model": root.get("name") or "robot"}), settings)
     urdf = _checked(root, work)
-    _read_meshes(urdf, work, files)
+    read_meshes(urdf, work, files)
     hinges = [j for j in urdf.findall("joint") if j.get("type") in HINGE_TYPES]
     for values in (settings.kp, settings.kd, settings.effort, settings.pose):
         check_patterns(values, [j.get("name", "") for j in hinges])
@@ -141,11 +132,6 @@ def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
     _add_servos(work, hinges)
     _add_stance(work)
     return work
-
-
-def quoted(text: str | None) -> str:
-    """Returns a name of a URDF as part of an error message, at most 80 characters long."""
-    return repr((text or "")[:_MAX_QUOTED])
 
 
 def _checked(root: ET.Element, work: Work) -> ET.Element:
@@ -246,7 +232,7 @@ def _kept(element: ET.Element) -> ET.Element:
         if name not in _TEXTS:
             _check_numbers(element.tag, name, text)
     for child in element:
-        once = child.tag not in _SHAPES
+        once = child.tag not in SHAPES
         if child.tag in _KEPT and not (once and copy.find(child.tag) is not None):
             copy.append(_kept(child))
     return copy
@@ -297,81 +283,6 @@ def _check_range(joint: ET.Element, work: Work) -> None:
 
 def _number(element: ET.Element, attribute: str, default: float = 0.0) -> float:
     return float(element.get(attribute, default))
-
-
-def _read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
-    """Reads the meshes, and removes shapes of size 0 and visuals whose mesh cannot be read."""
-    parts = [(link, e) for link in urdf.findall("link") for e in link if e.tag in _SHAPES]
-    empty = [part for part in parts if _is_empty(part[1].find("geometry/*"))]
-    for link, part in empty:
-        link.remove(part)
-    if empty:
-        work.notes.append(f"{len(empty)} shapes of size 0 are left out")
-    names, left_out = dict[str, str](), Counter[str]()
-    for link, part in parts:
-        mesh = part.find("geometry/mesh")
-        if mesh is None:
-            continue
-        uri = mesh.get("filename", "")
-        path = next(filter(files.has, _mesh_paths(uri)), None)
-        if path is not None:
-            if path not in names:
-                names[path] = add_asset(work, files, path, f"<mesh> ({quoted(uri)})")
-            mesh.set("filename", names[path])
-        elif part.tag == "visual":
-            link.remove(part)
-            left_out[_why_unread(uri)] += 1
-        else:
-            raise InputError(
-                f"the collision of the link {quoted(link.get('name'))} needs the mesh "
-                f"{quoted(uri)}, which is missing, lies outside the folders of the model, or "
-                f"is no STL or OBJ: save the mesh as .stl, or name a folder that contains it, "
-                f"with --set assets=DIR"
-            )
-    for reason, count in left_out.items():
-        work.notes.append(f"{count} visual meshes are left out: {reason}")
-
-
-def _is_empty(shape: ET.Element | None) -> bool:
-    """Returns whether a shape is missing, or has a size of 0."""
-    if shape is None:
-        return True
-    sizes = (shape.get(name, "").split() for name in ("size", "radius", "length"))
-    return any(float(size) == 0 for words in sizes for size in words)
-
-
-def _why_unread(uri: str) -> str:
-    ending = "." + uri.rpartition(".")[2].lower()
-    if ending in READABLE:
-        return f"their files were not found, such as {quoted(uri)}"
-    return f"MuJoCo reads no {ending[:10]}, expected {' or '.join(READABLE)}"
-
-
-def _mesh_paths(uri: str) -> Iterator[str]:
-    """Yields the possible paths of a mesh, relative to the URDF, the most specific first.
-
-    In place of a mesh in another format, it is the file of the same name that ends in ``.stl`` or
-    ``.obj``.
-    """
-    for path in _paths(uri):
-        stem, ending = splitext(path)
-        yield from [path] if ending.lower() in READABLE else [stem + other for other in READABLE]
-
-
-def _paths(uri: str) -> Iterator[str]:
-    text = uri.replace("\\", "/")
-    if text.startswith("file://"):
-        yield unquote(text.removeprefix("file://"))
-        return
-    scheme = next((scheme for scheme in _PACKAGE_SCHEMES if text.startswith(scheme)), None)
-    if scheme is None:
-        yield normpath(text)
-        return
-    whole = unquote(text.removeprefix(scheme))
-    inside = whole.partition("/")[2]  # of the package
-    for above in _ABOVE:
-        yield normpath(join(above, inside))
-        yield normpath(join(above, whole))
 
 
 def _free_base(work: Work) -> None:

@@ -94,9 +94,6 @@ def full(*_: object) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-# ---------------------------------------------------------------- what a log holds
-
-
 def assert_same_bits(behaviour: Behaviour, expected: Behaviour):
     assert behaviour.names == expected.names
     assert behaviour.time.tobytes() == expected.time.tobytes()
@@ -201,9 +198,6 @@ def test_a_clock_that_cannot_be_is_refused(
         read_log(path)
 
 
-# ---------------------------------------------------------------- what is refused
-
-
 @pytest.mark.parametrize(
     ("spoil", "match"),
     [
@@ -259,9 +253,6 @@ def test_a_file_that_is_created_meanwhile_is_not_overwritten(biped: Robot, tmp_p
         write(path, biped, intruding())
     assert path.read_text() == "precious"
     assert read_log(tmp_path / "a.mcap.part").status == "finished"
-
-
-# ---------------------------------------------------------------- what ends a trial
 
 
 @pytest.mark.parametrize("error", [RuntimeError("the robot fell off"), KeyboardInterrupt()])
@@ -438,9 +429,6 @@ def test_the_robot_stops_before_the_log_is_closed(biped: Robot, tmp_path: Path):
     assert order == [False, False]
 
 
-# ---------------------------------------------------------------- physical robots
-
-
 class Untimed:
     """A physical robot with made-up samples, which may end with an error."""
 
@@ -489,8 +477,8 @@ def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
     if case == "not stopped":
         error.add_note("the safe command could not be sent")
     robot = Untimed(biped, MIN_STEPS - (case == "short"), error)
-    stage = "before" if case == "before" else "recovery"
-    plan = dataclasses.replace(plan_of(biped, 2 * MIN_STEPS, "02-recovery"), stage=stage)
+    plan = plan_of(biped, 2 * MIN_STEPS, "02-recovery")
+    plan = dataclasses.replace(plan, stage="before" if case == "before" else "recovery")
     run = TrialRunner(tmp_path, biped, Settings())
     if case != "whole":
         with pytest.raises(TrialError, match=str(error)):
