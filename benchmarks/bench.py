@@ -45,7 +45,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.studies.experiment import Experiment, run
 from selfmodel.tasks import ROBOTS, entry, suite_bodies
-from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
 
 # dm_control searches for a display on import; nothing is drawn here.
@@ -137,7 +137,7 @@ def closed_loop_over_rollout(robot: Robot, count: int, steps: int, threads: int)
     Both have the same model, threads and initial poses, and the closed loop's motor targets.
     """
     batch = runs(robot, count)
-    recorded = Simulator(robot, threads).run(batch, steps, ["commands"]).behaviour["commands"]
+    recorded = Simulator(robot, threads).run(batch, steps, ["commands"]).trajectory["commands"]
     targets = np.repeat(recorded[:, :-1], robot.substeps, axis=1)
     start = _start(robot, count)
     datas = [mujoco.MjData(robot.model) for _ in range(threads)]

@@ -20,9 +20,9 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray, held, median_of_known
 from selfmodel.simulation.requests import END
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import standing_tolerance
 from selfmodel.trials.signals import HINGE_ERROR_SCALES, Signal
+from selfmodel.trials.trajectory import Trajectory
 
 ERROR_SCALE = 0.5
 """Error of the natural logarithm of a motion that counts as large: a factor of 1.6."""
@@ -85,7 +85,7 @@ def logged_motion(positions: FloatArray, starts: IndexArray, horizon: int) -> Lo
     )
 
 
-def encoder_motion_loss(simulated: Behaviour, logged: LoggedMotion) -> FloatArray:
+def encoder_motion_loss(simulated: Trajectory, logged: LoggedMotion) -> FloatArray:
     """Returns the loss of the predicted motion of the encoders, ``(n, segments)``.
 
     The error of a hinge is half the logarithm of the ratio of two mean square deviations, of the
@@ -133,7 +133,7 @@ def _mean(
 
 
 def hinge_losses(
-    simulated: Behaviour, logged: Mapping[Signal, FloatArray], compared: IndexArray
+    simulated: Trajectory, logged: Mapping[Signal, FloatArray], compared: IndexArray
 ) -> FloatArray:
     """Returns the loss of each hinge in each segment, ``(n, segments, hinges)``.
 
@@ -178,23 +178,25 @@ class LooseEncoders:
     source: IndexArray
 
 
-def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> LooseEncoders | None:
+def loose_encoders(
+    trajectory: Trajectory, starts: IndexArray, horizon: int
+) -> LooseEncoders | None:
     """Returns the encoders of a trial that follow commands; None if there are none.
 
     Encoders of intact joints may be among them: they are used only for hypotheses that detach the
     joint. The arguments are those of ``logged_motion``.
     """
-    commands, logged = behaviour["commands"], behaviour["joint_positions"]
+    commands, logged = trajectory["commands"], trajectory["joint_positions"]
     filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
-    first = round((1 - END) * behaviour.steps)
+    first = round((1 - END) * trajectory.steps)
     fits = [_following(column, filtered, first) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
     if not len(hinges):
         return None
     angles = np.stack([fit for fit in fits if fit is not None], axis=1)
-    velocities = np.gradient(angles, behaviour.time, axis=0)
+    velocities = np.gradient(angles, trajectory.time, axis=0)
     derived = []
-    for sensor, readings in enumerate(behaviour["sensors"].T):
+    for sensor, readings in enumerate(trajectory["sensors"].T):
         for source, hinge in enumerate(hinges):
             line = _line(readings[first:], logged[first:, hinge])
             if line is not None and line[2] < 1 - DERIVED**2:
@@ -211,7 +213,7 @@ def loose_encoders(behaviour: Behaviour, starts: IndexArray, horizon: int) -> Lo
     )
 
 
-def with_loose_encoders(simulated: Behaviour, loose: LooseEncoders) -> Mapping[Signal, FloatArray]:
+def with_loose_encoders(simulated: Trajectory, loose: LooseEncoders) -> Mapping[Signal, FloatArray]:
     """Returns predictions in which the encoders of detached hinges follow their commands."""
     detached = simulated.hinge_mask("detached")
     followed: dict[Signal, tuple[IndexArray, FloatArray, IndexArray]] = {

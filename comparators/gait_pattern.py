@@ -9,8 +9,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.sensor_series import geman_mcclure, observed_signals
 from selfmodel.simulation.requests import ClosedLoop
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 SIGNALS: tuple[Signal, ...] = ("sensors", "joint_positions")
@@ -79,9 +79,9 @@ class GaitPattern:
     def prepare(self, trial: Trial) -> "PreparedGait":
         """Returns the gait of the trial, from its observed readings and joint positions."""
         signals = observed_signals(trial, SIGNALS, self.name)
-        logged = np.concatenate([trial.behaviour[signal] for signal in signals], axis=-1)
-        readings = trial.behaviour["sensors"].shape[-1] if "sensors" in signals else 0
-        observed, time = np.isfinite(logged), trial.behaviour.time
+        logged = np.concatenate([trial.trajectory[signal] for signal in signals], axis=-1)
+        readings = trial.trajectory["sensors"].shape[-1] if "sensors" in signals else 0
+        observed, time = np.isfinite(logged), trial.trajectory.time
         timestep = float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 1.0
         windows = min(MAX_WINDOWS, max(1, len(logged) // MIN_WINDOW))
         length = len(logged) // windows
@@ -162,7 +162,7 @@ class PreparedGait:
     known: Mapping[str, BoolArray]
     share: float
 
-    def losses(self, simulated: Behaviour) -> FloatArray:
+    def losses(self, simulated: Trajectory) -> FloatArray:
         """Returns the loss of each group of features in each window, ``(n, windows * groups)``."""
         values = np.concatenate([simulated[signal] for signal in self.request.record], axis=-1)
         differences = _differences(self.gait_of(values), self.gait)

@@ -8,8 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.sensor_series import observed_signals, padded_windows
 from selfmodel.simulation.requests import Ensemble
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import ENSEMBLE_DEVIATION_FLOORS, Signal, comparable
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 WINDOW = 25
@@ -54,8 +54,8 @@ class NoisyTransfer:
     def prepare(self, trial: Trial) -> "PreparedFeatures":
         """Returns the features of the trial, of the signals that were observed."""
         signals = observed_signals(trial, ENSEMBLE_DEVIATION_FLOORS, self.name)
-        features = {signal: _trial_features(signal, trial.behaviour[signal]) for signal in signals}
-        weight = np.zeros(-(-trial.behaviour.steps // WINDOW))
+        features = {signal: _trial_features(signal, trial.trajectory[signal]) for signal in signals}
+        weight = np.zeros(-(-trial.trajectory.steps // WINDOW))
         for each in features.values():
             weight += each.weight.sum(axis=1)
         return PreparedFeatures(Ensemble(signals, self.members, self.level), features, weight)
@@ -92,7 +92,7 @@ class PreparedFeatures:
     features: Mapping[Signal, TrialFeatures]
     weight: FloatArray
 
-    def losses(self, simulated: Behaviour) -> FloatArray:
+    def losses(self, simulated: Trajectory) -> FloatArray:
         """Returns the loss of each window with an observation, ``(n, windows)``."""
         total = np.zeros((len(simulated[self.request.record[0]]), len(self.weight)))
         for signal, features in self.features.items():

@@ -8,7 +8,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.comparators.sensor_series import PreparedSeries, SensorSeries, geman_mcclure
 from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
-from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 DISPLACEMENT_SHARE = 0.2
@@ -58,7 +58,7 @@ class PreparedDisplacement:
     displacement: float
     request: ClosedLoop = REQUEST
 
-    def distances(self, simulated: Behaviour) -> FloatArray:
+    def distances(self, simulated: Trajectory) -> FloatArray:
         """Returns the distance of each simulation, ``(n,)``, m."""
         return np.abs(forward_displacement(simulated) - self.displacement)
 
@@ -98,7 +98,7 @@ class PreparedPaperSensors:
     displacement: float
     request: ClosedLoop
 
-    def losses(self, simulated: Behaviour) -> FloatArray:
+    def losses(self, simulated: Trajectory) -> FloatArray:
         """Returns the loss of each window, and of the displacement if the trial has one.
 
         Returns:

@@ -93,8 +93,8 @@ def command_errors(trial: Trial) -> FloatArray:
         NaN from the first reading that was not observed, because the controller's state is unknown
         from there. All 0 for a playback, whose controller is unknown.
     """
-    behaviour, source = trial.behaviour, trial.plan.controller
-    commands, readings = behaviour["commands"], behaviour["sensors"]
+    trajectory, source = trial.trajectory, trial.plan.controller
+    commands, readings = trajectory["commands"], trajectory["sensors"]
     if isinstance(source, Playback):
         return np.zeros_like(commands)
     batch = make_batch([source], [frozenset()], readings.shape[1])

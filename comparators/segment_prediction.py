@@ -25,9 +25,9 @@ from selfmodel.comparators.readings import (
 )
 from selfmodel.diagnosis.comparator import Losses, TrialRefusedError
 from selfmodel.simulation.requests import Segments, command_steps, cut_segments
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import ONBOARD, STATE, estimated_states, known_rows
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, Signal, difference
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 MIN_SEGMENTS = 4
@@ -62,7 +62,7 @@ class SegmentPrediction:
     continues each segment from the base's predicted state at the end of the segment before, which
     makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
     second. The network is taken to be known: without one (a recording of other software) its
-    arithmetic is not compared. Segments with a late step (``Behaviour.late``) have no loss: the
+    arithmetic is not compared. Segments with a late step (``Trajectory.late``) have no loss: the
     effect of a command in a quarter of a second is not its effect in an eighth.
 
     Attributes:
@@ -84,22 +84,22 @@ class SegmentPrediction:
 
     def prepare(self, trial: Trial) -> "PreparedSegments":
         """Returns the segments of the trial and the logged values to compare them with."""
-        behaviour, horizon = trial.behaviour, self.horizon
-        states = estimated_states(behaviour, self.state)
+        trajectory, horizon = trial.trajectory, self.horizon
+        states = estimated_states(trajectory, self.state)
         starts, steady = self._starts(trial, states)
         compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
         rows = starts[:, np.newaxis] + compared
-        request = cut_segments(behaviour, states, starts, horizon, (*self.state, "sensors"))
+        request = cut_segments(trajectory, states, starts, horizon, (*self.state, "sensors"))
         return PreparedSegments(
             request=request,
             compared=compared,
             states={signal: values[rows] for signal, values in states.items()},
             steady=steady,
-            readings=logged_readings(behaviour["sensors"], starts, horizon),
-            motion=logged_motion(behaviour["joint_positions"], starts, horizon)
+            readings=logged_readings(trajectory["sensors"], starts, horizon),
+            motion=logged_motion(trajectory["joint_positions"], starts, horizon)
             if "joint_positions" in states
             else None,
-            loose=loose_encoders(behaviour, starts, horizon),
+            loose=loose_encoders(trajectory, starts, horizon),
             arithmetic=arithmetic_loss(trial, starts, horizon),
             piece_steps=(starts[:, np.newaxis] + np.array([0, horizon]))[steady],
         )
@@ -108,21 +108,21 @@ class SegmentPrediction:
         self, trial: Trial, states: Mapping[Signal, FloatArray]
     ) -> tuple[IndexArray, BoolArray]:
         """Returns the steps at which segments begin, and a mask of those without a late step."""
-        behaviour, horizon = trial.behaviour, self.horizon
-        if behaviour.steps < MIN_SEGMENTS * horizon + 1:
+        trajectory, horizon = trial.trajectory, self.horizon
+        if trajectory.steps < MIN_SEGMENTS * horizon + 1:
             raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs {MIN_SEGMENTS * horizon + 1} steps or more, "
-                f"and the trial has {behaviour.steps}",
+                f"and the trial has {trajectory.steps}",
                 "leave this log out",
             )
-        count = min(self.max_segments, (behaviour.steps - 1) // horizon)
-        starts = np.linspace(0, behaviour.steps - 1 - horizon, count).round().astype(np.intp)
+        count = min(self.max_segments, (trajectory.steps - 1) // horizon)
+        starts = np.linspace(0, trajectory.steps - 1 - horizon, count).round().astype(np.intp)
         known: dict[Signal, BoolArray] = {
             signal: known_rows(signal, states[signal][starts]) for signal in self.state
         }
-        known["commands"] = _all_finite(behaviour["commands"], starts, horizon)
+        known["commands"] = _all_finite(trajectory["commands"], starts, horizon)
         usable = np.asarray(np.logical_and.reduce(list(known.values())))
-        steady = _all_finite(behaviour.steady_commands, starts, horizon)
+        steady = _all_finite(trajectory.steady_commands, starts, horizon)
         if np.sum(usable & steady) < MIN_SEGMENTS:
             if usable.sum() >= MIN_SEGMENTS:
                 raise TrialRefusedError(
@@ -169,7 +169,7 @@ class PreparedSegments:
     arithmetic: FloatArray
     piece_steps: IndexArray
 
-    def losses(self, simulated: Behaviour) -> Losses:
+    def losses(self, simulated: Trajectory) -> Losses:
         """Returns the losses of each segment without a late step; see ``SegmentPrediction``."""
         shape = simulated["sensors"].shape[:2]
         terms = {"commands": np.broadcast_to(self.arithmetic, shape), **self._terms(simulated)}
@@ -185,7 +185,7 @@ class PreparedSegments:
             by_hinge=by_hinge,
         )
 
-    def _terms(self, simulated: Behaviour) -> dict[str, FloatArray]:
+    def _terms(self, simulated: Trajectory) -> dict[str, FloatArray]:
         """Returns the loss of each predicted signal in each segment, ``(n, segments)`` each."""
         terms: dict[str, FloatArray] = {}
         predictions = simulated.signals

@@ -8,8 +8,8 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SERIES_SPREAD_FLOORS, Signal, comparable
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 BLOCK = 5
@@ -56,10 +56,10 @@ class SensorSeries:
     def prepare(self, trial: Trial) -> "PreparedSeries":
         """Returns the observed series of the trial, with their scales and weights."""
         signals = observed_signals(trial, self.signals, self.name)
-        steps = trial.behaviour.steps
+        steps = trial.trajectory.steps
         windows = -(-steps // WINDOW)
         columns = {
-            signal: _scaled_columns(signal, trial.behaviour[signal], windows) for signal in signals
+            signal: _scaled_columns(signal, trial.trajectory[signal], windows) for signal in signals
         }
         weight = np.zeros(windows)
         for column in columns.values():
@@ -110,7 +110,7 @@ class PreparedSeries:
     weight: FloatArray
     relative_decay: FloatArray
 
-    def losses(self, simulated: Behaviour) -> FloatArray:
+    def losses(self, simulated: Trajectory) -> FloatArray:
         """Returns the loss of each window, weighted so that their mean is the distance."""
         runs, windows = len(simulated[self.request.record[0]]), len(self.weight)
         steps = len(next(iter(self.columns.values())).logged)
@@ -162,7 +162,7 @@ def observed_signals(
         TrialRefusedError: The trial has none of the signals.
     """
     wanted = tuple(signals)
-    observed = tuple(signal for signal in wanted if np.isfinite(trial.behaviour[signal]).any())
+    observed = tuple(signal for signal in wanted if np.isfinite(trial.trajectory[signal]).any())
     if not observed:
         raise TrialRefusedError(
             f"{trial.path}: {comparator} needs at least one of {', '.join(wanted)}, and the log "

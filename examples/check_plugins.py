@@ -26,8 +26,8 @@ broken = parse("break:front_left_knee", robot.anatomy)
 # First a simulation that reproduces the trial, whose distance must be 0; then real simulations.
 check_comparator(HEADING, trial, shown(prepared.request, trial))
 simulated = simulate(Simulator(robot, threads=2), prepared.request, trial, [INTACT, broken])
-check_comparator(HEADING, trial, simulated.behaviour)
-print(f"{HEADING.name}: {prepared.losses(simulated.behaviour).mean(axis=1)}")
+check_comparator(HEADING, trial, simulated.trajectory)
+print(f"{HEADING.name}: {prepared.losses(simulated.trajectory).mean(axis=1)}")
 
 check_fault_kind(GRAVITY, robot)
 print(f"{GRAVITY.name}: {len(GRAVITY.candidates(robot.anatomy))} faults that may be proposed")

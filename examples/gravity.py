@@ -10,15 +10,15 @@ from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.model_variant import ModelVariant
 
 
 class Gravity(FaultKind):
     """Another acceleration of free fall."""
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Sets the acceleration."""
-        embodiment.model.opt.gravity[2] = -fault.severity
+        variant.model.opt.gravity[2] = -fault.severity
 
 
 GRAVITY = Gravity(

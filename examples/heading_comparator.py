@@ -14,7 +14,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import ClosedLoop
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 REQUEST = ClosedLoop(record=("base_orientation",))
@@ -32,7 +32,7 @@ class Heading:
         Raises:
             InputError: The base's orientation was not observed.
         """
-        orientation = trial.behaviour["base_orientation"]
+        orientation = trial.trajectory["base_orientation"]
         observed = np.asarray(np.isfinite(orientation).all(axis=-1))
         if not observed.any():
             raise InputError(
@@ -56,7 +56,7 @@ class PreparedHeading:
     logged: tuple[FloatArray, FloatArray]
     request: ClosedLoop = REQUEST
 
-    def losses(self, simulated: Behaviour) -> FloatArray:
+    def losses(self, simulated: Trajectory) -> FloatArray:
         """Returns the loss of each observed step, ``(n, steps)``, rad."""
         x, y = forward(np.compress(self.observed, simulated["base_orientation"], axis=1))
         along, across = self.logged

@@ -92,11 +92,11 @@ def _rendered(
     with mujoco.Renderer(floor, HEIGHT, WIDTH) as renderer:
         renderer.update_scene(data, camera)
         for row, ((log, notation), colour) in enumerate(zip(lanes, colours, strict=True)):
-            moments = evenly(log.trial.behaviour.time, MOMENTS)
+            moments = evenly(log.trial.trajectory.time, MOMENTS)
             film = film_of(
                 robot,
                 parse(notation, robot.anatomy),
-                [("logged", log.trial.behaviour)],
+                [("logged", log.trial.trajectory)],
                 moments,
             )
             model = film.model

@@ -34,10 +34,10 @@ def main(folder: Path, figure: Path) -> None:
 
 def draw(axes: Axes, log: TrialLog, shade: float) -> None:
     """Draws one trial."""
-    behaviour, plan = log.trial.behaviour, log.trial.plan
-    x = behaviour["base_position"][:, 0]
+    trajectory, plan = log.trial.trajectory, log.trial.plan
+    x = trajectory["base_position"][:, 0]
     label = f"{plan.name}: {log.trial.displacement:.2f} m"
-    axes.plot(behaviour.time, x - x[0], color=COLOURS[plan.stage], alpha=shade, label=label)
+    axes.plot(trajectory.time, x - x[0], color=COLOURS[plan.stage], alpha=shade, label=label)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ def read_info(path: Path) -> Info:
     """
     contents = read_contents(path)
     log = interpret(contents)
-    behaviour = log.trial.behaviour
+    trajectory = log.trial.trajectory
     return Info(
         log=log,
         bytes=path.stat().st_size,
@@ -79,7 +79,9 @@ def read_info(path: Path) -> Info:
         attachments={name: len(data) for name, data in contents.attachments.items()},
         records=tuple(contents.metadata),
         observed={
-            signal: float(np.mean(~np.isnan(behaviour[signal]))) if behaviour[signal].size else 1.0
+            signal: float(np.mean(~np.isnan(trajectory[signal])))
+            if trajectory[signal].size
+            else 1.0
             for signal in SIGNALS
         },
         driver=log.trial.plan.controller.summary,

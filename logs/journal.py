@@ -63,7 +63,7 @@ class FolderJournal:
             read_log(path).trial for path in sorted(self.trials.glob("*.mcap"), key=trial_order)
         )
         for trial in trials:
-            if trial.behaviour.names != self.space.anatomy.names:
+            if trial.trajectory.names != self.space.anatomy.names:
                 raise SchemaMismatchError(
                     trial.path,
                     f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",

@@ -292,14 +292,14 @@ def _order(part: Part, width: int) -> Sequence[int]:
 
 
 def topics(names: Names, root: str, *, timed: bool = False) -> tuple[Topic, ...]:
-    """Returns the topics that a behaviour is read from.
+    """Returns the topics that a trajectory is read from.
 
     ``/odom`` contains the velocity of the base in the frame of the base, as its type requires.
-    Rotating back would change the last bits, so the behaviour is read from
+    Rotating back would change the last bits, so the trajectory is read from
     ``/base_linear_velocity``, which contains the velocity in the world frame.
 
     Args:
-        names: Columns of the behaviour's signals.
+        names: Columns of the trajectory's signals.
         root: Name of the root body, the child frame of ``/odom``.
         timed: Whether the robot has its own clock, and thereby the topic ``TIMING``.
     """

@@ -79,6 +79,6 @@ class TrialRunner:
             if unsafe or plan.stage == "before" or not path.exists():
                 raise
             trial = read_log(path).trial
-            if trial.behaviour.steps < MIN_STEPS:
+            if trial.trajectory.steps < MIN_STEPS:
                 raise
             return trial

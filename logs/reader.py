@@ -49,14 +49,14 @@ from selfmodel.logs.records import (
     sha256,
 )
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Names
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Timing of a trial's steps; see ``selfmodel.trials.behaviour.StepTiming``.
+    """Timing of a trial's steps; see ``selfmodel.trials.trajectory.StepTiming``.
 
     Attributes:
         elapsed: Time since the first step, ``(steps,)`` s; NaN if unknown.
@@ -75,7 +75,7 @@ class TrialLog:
     """Content of a trial log, without the hidden faults of a simulated robot.
 
     Attributes:
-        trial: Plan and observed behaviour.
+        trial: Plan and observed trajectory.
         mjcf: Model of the healthy robot, as XML. The text is untrusted: load it with
             ``selfmodel.logs.robots.robot_of``.
         assets: Files that the model may name.
@@ -113,7 +113,7 @@ def read_log(path: str | Path) -> TrialLog:
     Example:
         >>> import selfmodel
         >>> log = selfmodel.read_log("before.mcap")
-        >>> print(log.trial.plan.stage, log.trial.behaviour.steps, log.status)
+        >>> print(log.trial.plan.stage, log.trial.trajectory.steps, log.status)
         before 60 finished
 
     Args:
@@ -136,14 +136,14 @@ def interpret(contents: Contents) -> TrialLog:
             raise contents.error(what)
     mjcf = _attachment(contents, MODEL_FILE, record.model_sha256)
     controller = read_controller(contents, record)
-    behaviour = read_behaviour(contents, record, result.steps, controller)
+    trajectory = read_trajectory(contents, record, result.steps, controller)
     timing = _timing(contents, record, result.steps)
     if timing is not None:
-        behaviour = replace(behaviour, late=timing.late)
+        trajectory = replace(trajectory, late=timing.late)
     with contents.mismatch("it has no controller, and cannot be played back"):
-        driver = controller or played_back(behaviour.names.motors, behaviour["commands"])
+        driver = controller or played_back(trajectory.names.motors, trajectory["commands"])
     plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
-    trial = Trial(plan, record.robot, behaviour, str(contents.path))
+    trial = Trial(plan, record.robot, trajectory, str(contents.path))
     # Compared as text: the displacement is NaN if the base was not observed.
     if repr(result.displacement) != repr(trial.displacement):
         what = (
@@ -260,10 +260,10 @@ def read_controller(contents: Contents, record: TrialRecord) -> Controller | Non
 # ---------------------------------------------------------------- messages
 
 
-def read_behaviour(
+def read_trajectory(
     contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
-) -> Behaviour:
-    """Returns the behaviour in the messages of a log; they must have the names of a controller."""
+) -> Trajectory:
+    """Returns the trajectory in the messages of a log; they must have the names of a controller."""
     names = read_names(contents)
     ends = controller.design if controller else names
     if (names.sensors, names.motors) != (ends.sensors, ends.motors):
@@ -275,7 +275,7 @@ def read_behaviour(
     for topic in topics(names, record.root):
         parts |= _rows(contents, topic, record, steps)
     time = np.arange(steps, dtype=np.float64) * record.control_timestep
-    return Behaviour(names, frozen(time), {signal: frozen(parts[signal]) for signal in SIGNALS})
+    return Trajectory(names, frozen(time), {signal: frozen(parts[signal]) for signal in SIGNALS})
 
 
 def read_names(contents: Contents) -> Names:

@@ -42,7 +42,7 @@ def robot_of(log: TrialLog) -> Robot:
             f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}",
             good=GOOD,
         )
-    names = log.trial.behaviour.names
+    names = log.trial.trajectory.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
         what = describe_difference(robot.anatomy.names, names)
         raise SchemaMismatchError(
@@ -98,7 +98,7 @@ def _identity(log: TrialLog) -> tuple[object, ...]:
         log.mjcf,
         dict(log.assets),
         log.control_timestep,
-        log.trial.behaviour.names,
+        log.trial.trajectory.names,
     )
 
 

@@ -13,11 +13,11 @@ from selfmodel.logs.log_file import Contents, LogFile, read_undamaged
 from selfmodel.logs.messages import DESCRIPTION, TRANSFORMS, topics
 from selfmodel.logs.reader import (
     interpret,
-    read_behaviour,
     read_controller,
     read_log,
     read_names,
     read_record,
+    read_trajectory,
 )
 from selfmodel.logs.records import (
     INTERRUPTED,
@@ -30,7 +30,7 @@ from selfmodel.logs.records import (
     TrialRecord,
     texts_of,
 )
-from selfmodel.trials.behaviour import forward_displacement
+from selfmodel.trials.trajectory import forward_displacement
 
 _SEALED = "selfmodel.manifest"
 """Record of a log that version 0.1 wrote; it is not of the new log."""
@@ -92,8 +92,8 @@ def _saved(path: Path) -> tuple[Contents, Result, Salvaged]:
     record = read_record(contents)
     controller = read_controller(contents, record)
     steps = _cut(contents, record, reason)
-    behaviour = read_behaviour(contents, record, steps, controller)
-    result = Result(INTERRUPTED, steps, float(forward_displacement(behaviour)))
+    trajectory = read_trajectory(contents, record, steps, controller)
+    result = Result(INTERRUPTED, steps, float(forward_displacement(trajectory)))
     contents.metadata = {
         name: texts
         for name, texts in contents.metadata.items()

@@ -69,8 +69,8 @@ from selfmodel.physical.safety import (
     release_stop_signals,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
 from selfmodel.version import __version__
 

@@ -23,6 +23,6 @@ from .robot.robot import Robot as Robot
 from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator
 from .testing import check_comparator as check_comparator, check_fault_kind as check_fault_kind
-from .trials.behaviour import Behaviour as Behaviour
+from .trials.trajectory import Trajectory as Trajectory
 from .trials.trial import Trial as Trial
 from .version import __version__ as __version__

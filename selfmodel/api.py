@@ -57,7 +57,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.simulation.trial_replay import Replay
 from selfmodel.studies.experiment import check_motion, draw_reality
-from selfmodel.trials.behaviour import samples_of
+from selfmodel.trials.trajectory import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -159,7 +159,7 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
         >>> import selfmodel
         >>> trial = selfmodel.read_log("after.mcap").trial
         >>> log = selfmodel.write_log(trial, "copy.mcap", "quadruped")
-        >>> selfmodel.read_log(log).trial.behaviour.steps
+        >>> selfmodel.read_log(log).trial.trajectory.steps
         60
 
     Args:
@@ -175,7 +175,7 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
         Path(path),
         robot_of(robot),
         trial.plan,
-        samples_of(trial.behaviour),
+        samples_of(trial.trajectory),
         TrialHeader(Settings()),
     )
 

@@ -14,13 +14,13 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 DEPENDS_ON_BATCH = (
@@ -29,7 +29,7 @@ DEPENDS_ON_BATCH = (
 )
 
 
-def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour) -> None:
+def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory) -> None:
     """Checks that a comparator fulfils ``Comparator``, and its trials ``PreparedTrial``.
 
     If the prepared trial has losses, they and their parts are checked too.
@@ -43,7 +43,7 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
         >>> trial = selfmodel.run_trial(physical, walk, "checked.mcap", robot=robot, steps=20)
         >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
         >>> runs = [(selfmodel.Hypothesis(), walk), (damaged, walk)]
-        >>> simulated = selfmodel.Simulator(robot).run(runs, 20, ["base_position"]).behaviour
+        >>> simulated = selfmodel.Simulator(robot).run(runs, 20, ["base_position"]).trajectory
         >>> selfmodel.check_comparator(FORWARD_DISPLACEMENT, trial, simulated)
 
     Args:
@@ -60,7 +60,7 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
     """
     if not comparator.name or comparator.name != comparator.name.strip():
         raise ValueError(f"a comparator needs a name, got {comparator.name!r}")
-    logged = _copied(trial.behaviour)
+    logged = _copied(trial.trajectory)
     prepared, again = comparator.prepare(trial), comparator.prepare(trial)
     for one in (prepared, again):
         if not isinstance(one, PreparedTrial | PiecewiseTrial):
@@ -77,14 +77,14 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Behaviour)
     _check_comparison(prepared, again, requested)
     if not _is_same(before, requested):
         raise ValueError("a comparator must not change its arguments")
-    if not _is_same(logged, trial.behaviour):
+    if not _is_same(logged, trial.trajectory):
         raise ValueError("a comparator must not change the trial")
 
 
 def _check_comparison(
     prepared: PreparedTrial | PiecewiseTrial,
     again: PreparedTrial | PiecewiseTrial,
-    simulated: Behaviour,
+    simulated: Trajectory,
 ) -> None:
     """Checks the numbers of a comparison, and that they depend on the trial and each run alone."""
     runs = len(simulated[prepared.request.record[0]])
@@ -101,7 +101,9 @@ def _check_comparison(
                 raise ValueError(f"the {what} of run {run} {DEPENDS_ON_BATCH}")
 
 
-def _parts(prepared: PreparedTrial | PiecewiseTrial, simulated: Behaviour) -> dict[str, FloatArray]:
+def _parts(
+    prepared: PreparedTrial | PiecewiseTrial, simulated: Trajectory
+) -> dict[str, FloatArray]:
     """Returns everything that a comparison returns, by its name."""
     if not isinstance(prepared, PiecewiseTrial):
         return {"distances": np.asarray(prepared.distances(simulated))}
@@ -126,7 +128,7 @@ def _check_numbers(what: str, values: FloatArray, runs: int) -> None:
         raise ValueError(f"{what} of a run that reproduces the trial must be 0, got {values[0]}")
 
 
-def shown(request: Request, trial: Trial) -> Behaviour:
+def shown(request: Request, trial: Trial) -> Trajectory:
     """Returns a simulation that reproduces a trial to the bit.
 
     A real simulation of segments differs by about 1e-9 even for the true hypothesis, because the
@@ -140,15 +142,15 @@ def shown(request: Request, trial: Trial) -> Behaviour:
     Returns:
         The requested signals, with a leading axis of one run.
     """
-    behaviour, time = trial.behaviour, trial.behaviour.time
-    rows: IndexArray = np.arange(behaviour.steps)
+    trajectory, time = trial.trajectory, trial.trajectory.time
+    rows: IndexArray = np.arange(trajectory.steps)
     if isinstance(request, Segments):
         rows = request.starts[:, np.newaxis] + np.arange(request.horizon + 1)
         time = time[: request.horizon + 1]
     elif isinstance(request, Ensemble):
         rows = np.tile(rows, (request.members, 1))
-    signals = {signal: behaviour[signal][rows][np.newaxis] for signal in request.record}
-    return Behaviour(behaviour.names, time, signals)
+    signals = {signal: trajectory[signal][rows][np.newaxis] for signal in request.record}
+    return Trajectory(trajectory.names, time, signals)
 
 
 def _check_request(request: Request, trial: Trial) -> None:
@@ -172,14 +174,14 @@ def _check_request(request: Request, trial: Trial) -> None:
 
 
 def _check_segments(request: Segments, trial: Trial) -> None:
-    behaviour, starts, horizon = trial.behaviour, request.starts, request.horizon
-    names, expected = behaviour.names, behaviour["commands"].shape
+    trajectory, starts, horizon = trial.trajectory, request.starts, request.horizon
+    names, expected = trajectory.names, trajectory["commands"].shape
     if request.commands.shape != expected:
         raise ValueError(
             f"the commands of segments must be those of the trial, of shape (steps, motors) = "
             f"{expected}, got {request.commands.shape}"
         )
-    last = behaviour.steps - 1 - horizon
+    last = trajectory.steps - 1 - horizon
     if horizon < 1 or not starts.size or not ((starts >= 0) & (starts <= last)).all():
         raise ValueError(
             f"segments need a horizon of at least 1 step, got {horizon}, and at least one start, "
@@ -215,13 +217,13 @@ def _is_same_request(one: Request, other: Request) -> bool:
     return one == other
 
 
-def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behaviour:
+def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Trajectory:
     """Returns the requested signals of a simulation, after a check of their shapes."""
-    lengths: tuple[int, ...] = (trial.behaviour.steps,)
+    lengths: tuple[int, ...] = (trial.trajectory.steps,)
     if isinstance(request, Segments):
         lengths = (len(request.starts), request.horizon + 1)
     elif isinstance(request, Ensemble):
-        lengths = (request.members, trial.behaviour.steps)
+        lengths = (request.members, trial.trajectory.steps)
     for signal in request.record:
         if simulated[signal].shape[1:-1] != lengths:
             raise ValueError(
@@ -232,19 +234,19 @@ def _as_requested(request: Request, trial: Trial, simulated: Behaviour) -> Behav
     return replace(simulated, signals=signals)
 
 
-def _copied(behaviour: Behaviour) -> Behaviour:
-    signals = {signal: values.copy() for signal, values in behaviour.signals.items()}
-    return replace(behaviour, signals=signals)
+def _copied(trajectory: Trajectory) -> Trajectory:
+    signals = {signal: values.copy() for signal, values in trajectory.signals.items()}
+    return replace(trajectory, signals=signals)
 
 
-def _is_same(one: Behaviour, other: Behaviour) -> bool:
+def _is_same(one: Trajectory, other: Trajectory) -> bool:
     return all(
         np.array_equal(values, other[signal], equal_nan=True)
         for signal, values in one.signals.items()
     )
 
 
-def _only(simulated: Behaviour, run: int) -> Behaviour:
+def _only(simulated: Trajectory, run: int) -> Trajectory:
     return replace(
         simulated,
         signals={signal: values[run : run + 1] for signal, values in simulated.signals.items()},
@@ -333,7 +335,7 @@ def _check_edits(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -
             raise ValueError(f"{fault} does not make the same robot every time")
         changed |= built != nominal
     if _saved(robot.model) != before:
-        raise ValueError(f"{kind.name} changes the robot itself instead of its embodiment")
+        raise ValueError(f"{kind.name} changes the robot itself instead of its variant")
     if not changed:
         raise ValueError(f"{kind.name} changes nothing about a robot")
 
@@ -350,7 +352,7 @@ def _check_batch(kind: FaultKind, robot: Robot) -> None:
     for row, run in enumerate(runs):
         alone = simulator.run([run], BATCH_STEPS, SIGNALS)
         if any(
-            not np.array_equal(alone.behaviour[signal][0], together.behaviour[signal][row])
+            not np.array_equal(alone.trajectory[signal][0], together.trajectory[signal][row])
             for signal in SIGNALS
         ):
             raise ValueError(f"a robot with {run[0]} moves differently in a batch and alone")
@@ -383,10 +385,10 @@ def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot:
     controller = Controller(network, np.linspace(-1, 1, network.weights))
     hypotheses = [Hypothesis((fault,)) for fault in candidates]
     runs = [(hypothesis, controller) for hypothesis in hypotheses]
-    simulated = Simulator(robot, 1).run(runs, BATCH_STEPS, SIGNALS).behaviour
+    simulated = Simulator(robot, 1).run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, fault in enumerate(candidates):
         signals = {signal: values[row] for signal, values in simulated.signals.items()}
-        log = Behaviour(simulated.names, simulated.time, signals)
+        log = Trajectory(simulated.names, simulated.time, signals)
         mask = kind.contradicted(fault, log)
         if np.shape(mask) != (BATCH_STEPS,) or np.asarray(mask).dtype != np.bool_:
             raise ValueError(f"{kind.name} must return a mask of the {BATCH_STEPS} steps of a log")
@@ -394,12 +396,12 @@ def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot:
             raise ValueError(f"the log of a robot with {fault} contradicts the fault")
 
 
-def _contents(embodiment: Embodiment) -> tuple[bytes, ...]:
-    own = embodiment
+def _contents(variant: ModelVariant) -> tuple[bytes, ...]:
+    own = variant
     parts = (own.gain, own.offset, own.bias, own.noise, own.added_delay, own.encoder_offset)
     return (
-        _saved(embodiment.model),
-        str(sorted(embodiment.silent_neurons)).encode(),
+        _saved(variant.model),
+        str(sorted(variant.silent_neurons)).encode(),
         *(part.tobytes() for part in parts),
     )
 

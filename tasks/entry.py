@@ -13,7 +13,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.contacts import reaches_ground
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour, forward_displacement
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 
 if TYPE_CHECKING:
     from dm_control.rl import control
@@ -67,8 +67,8 @@ def _robot(name: str) -> Robot:
     return Robot(name=name, mjcf=mjcf, control_timestep=CONTROL_TIMESTEP)
 
 
-def _speeds(robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-    return forward_displacement(behaviour) / robot.control_timestep
+def _speeds(robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    return forward_displacement(trajectory) / robot.control_timestep
 
 
 WALKING_RETURN = Score("return", ("base_position",), _speeds)

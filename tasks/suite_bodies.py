@@ -19,11 +19,11 @@ from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.anatomy import added_steps
-from selfmodel.robot.embodiment import Embodiment
 from selfmodel.robot.mjcf.load import adapt_text, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.untrusted import InMemory, parse_xml
 from selfmodel.robot.mjcf.work import read_mjcf
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import loading_a_model
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import (
@@ -35,8 +35,8 @@ from selfmodel.robot.state import (
 )
 from selfmodel.simulation.prediction import activations
 from selfmodel.tasks.entry import Entry
-from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Sample, Trajectory
 
 if TYPE_CHECKING:
     from dm_control.mujoco import Physics
@@ -191,15 +191,15 @@ class SuiteRobot:
     """
 
     def __init__(self, domain: str, task: str, robot: Robot, hidden: Hypothesis) -> None:
-        embodiment = build(robot, hidden, OWN_SEED)
+        variant = build(robot, hidden, OWN_SEED)
         physics, rewarding = episode_parts(domain, task)
-        stepped = _Stepped(rewarding, robot, embodiment)
+        stepped = _Stepped(rewarding, robot, variant)
         control = importlib.import_module("dm_control.rl.control")
-        env = control.Environment(physics(embodiment.model), stepped, n_sub_steps=robot.substeps)
+        env = control.Environment(physics(variant.model), stepped, n_sub_steps=robot.substeps)
         self.returns = stepped.returns
         # A simulation needs no stop command, whose step would add a reward.
         self._robot = EnvironmentRobot(
-            env, robot, stop=lambda: None, silent_neurons=embodiment.silent_neurons
+            env, robot, stop=lambda: None, silent_neurons=variant.silent_neurons
         )
         self.clock = self._robot.clock
 
@@ -214,13 +214,13 @@ class _Stepped:
     Args:
         task: The suite's task after one reset; all other attributes are delegated to it.
         robot: The healthy robot.
-        embodiment: The robot with its faults.
+        variant: The robot with its faults.
     """
 
-    def __init__(self, task: "Task", robot: Robot, embodiment: Embodiment) -> None:
+    def __init__(self, task: "Task", robot: Robot, variant: ModelVariant) -> None:
         self._task = task
-        self._robot, self._embodiment = robot, embodiment
-        joints = observed_fields(robot, [embodiment])["joint_positions"]
+        self._robot, self._variant = robot, variant
+        joints = observed_fields(robot, [variant])["joint_positions"]
         self._fields = {**signal_fields(robot), "joint_positions": joints}
         self.returns: list[float] = []
 
@@ -229,10 +229,10 @@ class _Stepped:
 
     def initialize_episode(self, _physics: "Physics") -> None:
         """Keeps the pose of the physics' reset and starts a new return."""
-        self._reader = SensorReader(self._embodiment.model, self._robot.anatomy, [self._embodiment])
+        self._reader = SensorReader(self._variant.model, self._robot.anatomy, [self._variant])
         self.returns.append(0.0)
-        delay = added_steps(self._robot.control_delay, float(self._embodiment.added_delay[0]))
-        self._delayed = deque(np.zeros((delay, self._embodiment.model.nu)))
+        delay = added_steps(self._robot.control_delay, float(self._variant.added_delay[0]))
+        self._delayed = deque(np.zeros((delay, self._variant.model.nu)))
 
     def before_step(self, action: FloatArray, physics: "Physics") -> None:
         """Applies the commands of some control steps ago."""
@@ -284,21 +284,21 @@ def episode_return(domain: str, task: str) -> Score:
     uses the forces one physics step earlier.
     """
 
-    def of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+    def of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
         make, rewarding = episode_parts(domain, task)
         physics = make(build(robot, hypothesis).model)
-        runs = range(len(behaviour["commands"]))
-        return np.array([_sum(robot, physics, rewarding, behaviour, run) for run in runs])
+        runs = range(len(trajectory["commands"]))
+        return np.array([_sum(robot, physics, rewarding, trajectory, run) for run in runs])
 
     return Score("return", (*STATE, "commands"), of)
 
 
-def _sum(robot: Robot, physics: "Physics", task: "Task", behaviour: Behaviour, run: int) -> float:
+def _sum(robot: Robot, physics: "Physics", task: "Task", trajectory: Trajectory, run: int) -> float:
     physics.reset()  # resets the solver's warm start too
-    model, data, commands = physics.model, physics.data, behaviour["commands"][run]
+    model, data, commands = physics.model, physics.data, trajectory["commands"][run]
     fields = {"qpos": np.zeros((len(commands), model.nq))}
     fields["qvel"] = np.zeros((len(commands), model.nv))
-    state_writer(robot, fields.__getitem__)({signal: behaviour[signal][run] for signal in STATE})
+    state_writer(robot, fields.__getitem__)({signal: trajectory[signal][run] for signal in STATE})
     activation = activations(robot, commands)
     total = 0.0
     for k in range(1, len(commands)):

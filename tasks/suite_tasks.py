@@ -16,7 +16,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.sensors import SILENT_NEURON
 from selfmodel.robot.anatomy import Anatomy, added_steps
 from selfmodel.robot.anatomy_reader import read_anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.simulation.domain import randomize_joint_angles, start_spread
 from selfmodel.simulation.reality_gap import draw_gap_of, perturbed_model
@@ -122,14 +122,14 @@ def environment(
     seed = int(construction.integers(2**32))
     model = _compiled(domain, task, env.physics.model.ptr, hypothesis, seed)
     with loading_a_model():
-        embodiment = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
-    delay = drawn.delay + added_steps(0, float(embodiment.added_delay[0]))
+        variant = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
+    delay = drawn.delay + added_steps(0, float(variant.added_delay[0]))
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
     extra.pop("n_sub_steps", None)  # is in the control time step of the suite's environment
     constructor = importlib.import_module("dm_control.rl.control").Environment
     return constructor(
-        type(env.physics).from_model(wrapper.MjModel(embodiment.model)),
-        DamagedTask(env.task, embodiment, anatomy, delay, start),
+        type(env.physics).from_model(wrapper.MjModel(variant.model)),
+        DamagedTask(env.task, variant, anatomy, delay, start),
         **{
             "time_limit": _default_time_limit(domain, task),
             **limit,
@@ -198,17 +198,17 @@ class DamagedTask:
 
     Args:
         task: The suite's task; all other attributes are delegated to it.
-        embodiment: The body with its faults.
+        variant: The body with its faults.
         anatomy: Parts of the body.
         delay: Control delay, control steps.
         start: Noise of the initial joint angles, as a gap level.
     """
 
     def __init__(
-        self, task: "Task", embodiment: Embodiment, anatomy: Anatomy, delay: int, start: float
+        self, task: "Task", variant: ModelVariant, anatomy: Anatomy, delay: int, start: float
     ) -> None:
         self._task = task
-        self._embodiment, self._anatomy = embodiment, anatomy
+        self._variant, self._anatomy = variant, anatomy
         self._delay, self._start = delay, start
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
@@ -243,7 +243,7 @@ class DamagedTask:
             rng = np.random.default_rng(next_seed(self._task.random))
             spread = start_spread(self._start)
             randomize_joint_angles(self._anatomy, model, data, spread.angles, rng)
-        for position, velocity, angle in self._embodiment.welded:
+        for position, velocity, angle in self._variant.welded:
             data.qpos[position], data.qvel[velocity] = angle, 0.0
         self._delayed = deque(np.zeros((self._delay, model.nu)))
 

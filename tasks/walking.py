@@ -19,11 +19,11 @@ from selfmodel.physical.simulated import (
     NoisyMeasurement,
     detached_limbs,
     draw_gap,
-    physical_embodiment,
+    physical_variant,
     place_debris,
 )
 from selfmodel.robot.anatomy import CONTROL_DELAY, added_steps, split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, current_value, observed_fields
 from selfmodel.simulation.domain import randomize_initial_pose, start_spread
@@ -94,12 +94,12 @@ def environment(
     drawn = draw_gap(robot, gap, construction)
     own = drawn if gap > 0 else None
     seed = int(construction.integers(2**32))
-    embodiment = physical_embodiment(robot, hypothesis, seed, own)
+    variant = physical_variant(robot, hypothesis, seed, own)
     limbs = () if own is None else detached_limbs(robot, hypothesis)
     start = start_level(start_noise, gap)
     return control.Environment(
-        mujoco.Physics.from_model(core.MjModel(embodiment.model)),
-        Walk(robot, embodiment, episodes, gap=own, limbs=limbs, start=start),
+        mujoco.Physics.from_model(core.MjModel(variant.model)),
+        Walk(robot, variant, episodes, gap=own, limbs=limbs, start=start),
         time_limit=time_limit,
         control_timestep=robot.control_timestep,
         **(environment_kwargs or {}),
@@ -134,7 +134,7 @@ class Walk(base.Task):
 
     Args:
         robot: The healthy robot.
-        embodiment: The robot with its faults and its gap.
+        variant: The robot with its faults and its gap.
         random: Generator of the episodes.
         gap: Reality gap, for its delay and its measurement noise; None for no gap.
         limbs: Root body of each detached limb that the model has debris of.
@@ -144,7 +144,7 @@ class Walk(base.Task):
     def __init__(
         self,
         robot: Robot,
-        embodiment: Embodiment,
+        variant: ModelVariant,
         random: np.random.RandomState,
         *,
         gap: RealityGap | None,
@@ -152,23 +152,23 @@ class Walk(base.Task):
         start: float,
     ) -> None:
         super().__init__(random=random)
-        self._robot, self._embodiment = robot, embodiment
+        self._robot, self._variant = robot, variant
         self._gap, self._limbs, self._start_level = gap, limbs, start
-        self._fields = observed_fields(robot, [embodiment])
+        self._fields = observed_fields(robot, [variant])
         self._start = self._end = 0.0
         self._begin(np.random.default_rng(0))  # for the specs, before the first episode
 
     def _begin(self, rng: np.random.Generator) -> None:
         """Starts the random number streams and the delay line of an episode."""
-        embodiment = dataclasses.replace(self._embodiment, seed=int(rng.integers(2**32)))
-        self._reader = SensorReader(embodiment.model, self._robot.anatomy, [embodiment])
+        variant = dataclasses.replace(self._variant, seed=int(rng.integers(2**32)))
+        self._reader = SensorReader(variant.model, self._robot.anatomy, [variant])
         self._measurement = Measurement()
         delay = int(self._robot.control_delay)
-        delay += added_steps(delay, float(embodiment.added_delay[0]))
+        delay += added_steps(delay, float(variant.added_delay[0]))
         if self._gap is not None:
-            self._measurement = NoisyMeasurement(self._gap.level, self._robot, embodiment, rng)
+            self._measurement = NoisyMeasurement(self._gap.level, self._robot, variant, rng)
             delay += self._gap.delay
-        self._delayed = deque(np.zeros((delay, embodiment.model.nu)))
+        self._delayed = deque(np.zeros((delay, variant.model.nu)))
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Sets the initial pose, with its noise, and the position for the reward."""

@@ -183,10 +183,10 @@ def test_a_replay_of_wrong_notation_is_refused():
 def blind() -> Trial:
     """A failing trial without the base's position."""
     trial = selfmodel.read_log(AFTER).trial
-    run = trial.behaviour
+    run = trial.trajectory
     lost = {"base_position": np.full_like(run["base_position"], np.nan)}
-    behaviour = dataclasses.replace(run, signals={**run.signals, **lost})
-    return dataclasses.replace(trial, behaviour=behaviour)
+    trajectory = dataclasses.replace(run, signals={**run.signals, **lost})
+    return dataclasses.replace(trial, trajectory=trajectory)
 
 
 def test_a_comparator_that_cannot_judge_is_refused_before_the_calibration(

@@ -88,7 +88,7 @@ def test_a_name_that_two_packages_define_is_refused(tmp_path: Path):
 def test_a_plug_in_of_version_0_1_is_refused_with_the_place_of_the_new_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    (tmp_path / "old_plug_in.py").write_text("from selfmodel.behaviour import Behaviour\n")
+    (tmp_path / "old_plug_in.py").write_text("from selfmodel.trajectory import Trajectory\n")
     monkeypatch.syspath_prepend(str(tmp_path))
 
     with pytest.raises(InputError, match=r"written for selfmodel 0\.1, whose modules have moved"):
@@ -111,6 +111,6 @@ WRONG = replace(DISPLACEMENT, record=("base_pos",))
     run = Simulator(quadruped, 1).run(runs, 3, found.record)
 
     with pytest.raises(InputError, match="score 'score_module:MINE': expected one number"):
-        found.of(quadruped, INTACT, run.behaviour)
+        found.of(quadruped, INTACT, run.trajectory)
     with pytest.raises(InputError, match="score 'score_module:WRONG' has record="):
         plugins.score("score_module:WRONG", "quadruped", entry)

@@ -19,7 +19,7 @@ FACES = [folder for folder in FACES if "lazy_loader" in (folder / "__init__.py")
 PUBLIC = {
     *("load_robot", "Robot", "Hypothesis", "FaultKind", "ALL_KINDS", "PAPER_KINDS"),
     *("parse_hypothesis", "Simulator", "simulated_robot", "EnvironmentRobot", "PhysicalRobot"),
-    *("Controller", "Trial", "Behaviour", "evolve_controller", "run_trial", "read_log"),
+    *("Controller", "Trial", "Trajectory", "evolve_controller", "run_trial", "read_log"),
     "write_log",
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "__version__"),

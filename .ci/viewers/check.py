@@ -69,19 +69,19 @@ def rerun(log: Path) -> str:
     if not rows:
         raise ProofError("expected Scalars at /joint_states/position, got none")
     try:
-        behaviour = read_log(log).trial.behaviour
+        trajectory = read_log(log).trial.trajectory
     except (InputError, LogError) as error:
         raise ProofError(f"there is nothing to compare with: {error}") from error
-    if len(rows) != behaviour.steps:
-        raise ProofError(f"expected {behaviour.steps} rows of positions, got {len(rows)}")
-    expected = list(behaviour.names.hinges)
+    if len(rows) != trajectory.steps:
+        raise ProofError(f"expected {trajectory.steps} rows of positions, got {len(rows)}")
+    expected = list(trajectory.names.hinges)
     strange = [row["names"] for row in rows if row["names"] != expected]
     if strange:
         raise ProofError(f"expected series named {expected}, got {strange[0]}")
-    if [row["time"] for row in rows] != np.rint(behaviour.time * 1e9).astype(int).tolist():
+    if [row["time"] for row in rows] != np.rint(trajectory.time * 1e9).astype(int).tolist():
         raise ProofError("the rows' times are not those of the log")
     shown = np.array([row["numbers"] for row in rows])
-    if not np.array_equal(shown, behaviour.signals["joint_positions"], equal_nan=True):
+    if not np.array_equal(shown, trajectory.signals["joint_positions"], equal_nan=True):
         raise ProofError("the numbers at /joint_states/position are not those of the log")
     return f"{len(rows)} rows of {len(expected)} joint positions as Scalars, equal to the log's"
 

@@ -32,8 +32,8 @@ from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.recoveries import bank_gait
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import BASE
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
 RESULTS = Path(__file__).with_name("calibration.json")
@@ -148,8 +148,8 @@ def _against_truth(
 
 def _trial(robot: Robot, physical: SimulatedRobot, driver: Controller) -> Trial:
     steps = Settings().steps
-    behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
-    return Trial(TrialPlan("trial", "before", driver, steps, 0), robot.name, behaviour, "a trial")
+    trajectory = collect(robot.anatomy.names, physical.run(driver, steps))
+    return Trial(TrialPlan("trial", "before", driver, steps, 0), robot.name, trajectory, "a trial")
 
 
 def _gait(robot: Robot, number: int, bank: Path | None) -> Controller:
@@ -177,10 +177,10 @@ def table(rows: Sequence[Facts]) -> str:
 
 def without_base(trial: Trial) -> Trial:
     """Returns the trial without the base's position and linear velocity."""
-    run = trial.behaviour
+    run = trial.trajectory
     forgotten = {signal: np.full_like(run[signal], np.nan) for signal in BASE}
-    behaviour = dataclasses.replace(run, signals={**run.signals, **forgotten})
-    return dataclasses.replace(trial, behaviour=behaviour)
+    trajectory = dataclasses.replace(run, signals={**run.signals, **forgotten})
+    return dataclasses.replace(trial, trajectory=trajectory)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.scaling import scale_contacts
 from selfmodel.studies.recoveries import bank_gait
-from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial
 
 MAX_DELAY = 2

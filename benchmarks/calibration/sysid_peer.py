@@ -82,11 +82,11 @@ def _sequences(robot: Robot, trials: Sequence[Trial], delay: int) -> Theirs:
     """Returns every segment as a sequence: from a logged state, under the delayed commands."""
     states, controls, observed = [], [], []
     for trial in trials:
-        estimated = estimated_states(trial.behaviour)
+        estimated = estimated_states(trial.trajectory)
         vectors = _vectors(robot, estimated)
-        last = trial.behaviour.steps - 1 - HORIZON
+        last = trial.trajectory.steps - 1 - HORIZON
         for k in np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(int)):
-            commands = trial.behaviour["commands"][k - delay : k - delay + HORIZON]
+            commands = trial.trajectory["commands"][k - delay : k - delay + HORIZON]
             # A last row that sysid drops.
             rows = np.concatenate([np.repeat(commands, robot.substeps, axis=0), commands[-1:]])
             states.append(

@@ -20,8 +20,8 @@ from selfmodel.robot.anatomy import split_delay
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 
 SAMPLE = Path(__file__).parents[3] / "shared" / "samples" / "go2-stand"
@@ -64,7 +64,7 @@ def trial_of(
     return Trial(
         TrialPlan("go2", "single", controller, steps, 0),
         robot.name,
-        Behaviour(names, time, signals),
+        Trajectory(names, time, signals),
         f"go2-{first}-{last}",
     )
 
@@ -103,8 +103,8 @@ def with_fault(
     the measured positions: what the model does not explain remains in the trial.
     """
     change = simulated(robot, positions, commands, fault) - simulated(robot, positions, commands)
-    behaviour = trial.behaviour
-    signals = {**behaviour.signals, "joint_positions": positions + change}
+    trajectory = trial.trajectory
+    signals = {**trajectory.signals, "joint_positions": positions + change}
     return replace(
-        trial, behaviour=replace(behaviour, signals=signals), path=f"{trial.path} with {fault}"
+        trial, trajectory=replace(trajectory, signals=signals), path=f"{trial.path} with {fault}"
     )

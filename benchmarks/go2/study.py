@@ -156,7 +156,7 @@ def injected_faults(
         for torque in TORQUES:
             fault = Hypothesis((Fault(WEAK_MOTOR, joint.name, torque),))
             damaged = with_fault(whole, robot, positions, commands, fault)
-            trial = trial_of(robot, damaged.behaviour["joint_positions"], commands, *part)
+            trial = trial_of(robot, damaged.trajectory["joint_positions"], commands, *part)
             simulator = Simulator(robot, threads)
             rough = LossTable(simulator, COMPARATOR.surrogate).losses(singles, [trial])
             few = [singles[i] for i in np.argsort(rough.mean(axis=1), kind="stable")[:SHORTLIST]]

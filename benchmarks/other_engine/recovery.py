@@ -25,7 +25,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import is_correct
 from selfmodel.studies.statistics import proportion
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import collect, forward_displacement
+from selfmodel.trials.trajectory import collect, forward_displacement
 from selfmodel.version import __version__
 
 Row = dict[str, Any]
@@ -102,7 +102,9 @@ def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) ->
                 "hypothesis": str(tried),
                 "displacement": trial.displacement,
                 "simulated": simulated,
-                "upright": bool(falls_of(robot, INTACT, trial.behaviour) == trial.behaviour.steps),
+                "upright": bool(
+                    falls_of(robot, INTACT, trial.trajectory) == trial.trajectory.steps
+                ),
             }
             for trial, tried, simulated in trials
         ],
@@ -122,7 +124,7 @@ def _simulated(recovery: Recovery, nominal: Simulator) -> Iterator[float | None]
         runs = [(tried, trial.plan.controller)]
         result = simulator.run(runs, trial.plan.steps, ("base_position",))
         lost = trial.plan.stage == "after" or bool(result.diverged[0])
-        yield None if lost else float(forward_displacement(result.behaviour)[0])
+        yield None if lost else float(forward_displacement(result.trajectory)[0])
 
 
 def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) -> Iterator[str]:
@@ -142,7 +144,7 @@ def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) ->
         result = Simulator(robot, threads=1).run(
             [(INTACT, gait)], Settings().steps, ("base_position",)
         )
-        found = [forward_displacement(result.behaviour)[0]]
+        found = [forward_displacement(result.trajectory)[0]]
         found += [_in_bullet(robot, gait, reality) for reality in realities]
         yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
 

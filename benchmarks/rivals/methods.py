@@ -18,7 +18,7 @@ from selfmodel.recovery.repertoire import Evaluate, Repertoire
 from selfmodel.recovery.scores import first_falls, held_at_the_end
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample, collect
+from selfmodel.trials.trajectory import Sample, collect
 
 FINALISTS, RUNS = 5, 5
 """Best controllers of each search of the oracle, and further runs of each of them: a single noisy

@@ -38,9 +38,9 @@ from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Behaviour, samples_of
 from selfmodel.trials.rotation import rotated
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, samples_of
 from selfmodel.trials.trial import TrialPlan
 
 MAX_STEPS = 100_000
@@ -55,7 +55,7 @@ class ImportedTrial:
     """Trial in a recording, resampled at the control steps.
 
     Attributes:
-        behaviour: Behaviour at the control steps; NaN where not observed.
+        trajectory: Trajectory at the control steps; NaN where not observed.
         qualities: Recording quality by topic.
         digests: SHA-256 of the recording's files by name.
         clock: Clock of the times: ``header``, ``log`` or ``column``.
@@ -63,7 +63,7 @@ class ImportedTrial:
         notes: Warnings for the user, one sentence each.
     """
 
-    behaviour: Behaviour
+    trajectory: Trajectory
     qualities: Mapping[str, Quality]
     digests: Mapping[str, str]
     clock: str
@@ -75,7 +75,7 @@ class ImportedTrial:
         """Fraction of observed values by signal."""
         return {
             signal: float(np.mean(np.isfinite(values)))
-            for signal, values in self.behaviour.signals.items()
+            for signal, values in self.trajectory.signals.items()
         }
 
     def facts(self) -> dict[str, str]:
@@ -115,7 +115,7 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
     except ValueError as error:
         raise mapping.error(("start",), f"{error}: set another start") from error
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
-    behaviour = Behaviour(
+    trajectory = Trajectory(
         robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
     )
     roles: dict[str, dict[str, None]] = {}
@@ -126,8 +126,8 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
         topic: quality(recording.series[topic], clocks[topic], origin, tuple(names))
         for topic, names in roles.items()
     }
-    warnings = notes(mapping.trial, behaviour, qualities, robot)
-    return ImportedTrial(behaviour, qualities, recording.digests, clock, origin, warnings)
+    warnings = notes(mapping.trial, trajectory, qualities, robot)
+    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, warnings)
 
 
 def write_recording(
@@ -150,13 +150,13 @@ def write_recording(
         InputError: The file exists, or the controller does not fit the robot.
         LogWriteError: The disk is full, or failed.
     """
-    behaviour = recording.behaviour
-    driver = controller or Playback(robot.anatomy.motors, behaviour["commands"])
+    trajectory = recording.trajectory
+    driver = controller or Playback(robot.anatomy.motors, trajectory["commands"])
     return write_trial(
         path,
         robot,
-        TrialPlan("imported", mapping.trial.stage, driver, behaviour.steps, seed=0),
-        samples_of(behaviour),
+        TrialPlan("imported", mapping.trial.stage, driver, trajectory.steps, seed=0),
+        samples_of(trajectory),
         TrialHeader(Settings(), imported=Imported(recording.facts(), mapping.text)),
     )
 

@@ -10,7 +10,7 @@ from selfmodel.logs.recordings.mapping import NONE, Trial
 from selfmodel.logs.recordings.recording import Series
 from selfmodel.logs.recordings.resample import MAX_PERIOD_RATIO, Clocked
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 MAX_INITIAL_DIFFERENCE = 0.1
 """Difference from the model's initial pose above which a joint is listed, rad."""
@@ -102,22 +102,22 @@ def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...])
 
 
 def notes(
-    trial: Trial, behaviour: Behaviour, qualities: Mapping[str, Quality], robot: Robot
+    trial: Trial, trajectory: Trajectory, qualities: Mapping[str, Quality], robot: Robot
 ) -> tuple[str, ...]:
     """Returns the warnings, one sentence each, most important first."""
     return (
-        *_pose(behaviour, robot),
-        *_of_topics(trial, behaviour, qualities),
-        *_unobserved(trial, behaviour),
+        *_pose(trajectory, robot),
+        *_of_topics(trial, trajectory, qualities),
+        *_unobserved(trial, trajectory),
     )
 
 
-def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
-    start = [robot.model.joint(name).qpos0[0] for name in behaviour.names.hinges]
-    apart = np.abs(behaviour["joint_positions"][0] - start)
+def _pose(trajectory: Trajectory, robot: Robot) -> Iterator[str]:
+    start = [robot.model.joint(name).qpos0[0] for name in trajectory.names.hinges]
+    apart = np.abs(trajectory["joint_positions"][0] - start)
     far = [
         f"{name} {difference:.2f}"
-        for name, difference in zip(behaviour.names.hinges, apart, strict=True)
+        for name, difference in zip(trajectory.names.hinges, apart, strict=True)
         if difference > MAX_INITIAL_DIFFERENCE
     ]
     if far:
@@ -125,7 +125,7 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
             f"at the start these joints are far from the model's start pose, from which every "
             f"simulation begins (rad): {', '.join(far)}"
         )
-    x = behaviour["base_position"][:, 0]
+    x = trajectory["base_position"][:, 0]
     if np.isnan(x).all():
         yield "where the base was is not known, so this trial says nothing of displacement"
     elif np.isnan(x[[0, -1]]).any():
@@ -136,7 +136,7 @@ def _pose(behaviour: Behaviour, robot: Robot) -> Iterator[str]:
 
 
 def _of_topics(
-    trial: Trial, behaviour: Behaviour, qualities: Mapping[str, Quality]
+    trial: Trial, trajectory: Trajectory, qualities: Mapping[str, Quality]
 ) -> Iterator[str]:
     if trial.time is None and trial.clock == "log":
         yield 'all times are log times, as clock = "log" says: latency is part of them'
@@ -148,7 +148,7 @@ def _of_topics(
                     f"and go by log time, latency included"
                 )
     for topic, found in qualities.items():
-        yield from _gaps(topic, behaviour, found)
+        yield from _gaps(topic, trajectory, found)
     for topic, found in qualities.items():
         reasons = [f"{count} {reason}" for reason, count in found.refused.items()]
         if found.repeated:
@@ -161,8 +161,8 @@ def _of_topics(
             yield f"{topic}: {found.reordered} messages came out of order and were sorted"
 
 
-def _gaps(topic: str, behaviour: Behaviour, found: Quality) -> Iterator[str]:
-    end = float(behaviour.time[-1])
+def _gaps(topic: str, trajectory: Trajectory, found: Quality) -> Iterator[str]:
+    end = float(trajectory.time[-1])
     within = [gap for gap in found.gaps if gap.start < end and gap.start + gap.length > 0]
     if not within or found.roles == ("commands",):  # a command is held until the next
         return
@@ -172,30 +172,30 @@ def _gaps(topic: str, behaviour: Behaviour, found: Quality) -> Iterator[str]:
     if len(within) > MAX_GAPS_IN_NOTES:
         listed.append(f"{len(within) - MAX_GAPS_IN_NOTES} more")
     starts, lengths = np.array(within).T
-    first = np.searchsorted(behaviour.time, starts, side="right")
-    last = np.searchsorted(behaviour.time, starts + lengths, side="left")
+    first = np.searchsorted(trajectory.time, starts, side="right")
+    last = np.searchsorted(trajectory.time, starts + lengths, side="left")
     rows = int(np.sum(np.maximum(last - first, 0)))
     yield f"{topic}: silent for {', '.join(listed)}; rows marked as not observed: {rows}"
 
 
-def _unobserved(trial: Trial, behaviour: Behaviour) -> Iterator[str]:
-    joints = {"angle": behaviour["joint_positions"], "velocity": behaviour["joint_velocities"]}
+def _unobserved(trial: Trial, trajectory: Trajectory) -> Iterator[str]:
+    joints = {"angle": trajectory["joint_positions"], "velocity": trajectory["joint_velocities"]}
     for quantity, values in joints.items():
         seen = np.isfinite(values)
         if not seen.any():
             continue
         end = np.flatnonzero(seen.any(axis=1))[-1]
-        for name, column in zip(behaviour.names.hinges, seen.T, strict=True):
+        for name, column in zip(trajectory.names.hinges, seen.T, strict=True):
             steps = np.flatnonzero(column)
             if not len(steps):
                 reason = f", as {NONE!r} says" if name not in trial.joints.links else ""
                 yield f"no {quantity} of {name} was observed{reason}"
             elif steps[-1] < end:
-                since = behaviour.time[steps[-1] + 1]
+                since = trajectory.time[steps[-1] + 1]
                 yield f"no {quantity} of {name} was observed from {since:.3f} s on"
-    nothing = [name for name, rows in behaviour.signals.items() if np.isnan(rows).all()]
+    nothing = [name for name, rows in trajectory.signals.items() if np.isnan(rows).all()]
     if nothing:
         yield f"not observed at all: {', '.join(nothing)}"
-    for column, name in enumerate(behaviour.names.sensors):
-        if np.isnan(behaviour["sensors"][:, column]).all() and "sensors" not in nothing:
+    for column, name in enumerate(trajectory.names.sensors):
+        if np.isnan(trajectory["sensors"][:, column]).all() and "sensors" not in nothing:
             yield f"the sensor {name} was not observed"

@@ -17,7 +17,7 @@ from selfmodel.logs.recordings.names import classified, matched, unit_of_time
 from selfmodel.logs.recordings.recording import TABLE, Recording, Series
 from selfmodel.logs.recordings.tables import is_table, read_table
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import PREFIXES, column_names
+from selfmodel.trials.trajectory import PREFIXES, column_names
 
 _COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
 

@@ -32,7 +32,7 @@ from selfmodel.logs.recordings.recording import (
     packed,
     unpacked,
 )
-from selfmodel.trials.behaviour import Behaviour, columns_of
+from selfmodel.trials.trajectory import Trajectory, columns_of
 
 MAX_TIME = 2**62
 """Largest magnitude of a time, ns; sums still fit 64 bits."""
@@ -371,12 +371,12 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
 """Formats of tables by the suffix of the file."""
 
 
-def export(path: Path, behaviour: Behaviour) -> tuple[str, ...]:
+def export(path: Path, trajectory: Trajectory) -> tuple[str, ...]:
     """Writes the observed signals of a trial as a table, which ``logs import`` reads again.
 
     Args:
         path: Name of the file, which must not exist, with the suffix of a format.
-        behaviour: Behaviour of the trial.
+        trajectory: Trajectory of the trial.
 
     Returns:
         Names of the columns.
@@ -386,7 +386,7 @@ def export(path: Path, behaviour: Behaviour) -> tuple[str, ...]:
         LogWriteError: The disk is full, or failed.
     """
     write = writer_of(path)
-    columns = columns_of(behaviour)
+    columns = columns_of(trajectory)
     with create_file(path) as file:
         write(file, columns)
     return tuple(columns)

@@ -158,7 +158,7 @@ def _notes(logs: Sequence[TrialLog]) -> list[str]:
     ]
     notes += [
         f"{log.trial.path}: {log.timing.late.sum()} of "
-        f"{counted(log.trial.behaviour.steps, 'step')} were late; comparators of short segments "
+        f"{counted(log.trial.trajectory.steps, 'step')} were late; comparators of short segments "
         f"leave late steps out, comparators of whole trials do not"
         for log in logs
         if log.timing is not None and log.timing.late.any()

@@ -22,7 +22,7 @@ from selfmodel.robot.motion import (
     visible_geoms,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 WIDTH, HEIGHT = 480, 360
 """Size of a motion's picture, pixels."""
@@ -159,7 +159,7 @@ class Film:
 def film_of(
     robot: Robot,
     hypothesis: Hypothesis,
-    motions: Sequence[tuple[str, Behaviour]],
+    motions: Sequence[tuple[str, Trajectory]],
     moments: FloatArray,
 ) -> Film:
     """Returns the film of some motions.
@@ -167,18 +167,18 @@ def film_of(
     Args:
         robot: The healthy robot.
         hypothesis: Hypothesis whose detached and jammed bodies are marked.
-        motions: Title and behaviour of each motion, all with the same times.
+        motions: Title and trajectory of each motion, all with the same times.
         moments: Times of the frames, ``(frames,)``, s; a frame shows the last step at or before its
             time.
     """
-    embodiment = build(robot, hypothesis)
-    model, time = embodiment.model, motions[0][1].time
+    variant = build(robot, hypothesis)
+    model, time = variant.model, motions[0][1].time
     # 1e-9 s: a time that equals a step but for rounding shows that step.
     steps = np.searchsorted(time, moments + 1e-9, side="right") - 1
     shots: list[Shot] = []
     missing: list[str] = []
-    for title, behaviour in motions:
-        poses = poses_of(robot, model, behaviour)
+    for title, trajectory in motions:
+        poses = poses_of(robot, model, trajectory)
         known = poses.forward[np.isfinite(poses.forward)]
         forward = poses.forward - (known[0] if len(known) else np.nan)
         shots.append(Shot(title, poses.qpos[steps], poses.held[steps], forward[steps]))
@@ -191,7 +191,7 @@ def film_of(
         time=time[steps],
         shots=tuple(shots),
         missing=tuple(missing),
-        normal=embodiment.normal,
+        normal=variant.normal,
     )
 
 

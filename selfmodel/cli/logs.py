@@ -74,7 +74,7 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "stage": trial.plan.stage,
         "status": found.log.status,
         "reason": found.log.reason,
-        "steps": trial.behaviour.steps,
+        "steps": trial.trajectory.steps,
         "planned_steps": trial.plan.steps,
         "control_timestep": found.log.control_timestep,
         "seed": trial.plan.seed,
@@ -177,7 +177,7 @@ def _checked(path: Path, expected: str) -> dict[str, Any]:
         "ok": True,
         "status": found.log.status,
         "reason": found.log.reason,
-        "steps": found.log.trial.behaviour.steps,
+        "steps": found.log.trial.trajectory.steps,
         "model_loaded": found.model_loaded,
         "digest": found.digest,
     }

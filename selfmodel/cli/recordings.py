@@ -87,7 +87,7 @@ def _import_facts(out: Path, mapping: RecordingMapping, recording: ImportedTrial
     return {
         "log": str(out),
         "robot": mapping.trial.robot,
-        "steps": recording.behaviour.steps,
+        "steps": recording.trajectory.steps,
         "valid": recording.valid,
         "topics": {topic: found.facts() for topic, found in recording.qualities.items()},
         "clock": recording.clock,
@@ -113,7 +113,7 @@ def _print_import(out: Path, recording: ImportedTrial) -> None:
     print_lines(
         *(f"note: {note}" for note in recording.notes),
         f"observed: {valid}",
-        f"{counted(recording.behaviour.steps, 'step')}: {out}",
+        f"{counted(recording.trajectory.steps, 'step')}: {out}",
     )
 
 
@@ -126,11 +126,11 @@ def export(options: ExportTable) -> None:
     writer_of(options.out)
     refuse_existing(options.out)
     (found,) = arguments.read_logs([options.log])
-    behaviour = found.trial.behaviour
-    names = write_table(options.out, behaviour)
+    trajectory = found.trial.trajectory
+    names = write_table(options.out, trajectory)
     if options.as_json:
-        print_json({"table": str(options.out), "rows": behaviour.steps, "columns": list(names)})
+        print_json({"table": str(options.out), "rows": trajectory.steps, "columns": list(names)})
     else:
         print_lines(
-            f"{counted(behaviour.steps, 'row')} of {counted(len(names), 'column')}: {options.out}"
+            f"{counted(trajectory.steps, 'row')} of {counted(len(names), 'column')}: {options.out}"
         )

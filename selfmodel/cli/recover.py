@@ -168,7 +168,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
                 log=trial.path,
                 stage=trial.plan.stage,
                 displacement=trial.displacement,
-                steps=trial.behaviour.steps,
+                steps=trial.trajectory.steps,
                 ended_early=trial.early_end != "",
                 score=score,
                 predicted_score=predicted if math.isfinite(predicted) else None,

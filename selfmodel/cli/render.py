@@ -122,7 +122,7 @@ def _film(given: "ReplayedLog", pictures: int | None) -> tuple["Film", dict[str,
     """
     from selfmodel.cli.film import evenly, film_of  # noqa: PLC0415  # as above
 
-    trial, time = given.log.trial, given.log.trial.behaviour.time
+    trial, time = given.log.trial, given.log.trial.trajectory.time
     if pictures is None and not time[-1] * RATE < MAX_FRAMES:
         raise InputError(
             f"{trial.path}: the trial takes {time[-1]:g} s, and a film takes at most "
@@ -130,7 +130,7 @@ def _film(given: "ReplayedLog", pictures: int | None) -> tuple["Film", dict[str,
         )
     found = given.drawable()
     motions = [
-        (plain(f"logged: {trial.plan.name}"), trial.behaviour),
+        (plain(f"logged: {trial.plan.name}"), trial.trajectory),
         (plain(f"model: {given.hypothesis}"), found.simulated),
     ]
     whole = np.arange(int(float(time[-1]) * RATE) + 1) / RATE
@@ -147,7 +147,7 @@ def _film(given: "ReplayedLog", pictures: int | None) -> tuple["Film", dict[str,
         notes.append("the simulation diverged: with this hypothesis the model is unstable")
     return film, {
         "hypothesis": str(given.hypothesis),
-        "steps": trial.behaviour.steps,
+        "steps": trial.trajectory.steps,
         "missing": list(film.missing),
         "held": held,
         "diverged": found.diverged,

@@ -113,7 +113,7 @@ def replay(options: ReplayTrial) -> None:
         "robot": given.robot.name,
         "model": options.self_model,
         "hypothesis": str(given.hypothesis),
-        "steps": log.trial.behaviour.steps,
+        "steps": log.trial.trajectory.steps,
         "identical": found.identical,
         "first_divergence_step": found.first_divergence_step,
         "rms": {key: one if math.isfinite(one) else None for key, one in errors.items()},
@@ -158,7 +158,7 @@ def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
 
 def _rows(log: TrialLog, found: Replay) -> list[tuple[str, ...]]:
     """Returns the error of each signal in each window of the trial."""
-    steps, timestep = log.trial.behaviour.steps, log.control_timestep
+    steps, timestep = log.trial.trajectory.steps, log.control_timestep
     windows = min(WINDOWS, steps)
     rows = []
     for k in range(windows):
@@ -180,7 +180,7 @@ def figure(log: TrialLog, found: Replay, hypothesis: str, kind: str) -> bytes:
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  # most replays draw nothing
 
-    logged, simulated = log.trial.behaviour, found.simulated
+    logged, simulated = log.trial.trajectory, found.simulated
     drawn = Figure(figsize=(8, 6), layout="constrained")
     path, error = drawn.subplots(2, 1, sharex=True)
     path.plot(logged.time, logged["base_position"][:, 0], label="logged")

@@ -52,7 +52,7 @@ def trial(options: RunTrial) -> None:
         "gap": options.gap,
         "structure": False,  # readers of 0.1 expect the key
         "seed": options.seed,
-        "steps": logged.behaviour.steps,
+        "steps": logged.trajectory.steps,
         "displacement": logged.displacement if math.isfinite(logged.displacement) else None,
     }
     if options.as_json:

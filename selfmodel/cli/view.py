@@ -80,7 +80,7 @@ def view(options: View) -> None:
             "log": str(options.file),
             "robot": given.robot.name,
             "hypothesis": str(given.hypothesis),
-            "steps": given.log.trial.behaviour.steps,
+            "steps": given.log.trial.trajectory.steps,
             "diverged": found.diverged,
             "out": str(options.out) if options.out else None,
             "bytes": written,
@@ -223,7 +223,7 @@ def fill_recording(recording: Any, given: ReplayedLog, found: Replay) -> None:  
         found: The simulation, compared with it.
     """
     rr = import_rerun()
-    logged = given.log.trial.behaviour
+    logged = given.log.trial.trajectory
     motions = [(LOGGED, logged), (SIMULATED, found.simulated)]
     film = film_of(given.robot, given.hypothesis, motions, np.asarray(logged.time))
     about = (
@@ -244,10 +244,10 @@ def fill_recording(recording: Any, given: ReplayedLog, found: Replay) -> None:  
         recording.log(entity, line, static=True)
         recording.send_columns(entity, times, rr.Scalars.columns(scalars=values))
 
-    for shot, (name, behaviour) in zip(film.shots, motions, strict=True):
+    for shot, (name, trajectory) in zip(film.shots, motions, strict=True):
         _send_body(recording, film, shot.qpos, name, times)
-        angles = behaviour["joint_positions"]
-        for column, hinge in enumerate(behaviour.names.columns("joint_positions")):
+        angles = trajectory["joint_positions"]
+        for column, hinge in enumerate(trajectory.names.columns("joint_positions")):
             send_line(("joints", hinge, name), angles[:, column], COLOURS[name])
     for signal, errors in found.errors.items():
         send_line(("errors", signal), errors)

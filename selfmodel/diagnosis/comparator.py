@@ -1,4 +1,4 @@
-"""Comparator interface: losses of simulated behaviour against a logged trial."""
+"""Comparator interface: losses of simulated trajectories against a logged trial."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,13 +7,13 @@ from typing import Any, Protocol, runtime_checkable
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 
 @runtime_checkable
 class Comparator(Protocol):
-    """A distance between simulated behaviour and a logged trial.
+    """A distance between simulated trajectories and a logged trial.
 
     A plug-in is an object with these members; no base class is required.
     ``selfmodel.check_comparator`` tests conformance. An attribute ``surrogate`` is optional: a
@@ -48,14 +48,14 @@ class PreparedTrial(Protocol):
         """The simulation that a comparison with the trial requires."""
         ...
 
-    def distances(self, simulated: Behaviour) -> FloatArray:
+    def distances(self, simulated: Trajectory) -> FloatArray:
         """Returns the distance of each simulation from the trial.
 
         The result depends on the prepared trial and the argument alone; neither is changed.
 
         Args:
             simulated: The requested signals, with a leading axis of ``n`` hypotheses, and the
-                hinges that each hypothesis fixes; see ``Behaviour``.
+                hinges that each hypothesis fixes; see ``Trajectory``.
 
         Returns:
             ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
@@ -79,7 +79,7 @@ class PiecewiseTrial(Protocol):
         """The simulation that a comparison with the trial requires."""
         ...
 
-    def losses(self, simulated: Behaviour) -> "FloatArray | Losses":
+    def losses(self, simulated: Trajectory) -> "FloatArray | Losses":
         """Returns the loss of each segment, window or step of the trial.
 
         Args:

@@ -91,12 +91,12 @@ def direct_evidence(
 
 
 def _evidence_of(trial: Trial, anatomy: Anatomy, name: str) -> DirectEvidence:
-    behaviour = trial.behaviour
-    commands = _known(behaviour.names.motors, behaviour["commands"])
+    trajectory = trial.trajectory
+    commands = _known(trajectory.names.motors, trajectory["commands"])
     ranges = {motor: float(np.ptp(each)) if len(each) else 0.0 for motor, each in commands.items()}
-    readings = _known(behaviour.names.sensors, behaviour["sensors"])
-    angles = _known(behaviour.names.hinges, behaviour["joint_positions"])
-    positions = behaviour["joint_positions"]
+    readings = _known(trajectory.names.sensors, trajectory["sensors"])
+    angles = _known(trajectory.names.hinges, trajectory["joint_positions"])
+    positions = trajectory["joint_positions"]
     noise = encoder_noise(np.where(np.isfinite(positions), positions, np.nan))
     tolerances = dict(zip(angles, np.hypot(PLAY, NOISE_RATIO * noise), strict=True))
     joints: list[JointEvidence] = []

@@ -26,7 +26,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
 Parts = Sequence[Trial | TrialPart]
@@ -182,7 +182,7 @@ class LossTable:
             steps = self._column(part.trial).piece_steps
             if steps is None:
                 return None
-            times.append(part.trial.behaviour.time[steps][self._pieces(part)])
+            times.append(part.trial.trajectory.time[steps][self._pieces(part)])
         begin, end = np.concatenate(times).T
         return Timeline(np.repeat(np.arange(len(times)), [*map(len, times)]), begin, end)
 
@@ -215,8 +215,10 @@ class LossTable:
 
     def _opening(self, trial: Trial) -> Trial:
         """The first part of a trial, or the whole trial if the comparator refuses the part."""
-        steps = max(round(OPENING * trial.behaviour.steps), min(MIN_OPENING, trial.behaviour.steps))
-        opening = replace(trial, behaviour=trial.behaviour.first(steps))
+        steps = max(
+            round(OPENING * trial.trajectory.steps), min(MIN_OPENING, trial.trajectory.steps)
+        )
+        opening = replace(trial, trajectory=trial.trajectory.first(steps))
         return opening if self.accepts([opening]) else trial
 
     def _column(self, trial: Trial) -> _Column:
@@ -230,7 +232,7 @@ class LossTable:
         steps = self._column(part.trial).piece_steps
         if part.is_whole or steps is None:
             return slice(None)
-        times = part.trial.behaviour.time[steps]
+        times = part.trial.trajectory.time[steps]
         return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
 
     def _rows_of(
@@ -244,7 +246,7 @@ class LossTable:
         column = self._column(trial)
         missing = list(dict.fromkeys(one for one in hypotheses if one not in column.known))
         request, simulator = column.prepared.request, self._simulator
-        size = largest_batch(simulator.robot, request, trial.behaviour.steps)
+        size = largest_batch(simulator.robot, request, trial.trajectory.steps)
         for first in range(0, len(missing), size):
             batch = missing[first : first + size]
             result = simulate(simulator, request, trial, batch)
@@ -265,7 +267,7 @@ class LossTable:
             {} if not diverged.any() else dict.fromkeys(("over", "invalid", "divide"), "ignore")
         )
         with np.errstate(**handling):  # type: ignore[arg-type]  # of a literal type
-            losses = _compared(column.prepared, result.behaviour)
+            losses = _compared(column.prepared, result.trajectory)
         total, by_hinge = losses.total, losses.by_hinge
         if total.ndim != 2 or len(total) != len(hypotheses) or not total.shape[1]:
             raise contract_error(
@@ -277,14 +279,14 @@ class LossTable:
                 self._comparator,
                 f"returned a distance that is not a number of at least 0: {wrong[0]}",
             )
-        expected = (*total.shape, len(trial.behaviour.names.hinges))
+        expected = (*total.shape, len(trial.trajectory.names.hinges))
         if by_hinge is not None and by_hinge.shape != expected:
             raise contract_error(
                 self._comparator,
                 f"returned losses of hinges {by_hinge.shape} in place of {expected}",
             )
         if column.piece_steps is not None:
-            total = total + contradiction_losses(hypotheses, trial.behaviour, column.piece_steps)
+            total = total + contradiction_losses(hypotheses, trial.trajectory, column.piece_steps)
         return Losses(
             np.where(diverged, np.inf, total),
             losses.by_signal,
@@ -296,18 +298,18 @@ def simulate(
     simulator: Simulator, request: Request, trial: Trial, hypotheses: Sequence[Hypothesis]
 ) -> SimulationResult:
     """Runs the simulation that a comparison with a trial requires, a row for each hypothesis."""
-    driver, steps = trial.plan.controller, trial.behaviour.steps
+    driver, steps = trial.plan.controller, trial.trajectory.steps
     match request:
         case ClosedLoop():
             runs = [(hypothesis, driver) for hypothesis in hypotheses]
             return simulator.run(runs, steps, request.record)
         case Segments():
-            return simulator.predict(hypotheses, request, trial.behaviour)
+            return simulator.predict(hypotheses, request, trial.trajectory)
         case Ensemble():
             return simulator.run_ensemble(hypotheses, driver, steps, request)
 
 
-def _compared(prepared: PreparedTrial | PiecewiseTrial, simulated: Behaviour) -> Losses:
+def _compared(prepared: PreparedTrial | PiecewiseTrial, simulated: Trajectory) -> Losses:
     if not isinstance(prepared, PiecewiseTrial):
         return Losses(np.asarray(prepared.distances(simulated))[..., np.newaxis])
     losses = prepared.losses(simulated)
@@ -315,7 +317,7 @@ def _compared(prepared: PreparedTrial | PiecewiseTrial, simulated: Behaviour) ->
 
 
 def contradiction_losses(
-    hypotheses: Sequence[Hypothesis], behaviour: Behaviour, piece_steps: IndexArray
+    hypotheses: Sequence[Hypothesis], trajectory: Trajectory, piece_steps: IndexArray
 ) -> FloatArray:
     """Returns the loss in the pieces in which a log contradicts hypotheses, ``(n, pieces)``.
 
@@ -326,7 +328,7 @@ def contradiction_losses(
     losses = np.zeros((len(hypotheses), len(piece_steps)))
     for row, hypothesis in zip(losses, hypotheses, strict=True):
         for fault in hypothesis.faults:
-            steps = np.append(0, np.cumsum(fault.kind.contradicted(fault, behaviour)))
+            steps = np.append(0, np.cumsum(fault.kind.contradicted(fault, trajectory)))
             is_contradicted = steps[piece_steps[:, 1] + 1] > steps[piece_steps[:, 0]]
             row[is_contradicted] += CONTRADICTION
     return losses
@@ -479,9 +481,9 @@ def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...
         Faults of the kind ``jam-angle``, in the order of the joints, without joints whose encoders
         are unknown and joints whose hinges end at different angles.
     """
-    behaviour = trials[-1].behaviour  # a fault may begin during the trials
-    medians = median_of_known(behaviour["joint_positions"][round((1 - END) * behaviour.steps) :])
-    ends = dict(zip(behaviour.names.hinges, medians, strict=True))
+    trajectory = trials[-1].trajectory  # a fault may begin during the trials
+    medians = median_of_known(trajectory["joint_positions"][round((1 - END) * trajectory.steps) :])
+    ends = dict(zip(trajectory.names.hinges, medians, strict=True))
     jams = []
     for name in JAMMED_AT_ANGLE.parts(anatomy):
         joint = anatomy.joint(name)

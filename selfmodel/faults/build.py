@@ -9,7 +9,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.anatomy import Anatomy, Joint
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 
@@ -24,8 +24,8 @@ def build(
     *,
     edits: Sequence[SpecEdit] = (),
     perturb: Callable[[MjModel], MjModel] | None = None,
-) -> Embodiment:
-    """Returns the embodiment of a robot under a hypothesis.
+) -> ModelVariant:
+    """Returns the variant of a robot under a hypothesis.
 
     Args:
         robot: The nominal robot.
@@ -67,8 +67,8 @@ def compile_model(
 
 def apply_faults(
     model: MjModel, anatomy: Anatomy, hypothesis: Hypothesis, seed: int = 0
-) -> Embodiment:
-    """Returns the embodiment of a compiled model with the faults of a hypothesis applied.
+) -> ModelVariant:
+    """Returns the variant of a compiled model with the faults of a hypothesis applied.
 
     Args:
         model: The model as ``compile_model`` returns it; it is not changed.
@@ -76,22 +76,22 @@ def apply_faults(
         hypothesis: Hypothesis in canonical form.
         seed: Seed of the random parts of the faults.
     """
-    embodiment = Embodiment.of(model, anatomy, seed)
+    variant = ModelVariant.of(model, anatomy, seed)
     if not hypothesis.faults:
-        return embodiment
+        return variant
     for fault in hypothesis.faults:
-        fault.kind.apply(embodiment, anatomy, fault)
+        fault.kind.apply(variant, anatomy, fault)
     with mujoco_errors_as_input_errors(f"simulate the model of {hypothesis}"):
         # One MjData for both models, which have one layout: its allocation takes the most time.
         data = mujoco.MjData(model)
         nominal = _mean_inertia(model, data)
-        mujoco.mj_setConst(embodiment.model, data)
+        mujoco.mj_setConst(variant.model, data)
         # Tendons keep their length, although a welded joint's angle has become its reference.
-        embodiment.model.tendon_length0[:] = model.tendon_length0
+        variant.model.tendon_length0[:] = model.tendon_length0
         # The solver's tolerance is relative to the mean inertia, and a welded hinge's armature
         # would make any solution converged. The absolute tolerance is kept.
-        embodiment.model.opt.tolerance *= nominal / _mean_inertia(embodiment.model, data)
-    return embodiment
+        variant.model.opt.tolerance *= nominal / _mean_inertia(variant.model, data)
+    return variant
 
 
 def _mean_inertia(model: MjModel, data: mujoco.MjData) -> float:

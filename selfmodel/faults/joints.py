@@ -9,7 +9,7 @@ from selfmodel.faults.sensors import FAILED_SENSOR, SENSOR_GAIN
 from selfmodel.robot.anatomy import Anatomy, Joint
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.model_variant import ModelVariant
 
 ANGLE_LEVELS = 12
 """Levels of the angle of a jam, evenly spaced inside the joint's range: 0.09 rad apart for 60
@@ -23,14 +23,14 @@ class BrokenJoint(FaultKind):
         """Returns the joints whose bodies all have names: faults refer to bodies by name."""
         return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Detaches the bodies of the limb and zeroes the readings of its sensors."""
         detached = anatomy.joint(fault.part).bodies
         for name in detached:
-            embodiment.detach_body(name)
+            variant.detach_body(name)
         for column, sensor in enumerate(anatomy.sensors):
             if sensor.body in detached:
-                embodiment.fix_reading(column, 0.0)
+                variant.fix_reading(column, 0.0)
 
     def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
         """Returns whether the other fault is at a detached part, or of a motor without a load."""
@@ -80,10 +80,10 @@ class JammedAtAngle(FaultKind):
         angles = (low + (high - low) * (k + 0.5) / ANGLE_LEVELS for k in range(ANGLE_LEVELS))
         return tuple(dict.fromkeys(round(angle, 3) + 0.0 for angle in angles if round(angle, 3)))
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Welds the hinges at the angle of the severity."""
         hinges = anatomy.joint(fault.part).hinges
-        _weld(embodiment, anatomy, dict.fromkeys(hinges, fault.severity))
+        _weld(variant, anatomy, dict.fromkeys(hinges, fault.severity))
 
     def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
         """Returns whether a fault of the joint's resistance or motor has no further effect.
@@ -103,9 +103,9 @@ class JammedAtAngle(FaultKind):
 class Jammed(JointFault):
     """A joint whose hinges are welded at 0, or at the limit nearest to 0."""
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Welds the hinges."""
-        _weld(embodiment, anatomy, _nearest_to_zero(anatomy.joint(fault.part)))
+        _weld(variant, anatomy, _nearest_to_zero(anatomy.joint(fault.part)))
 
     def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
         """Returns whether a fault of the joint's sensor, motor or angle has no further effect.
@@ -121,13 +121,13 @@ class Jammed(JointFault):
         return JAMMED_AT_ANGLE.absorbs(fault, other, anatomy)
 
 
-def _weld(embodiment: "Embodiment", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
+def _weld(variant: "ModelVariant", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
     for hinge, angle in angles.items():
-        embodiment.weld_hinge(hinge, angle)
+        variant.weld_hinge(hinge, angle)
     for column, sensor in enumerate(anatomy.sensors):
         if sensor.hinge in angles:
-            offset = embodiment.encoder_offset[anatomy.hinges.index(sensor.hinge)]
-            embodiment.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
+            offset = variant.encoder_offset[anatomy.hinges.index(sensor.hinge)]
+            variant.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
 
 
 def _nearest_to_zero(joint: Joint) -> dict[str, float]:
@@ -140,10 +140,10 @@ def _nearest_to_zero(joint: Joint) -> dict[str, float]:
 class WeakMotor(MotorFault):
     """A joint whose motors' torque is scaled by a factor below 1."""
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the forces and the force limits of the motors."""
         motors = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).motors]
-        embodiment.weaken_motors(motors, fault.severity)
+        variant.weaken_motors(motors, fault.severity)
 
 
 class DampedJoint(JointFault):
@@ -154,10 +154,10 @@ class DampedJoint(JointFault):
     effect beside the velocity gain of a servo, which is no part of the damping.
     """
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the damping of the hinges."""
         for hinge in anatomy.joint(fault.part).hinges:
-            embodiment.scale_damping(hinge, fault.severity)
+            variant.scale_damping(hinge, fault.severity)
 
 
 class JointFriction(MotorFault):
@@ -167,10 +167,10 @@ class JointFriction(MotorFault):
     friction in the model. A weak motor does not change it.
     """
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Adds the friction to the hinges."""
         for hinge in anatomy.joint(fault.part).hinges:
-            embodiment.add_dry_friction(hinge, fault.severity)
+            variant.add_dry_friction(hinge, fault.severity)
 
 
 class EncoderOffset(JointFault):
@@ -182,14 +182,14 @@ class EncoderOffset(JointFault):
     one joint add up. A jammed joint does not absorb the fault: its angle is measured with it.
     """
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Shifts what the encoders of the joint measure."""
         hinges = anatomy.joint(fault.part).hinges
         for hinge in hinges:
-            embodiment.encoder_offset[anatomy.hinges.index(hinge)] += fault.severity
+            variant.encoder_offset[anatomy.hinges.index(hinge)] += fault.severity
         for column, sensor in enumerate(anatomy.sensors):
             if sensor.hinge in hinges:
-                embodiment.shift_reading(column, fault.severity / sensor.half_range)
+                variant.shift_reading(column, fault.severity / sensor.half_range)
 
 
 class EncoderSlip(EncoderOffset):
@@ -203,11 +203,11 @@ class EncoderSlip(EncoderOffset):
         """Returns the joints with motors with position feedback."""
         return tuple(joint.name for joint in anatomy.joints if joint.servos)
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Shifts what the encoders of the joint measure, and the feedback of its servos."""
-        super().apply(embodiment, anatomy, fault)
+        super().apply(variant, anatomy, fault)
         for hinge in anatomy.joint(fault.part).hinges:
-            embodiment.shift_feedback(hinge, fault.severity)
+            variant.shift_feedback(hinge, fault.severity)
 
 
 class LostGrip(FaultKind):
@@ -225,9 +225,9 @@ class LostGrip(FaultKind):
             if "" not in joint.bodies and not joint.descendants & names
         )
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the friction of the bodies of the foot."""
-        embodiment.scale_grip(sorted(anatomy.joint(fault.part).bodies), fault.severity)
+        variant.scale_grip(sorted(anatomy.joint(fault.part).bodies), fault.severity)
 
 
 BROKEN = BrokenJoint(name="break")

@@ -9,12 +9,12 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.model_variant import ModelVariant
 
 ENVIRONMENT = ""
 """Part of the kinds that apply to the world or to the whole robot; notation omits it."""
@@ -97,8 +97,8 @@ class FaultKind:
         """Returns ``levels`` at one part."""
         return self.levels
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: "Fault") -> None:
-        """Edits an embodiment: its model, readings or neurons. The layout of the model stays.
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: "Fault") -> None:
+        """Edits a variant: its model, readings or neurons. The layout of the model stays.
 
         Faults are applied in the order of their kinds' names.
         """
@@ -112,19 +112,19 @@ class FaultKind:
         """
 
     def adapt_to_contacts(
-        self, embodiment: "Embodiment", fault: "Fault", points: FloatArray
+        self, variant: "ModelVariant", fault: "Fault", points: FloatArray
     ) -> None:
-        """Adapts an embodiment to a trial before its segments are predicted; by default, not.
+        """Adapts a variant to a trial before its segments are predicted; by default, not.
 
         The points are contacts observed in the trial, ``(n, 3)``, world frame, m.
         """
 
-    def contradicted(self, _fault: "Fault", behaviour: Behaviour) -> BoolArray:
+    def contradicted(self, _fault: "Fault", trajectory: Trajectory) -> BoolArray:
         """Returns a mask of the steps of a log that a fault excludes, ``(steps,)``.
 
         Such as those in which a failed sensor reads something; by default none.
         """
-        return np.zeros(behaviour.steps, dtype=np.bool_)
+        return np.zeros(trajectory.steps, dtype=np.bool_)
 
     def absorbs(self, _fault: "Fault", _other: "Fault", _anatomy: Anatomy) -> bool:
         """Returns whether a fault of this kind removes any effect of another; by default, not."""

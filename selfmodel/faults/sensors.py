@@ -13,10 +13,10 @@ from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.model_variant import ModelVariant
 
 
 class SensorFault(FaultKind):
@@ -30,13 +30,13 @@ class SensorFault(FaultKind):
 class FailedSensor(SensorFault):
     """A sensor that reads 0."""
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Sets the reading to 0."""
-        embodiment.fix_reading(_column(anatomy, fault), 0.0)
+        variant.fix_reading(_column(anatomy, fault), 0.0)
 
-    def contradicted(self, fault: Fault, behaviour: Behaviour) -> BoolArray:
+    def contradicted(self, fault: Fault, trajectory: Trajectory) -> BoolArray:
         """Returns a mask of the steps with a known reading other than 0, ``(steps,)``."""
-        readings = _readings(fault, behaviour)
+        readings = _readings(fault, trajectory)
         return np.asarray(np.isfinite(readings) & (readings != 0))
 
     def absorbs(self, fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
@@ -47,31 +47,31 @@ class FailedSensor(SensorFault):
 class SensorGain(SensorFault):
     """A sensor whose reading is scaled by a factor."""
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the reading."""
-        embodiment.scale_reading(_column(anatomy, fault), fault.severity)
+        variant.scale_reading(_column(anatomy, fault), fault.severity)
 
-    def contradicted(self, fault: Fault, behaviour: Behaviour) -> BoolArray:
+    def contradicted(self, fault: Fault, trajectory: Trajectory) -> BoolArray:
         """Returns a mask of the steps in which a binary sensor reads 1, ``(steps,)``.
 
         With a gain, it reads the gain in place of 1.
         """
-        return _reads_as_if_binary(fault, behaviour, 1.0)
+        return _reads_as_if_binary(fault, trajectory, 1.0)
 
 
 class SensorBias(SensorFault):
     """A sensor with a constant added to its reading."""
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Adds the constant."""
-        embodiment.bias[_column(anatomy, fault)] = fault.severity
+        variant.bias[_column(anatomy, fault)] = fault.severity
 
-    def contradicted(self, fault: Fault, behaviour: Behaviour) -> BoolArray:
+    def contradicted(self, fault: Fault, trajectory: Trajectory) -> BoolArray:
         """Returns a mask of the steps in which a binary sensor reads 0, ``(steps,)``.
 
         With a bias, it never reads 0.
         """
-        return _reads_as_if_binary(fault, behaviour, 0.0)
+        return _reads_as_if_binary(fault, trajectory, 0.0)
 
 
 class SensorNoise(FaultKind):
@@ -81,22 +81,22 @@ class SensorNoise(FaultKind):
         """Returns the angle sensors; additive noise has no meaning for a binary touch sensor."""
         return tuple(sensor.name for sensor in anatomy.sensors if sensor.kind == "angle")
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Sets the standard deviation of the noise."""
-        embodiment.noise[_column(anatomy, fault)] = fault.severity
+        variant.noise[_column(anatomy, fault)] = fault.severity
 
 
 def _column(anatomy: Anatomy, fault: Fault) -> int:
     return anatomy.names.sensors.index(fault.part)
 
 
-def _readings(fault: Fault, behaviour: Behaviour) -> FloatArray:
-    return behaviour["sensors"][:, behaviour.names.sensors.index(fault.part)]
+def _readings(fault: Fault, trajectory: Trajectory) -> FloatArray:
+    return trajectory["sensors"][:, trajectory.names.sensors.index(fault.part)]
 
 
-def _reads_as_if_binary(fault: Fault, behaviour: Behaviour, value: float) -> BoolArray:
+def _reads_as_if_binary(fault: Fault, trajectory: Trajectory, value: float) -> BoolArray:
     """Returns a mask of the steps with a reading, of a sensor that reads 0 and 1 only."""
-    readings = _readings(fault, behaviour)
+    readings = _readings(fault, trajectory)
     is_known = np.isfinite(readings)
     if not np.isin(readings[is_known], (0.0, 1.0)).all():
         return np.zeros(len(readings), dtype=np.bool_)
@@ -110,9 +110,9 @@ class SilentNeuron(FaultKind):
         """Returns the neurons of the largest network: the controller of a robot is unknown."""
         return tuple(str(neuron) for neuron in range(MAX_HIDDEN_NEURONS))
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Silences the neuron."""
-        embodiment.silent_neurons.add(int(fault.part))
+        variant.silent_neurons.add(int(fault.part))
 
 
 FAILED_SENSOR = FailedSensor(name="sensor", affects_dynamics=False)

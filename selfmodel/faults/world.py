@@ -15,7 +15,7 @@ from selfmodel.trials.rotation import rotated
 if TYPE_CHECKING:
     from mujoco import MjSpec
 
-    from selfmodel.robot.embodiment import Embodiment
+    from selfmodel.robot.model_variant import ModelVariant
 
 AIR_DENSITY = 1.2
 """Density of air at 20 degrees Celsius, kg/m^3; MuJoCo's default medium is a vacuum."""
@@ -57,9 +57,9 @@ class Friction(FaultKind):
     No severity is nominal for every robot: the nominal friction is the model's.
     """
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Sets the friction."""
-        embodiment.set_friction(fault.severity)
+        variant.set_friction(fault.severity)
 
 
 class Slope(FaultKind):
@@ -70,9 +70,9 @@ class Slope(FaultKind):
     with gravity by an IMU.
     """
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Tilts the ground and the robot."""
-        embodiment.tilt_ground(fault.severity)
+        variant.tilt_ground(fault.severity)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -87,9 +87,9 @@ class Wind(FaultKind):
 
     axis: int
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Sets the wind."""
-        option = embodiment.model.opt
+        option = variant.model.opt
         if option.density == option.viscosity == 0:  # a swimmer's model has its own medium
             option.density, option.viscosity = AIR_DENSITY, AIR_VISCOSITY
         option.wind[self.axis] = fault.severity
@@ -107,9 +107,9 @@ class Payload(FaultKind):
         """Returns the places; none for a fixed base."""
         return tuple(PLACES) if anatomy.floating_base else ()
 
-    def apply(self, embodiment: "Embodiment", anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Adds the mass."""
-        embodiment.load_body(anatomy.floating_base, fault.severity, PLACES[fault.part])
+        variant.load_body(anatomy.floating_base, fault.severity, PLACES[fault.part])
 
 
 class GrownDelay(FaultKind):
@@ -120,15 +120,15 @@ class GrownDelay(FaultKind):
     their start.
     """
 
-    def apply(self, embodiment: "Embodiment", _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: "ModelVariant", _anatomy: Anatomy, fault: Fault) -> None:
         """Sets the added delay."""
-        embodiment.added_delay[:] = fault.severity
+        variant.added_delay[:] = fault.severity
 
 
 class Roughness(FaultKind):
     """Rough ground; the severity is the maximum deviation of the ground from its mean height, m."""
 
-    def apply(self, _embodiment: "Embodiment", _anatomy: Anatomy, _fault: Fault) -> None:
+    def apply(self, _variant: "ModelVariant", _anatomy: Anatomy, _fault: Fault) -> None:
         """Does nothing: ``edit_specification`` has added the terrain."""
 
     def edit_specification(self, spec: "MjSpec", fault: Fault, seed: int) -> None:
@@ -154,18 +154,18 @@ class Roughness(FaultKind):
             # A plane's centre is arbitrary; that of the field is the initial position.
             plane.pos = [0.0, 0.0, plane.pos[2] + low]
 
-    def adapt_to_contacts(self, embodiment: "Embodiment", fault: Fault, points: FloatArray) -> None:
+    def adapt_to_contacts(self, variant: "ModelVariant", fault: Fault, points: FloatArray) -> None:
         """Sets the height field to the estimated terrain, scaled by the severity."""
         import mujoco  # noqa: PLC0415  # faults/ imports without MuJoCo
 
-        model = embodiment.model
+        model = variant.model
         field = model.hfield(TERRAIN_NAME)
         fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
         (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
         inverse = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
         in_field_frame = rotated(points - model.geom_pos[geom], inverse)
         # The data is a fraction of the field's height above the lowest drawn height.
-        lowest = fault.severity * float(unit_heights(embodiment.seed).min())
+        lowest = fault.severity * float(unit_heights(variant.seed).min())
         parts = (fault.severity * estimated_heights(in_field_frame) - lowest) / field.size[2]
         field.data[:] = np.clip(parts, 0, 1)
 

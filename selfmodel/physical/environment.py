@@ -25,8 +25,8 @@ from selfmodel.physical.safety import (
 )
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Sample, StepTiming
 from selfmodel.trials.signals import SIGNALS, Names, Signal
+from selfmodel.trials.trajectory import Sample, StepTiming
 
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an

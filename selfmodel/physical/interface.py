@@ -9,8 +9,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Sample
 
 NORM_TOLERANCE = 0.01
 """Largest deviation of a measured quaternion's norm from 1."""

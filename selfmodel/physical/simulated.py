@@ -14,7 +14,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import BROKEN
 from selfmodel.robot.anatomy_reader import joint_limits
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS
 from selfmodel.simulation.domain import (
@@ -30,8 +30,8 @@ from selfmodel.simulation.reality_gap import (
     perturbed_model,
 )
 from selfmodel.simulation.rollout import Rollout
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS, Signal
+from selfmodel.trials.trajectory import Sample
 
 OWN_SEED = 1
 """Seed of the randomness of a fault, such as terrain, in a physical robot without a gap; the
@@ -66,10 +66,10 @@ class NoisyMeasurement(Measurement):
     """
 
     def __init__(
-        self, level: float, robot: Robot, embodiment: Embodiment, rng: np.random.Generator
+        self, level: float, robot: Robot, variant: ModelVariant, rng: np.random.Generator
     ) -> None:
         self._level, self._rng = level, rng
-        self._dead = dead_sensors(robot.anatomy, embodiment)
+        self._dead = dead_sensors(robot.anatomy, variant)
         self._touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
         hinges = [robot.model.joint(name).id for name in robot.anatomy.hinges]
         # MuJoCo leaves the range of an unlimited hinge in degrees, if the MJCF is in degrees.
@@ -120,7 +120,7 @@ class SimulatedRobot:
         self._gap = gap if gap is not None and gap.level > 0 else None
         self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
         seed = gap.seed if gap else OWN_SEED
-        self._embodiment = physical_embodiment(robot, hidden, seed, self._gap)
+        self._variant = physical_variant(robot, hidden, seed, self._gap)
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
@@ -141,21 +141,21 @@ class SimulatedRobot:
     def _run(
         self, child: np.random.SeedSequence, controller: CommandSource, steps: int
     ) -> Iterator[Sample]:
-        robot, embodiment, gap = self._robot, self._embodiment, self._gap
+        robot, variant, gap = self._robot, self._variant, self._gap
         measurement, start = Measurement(), None
         if gap is not None:
             (of_faults,) = child.spawn(1)
             seed = int(of_faults.generate_state(1)[0])
-            embodiment = dataclasses.replace(embodiment, seed=seed)
+            variant = dataclasses.replace(variant, seed=seed)
             rng = np.random.default_rng(child)
-            measurement = NoisyMeasurement(gap.level, robot, embodiment, rng)
-            data = mujoco.MjData(embodiment.model)
-            randomize_initial_pose(robot, embodiment.model, data, start_spread(gap.level), rng)
-            place_debris(embodiment.model, data, self._limbs)
+            measurement = NoisyMeasurement(gap.level, robot, variant, rng)
+            data = mujoco.MjData(variant.model)
+            randomize_initial_pose(robot, variant.model, data, start_spread(gap.level), rng)
+            place_debris(variant.model, data, self._limbs)
             start = data.qpos[np.newaxis]
         rollout = Rollout(
             robot,
-            [embodiment],
+            [variant],
             [controller],
             SIGNALS,
             start=start,
@@ -180,9 +180,9 @@ class SimulatedRobot:
             )
 
 
-def physical_embodiment(
+def physical_variant(
     robot: Robot, hidden: Hypothesis, seed: int, gap: RealityGap | None = None
-) -> Embodiment:
+) -> ModelVariant:
     """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
 
     The seed is that of the random parts of the faults.

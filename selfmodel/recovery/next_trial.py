@@ -24,8 +24,8 @@ from selfmodel.recovery.scores import first_falls
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Cache, Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, difference
+from selfmodel.trials.trajectory import Trajectory
 
 GENERATIONS = 8
 """Generations of offspring of the controllers with the largest disagreement: the first offspring of
@@ -160,7 +160,7 @@ class Disagreement:
         upright = np.flatnonzero(falls == self._early)
         disagreement = np.zeros(len(candidates))
         if upright.size:
-            commands = early.behaviour["commands"][upright, 0]
+            commands = early.trajectory["commands"][upright, 0]
             known = disagreements_on(commands, self.hypotheses, self.simulator)
             disagreement[upright] = np.where(np.isnan(known), -1.0, known)
         return np.stack([falls, disagreement], axis=1)
@@ -172,7 +172,7 @@ class Disagreement:
         """First fall under any hypothesis, ``(drivers,)``; 0 for a simulation that diverges."""
         robot = self.simulator.robot
         normals = np.array([build(robot, hypothesis).normal for hypothesis in self.hypotheses])
-        falls = first_falls(simulated.behaviour, normals, robot.standing_height)
+        falls = first_falls(simulated.trajectory, normals, robot.standing_height)
         return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
 
 
@@ -198,7 +198,7 @@ def disagreements_on(
     drivers = [Playback(motors, rows) for rows in commands]
     outcome = _predicted(simulator, drivers, hypotheses, commands.shape[1])
     with np.errstate(invalid="ignore", over="ignore"):  # values of a diverged simulation
-        values = disagreements(outcome.behaviour)
+        values = disagreements(outcome.trajectory)
     return np.where(outcome.diverged.any(axis=1), np.nan, values)
 
 
@@ -214,24 +214,24 @@ def _predicted(
     return outcome.grouped(len(drivers), len(hypotheses))
 
 
-def disagreements(behaviour: Behaviour) -> FloatArray:
+def disagreements(trajectory: Trajectory) -> FloatArray:
     """Returns the disagreement of the hypotheses on each controller, 0 to 1.
 
     The disagreement is the mean difference of two predictions, relative to ``DISAGREEMENT_SCALES``,
     over all pairs of hypotheses, signals, columns and early steps.
 
     Args:
-        behaviour: Signals of ``DISAGREEMENT_SCALES``, ``(controllers, hypotheses, steps, width)``
+        trajectory: Signals of ``DISAGREEMENT_SCALES``, ``(controllers, hypotheses, steps, width)``
             each.
 
     Returns:
         ``(controllers,)``; 0 for a single hypothesis, NaN if a simulation diverged.
     """
-    controllers, hypotheses = behaviour["sensors"].shape[:2]
+    controllers, hypotheses = trajectory["sensors"].shape[:2]
     pairs = list(combinations(range(hypotheses), 2))
     total = np.zeros(controllers)
     for name, scale in DISAGREEMENT_SCALES.items():
-        values = behaviour[name][:, :, :EARLY_STEPS]
+        values = trajectory[name][:, :, :EARLY_STEPS]
         for first, second in pairs:
             differences = difference(name, values[:, first], values[:, second])
             total += np.minimum(np.abs(differences) / scale, 1).mean(axis=(1, 2))

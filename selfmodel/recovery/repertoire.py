@@ -22,8 +22,8 @@ from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import forward_displacement
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import forward_displacement
 from selfmodel.version import __version__
 
 if TYPE_CHECKING:
@@ -279,11 +279,11 @@ def _evaluate(
     for start in range(0, len(controllers), BATCH):
         runs = [(hypothesis, one) for one in controllers[start : start + BATCH]]
         outcome = simulator.run(runs, steps, RECORD)
-        moved = np.array(forward_displacement(outcome.behaviour))
-        fell = falls_of(robot, hypothesis, outcome.behaviour) < steps
+        moved = np.array(forward_displacement(outcome.trajectory))
+        fell = falls_of(robot, hypothesis, outcome.trajectory) < steps
         moved[outcome.diverged | fell | ~(moved > 0)] = -np.inf
         scores.append(moved)
-        duty.append(duty_factors(robot.anatomy, outcome.behaviour["sensors"]))
+        duty.append(duty_factors(robot.anatomy, outcome.trajectory["sensors"]))
     return np.concatenate(scores), np.concatenate(duty)
 
 

@@ -20,9 +20,9 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.rollout import SimulationResult
-from selfmodel.trials.behaviour import Behaviour, forward_displacement
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 FALLEN_HEIGHT = 0.5
@@ -56,7 +56,7 @@ class Score:
     Attributes:
         name: Name of the score.
         record: Signals that the score is computed from.
-        of: Function of a healthy robot, a hypothesis and the behaviour of a batch of rollouts,
+        of: Function of a healthy robot, a hypothesis and the trajectory of a batch of rollouts,
             ``(n, steps, width)`` per signal, that returns the scores, ``(n,)``. The score of a
             rollout does not depend on the other rollouts of the batch.
         unit: Unit of the score; "" for none.
@@ -68,16 +68,16 @@ class Score:
 
     name: str
     record: tuple[Signal, ...]
-    of: Callable[[Robot, Hypothesis, Behaviour], FloatArray]
+    of: Callable[[Robot, Hypothesis, Trajectory], FloatArray]
     unit: str = ""
     grows_with_time: bool = False
     needs_free_base: bool = False
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
         """Returns the score of a trial of a robot with faults; NaN if it was not observed."""
-        logged = trial.behaviour
+        logged = trial.trajectory
         signals = {signal: logged[signal][np.newaxis] for signal in self.record}
-        batch = Behaviour(logged.names, logged.time, signals)
+        batch = Trajectory(logged.names, logged.time, signals)
         return float(self.of(robot, hypothesis, batch)[0])
 
 
@@ -92,39 +92,39 @@ def scores_of(
         hypotheses: Faults of the robot in each column of the rollouts.
         outcome: The rollouts, ``(n, hypotheses)``, which is the shape of the scores.
     """
-    scores, simulated = np.full(outcome.diverged.shape, -np.inf), outcome.behaviour
+    scores, simulated = np.full(outcome.diverged.shape, -np.inf), outcome.trajectory
     for column, hypothesis in enumerate(hypotheses):
         rows = ~outcome.diverged[:, column]
         if rows.any():
             signals = {name: values[rows, column] for name, values in simulated.signals.items()}
-            finite = Behaviour(simulated.names, simulated.time, signals)
+            finite = Trajectory(simulated.names, simulated.time, signals)
             scores[rows, column] = score.of(robot, hypothesis, finite)
     return scores
 
 
-def falls_of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> IndexArray:
+def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> IndexArray:
     """Returns the first step at which each run has fallen, or the number of steps without a fall.
 
     Args:
         robot: The healthy robot.
         hypothesis: Faults of the robot, of which a slope tilts the ground.
-        behaviour: Position and orientation of the base, ``(..., steps, width)`` each.
+        trajectory: Position and orientation of the base, ``(..., steps, width)`` each.
 
     Returns:
         Step indices, ``(...)``.
     """
-    return first_falls(behaviour, build(robot, hypothesis).normal, robot.standing_height)
+    return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
 
 
-def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: float) -> IndexArray:
+def first_falls(trajectory: Trajectory, normals: FloatArray, standing_height: float) -> IndexArray:
     """Returns the first step at which the robot has fallen, or the number of steps without a fall.
 
     At that step the base is low or tilted, and so it is for most of ``FALLEN_TIME``; see
     ``first_lasting``.
 
     Args:
-        behaviour: Position and orientation of the base, ``(..., steps, width)`` each; NaN where not
-            observed.
+        trajectory: Position and orientation of the base, ``(..., steps, width)`` each; NaN where
+            not observed.
         normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
             ground passes through the origin.
         standing_height: Height of the base in the initial pose, m.
@@ -132,16 +132,16 @@ def first_falls(behaviour: Behaviour, normals: FloatArray, standing_height: floa
     Returns:
         Step indices, ``(...)``.
     """
-    height = np.einsum("...sk,...k->...s", behaviour["base_position"], normals)
+    height = np.einsum("...sk,...k->...s", trajectory["base_position"], normals)
     # The world's upward direction in the frame of the base, against the first one that is known.
-    upward = directions(behaviour["base_orientation"])[..., 2:]
+    upward = directions(trajectory["base_orientation"])[..., 2:]
     first = np.isfinite(upward).all(axis=-1).argmax(axis=-1)
     reference = np.take_along_axis(upward, first[..., np.newaxis, np.newaxis], axis=-2)
     cosine = (upward * reference).sum(axis=-1)
     low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
     down = low | (cosine < np.cos(FALLEN_TILT))
     up = ~down & (np.isfinite(height) | np.isfinite(cosine))
-    return first_lasting(down, up, _steps_in(FALLEN_TIME, behaviour))
+    return first_lasting(down, up, _steps_in(FALLEN_TIME, trajectory))
 
 
 def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
@@ -152,25 +152,25 @@ def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
     """
     if robot.has_fixed_base:
         return None
-    logged = trial.behaviour
+    logged = trial.trajectory
     whole = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
     fall = int(falls_of(robot, hypothesis, whole))
     return fall if fall < logged.steps else None
 
 
-def held_at_the_end(behaviour: Behaviour) -> Behaviour:
+def held_at_the_end(trajectory: Trajectory) -> Trajectory:
     """Returns the signals of a run that ended early as if the last ones remained.
 
     A robot that is stopped as it falls has few measurements of the fall.
     """
-    more, time = _steps_in(FALLEN_TIME, behaviour), behaviour.time
-    step = time[-1] - time[-2] if behaviour.steps > 1 else FALLEN_TIME
+    more, time = _steps_in(FALLEN_TIME, trajectory), trajectory.time
+    step = time[-1] - time[-2] if trajectory.steps > 1 else FALLEN_TIME
     signals = {
         name: np.pad(values, ((0, more), (0, 0)), mode="edge")
-        for name, values in behaviour.signals.items()
+        for name, values in trajectory.signals.items()
     }
     later = time[-1] + step * np.arange(1, more + 1)
-    return Behaviour(behaviour.names, np.concatenate([time, later]), signals)
+    return Trajectory(trajectory.names, np.concatenate([time, later]), signals)
 
 
 def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
@@ -196,39 +196,39 @@ def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
     return np.asarray(np.where(lasting.any(axis=-1), lasting.argmax(axis=-1), run))
 
 
-def _steps_in(duration: float, behaviour: Behaviour) -> int:
+def _steps_in(duration: float, trajectory: Trajectory) -> int:
     """Returns the control steps in a time, s, at least 1."""
-    time = behaviour.time
+    time = trajectory.time
     return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
 
 
-def _displacement(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-    return forward_displacement(behaviour)
+def _displacement(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    return forward_displacement(trajectory)
 
 
-def _upright(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-    x = behaviour["base_position"][..., 0]
-    last = np.maximum(falls_of(robot, hypothesis, behaviour) - 1, 0)
+def _upright(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    x = trajectory["base_position"][..., 0]
+    last = np.maximum(falls_of(robot, hypothesis, trajectory) - 1, 0)
     end = np.take_along_axis(x, last[..., np.newaxis], axis=-1)[..., 0]
     return np.asarray(end - x[..., 0])
 
 
-def _upright_less_work(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+def _upright_less_work(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     model = build(robot, hypothesis).model
     weight = float(model.body_mass.sum() * np.linalg.norm(model.opt.gravity))
-    cost = joint_work(robot, behaviour) / weight if weight else 0.0
-    return np.asarray(_upright(robot, hypothesis, behaviour) - WORK_WEIGHT * cost)
+    cost = joint_work(robot, trajectory) / weight if weight else 0.0
+    return np.asarray(_upright(robot, hypothesis, trajectory) - WORK_WEIGHT * cost)
 
 
-def joint_work(robot: Robot, behaviour: Behaviour) -> FloatArray:
+def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:
     """Returns the mechanical work of the joints, J, ``(...)``: work on a motor counts as spent.
 
     Args:
         robot: The robot, for its control time step.
-        behaviour: Efforts and velocities of the joints, ``(..., steps, hinges)`` each; single NaN
+        trajectory: Efforts and velocities of the joints, ``(..., steps, hinges)`` each; single NaN
             count as 0, and the work of a run without any number is NaN.
     """
-    power = np.abs(behaviour["joint_efforts"] * behaviour["joint_velocities"])
+    power = np.abs(trajectory["joint_efforts"] * trajectory["joint_velocities"])
     observed = np.isfinite(power).any(axis=(-2, -1))
     work = np.nansum(power, axis=(-2, -1)) * robot.control_timestep
     return np.asarray(np.where(observed, work, np.nan))
@@ -309,22 +309,22 @@ def upright_within(
         )
     compares_bodies = math.isfinite(max_self_collision)
 
-    def of(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-        moved = np.diff(_held(behaviour["base_position"][..., 0]), axis=-1)
+    def of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+        moved = np.diff(_held(trajectory["base_position"][..., 0]), axis=-1)
         # A joint that has come off lies on the ground, and is not the robot's.
         detached = build(robot, hypothesis).detached
         attached = [j for j, name in enumerate(robot.anatomy.hinges) if name not in detached]
         # NaN is not over a limit.
-        speeding = np.abs(behaviour["joint_velocities"][..., attached]) > max_speed
-        straining = np.abs(behaviour["joint_efforts"][..., attached]) > max_torque
+        speeding = np.abs(trajectory["joint_velocities"][..., attached]) > max_speed
+        straining = np.abs(trajectory["joint_efforts"][..., attached]) > max_torque
         over: BoolArray = np.any(speeding | straining, axis=-1)
         counted = np.where(over[..., 1:], np.minimum(moved, 0.0), moved)
-        end = falls_of(robot, hypothesis, behaviour)
+        end = falls_of(robot, hypothesis, trajectory)
         if compares_bodies:
-            deep = _depths(robot, hypothesis, behaviour) > max_self_collision
-            steps = _steps_in(COLLISION_TIME, behaviour)
+            deep = _depths(robot, hypothesis, trajectory) > max_self_collision
+            steps = _steps_in(COLLISION_TIME, trajectory)
             end = np.minimum(end, first_lasting(deep, ~deep, steps))
-        before = np.arange(1, behaviour.steps) < end[..., np.newaxis]
+        before = np.arange(1, trajectory.steps) < end[..., np.newaxis]
         return np.asarray(np.where(before, counted, 0.0).sum(axis=-1))
 
     limits = {"rad/s": max_speed, "N m": max_torque, "m of self-collision": max_self_collision}
@@ -335,13 +335,13 @@ def upright_within(
     return Score(name, signals, of, unit="m", grows_with_time=True, needs_free_base=True)
 
 
-def _depths(robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
+def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     """Returns the depth of self-collision at each step, m, ``(..., steps)``.
 
     A joint without a measurement is where it was last measured, or else in the initial pose.
     Detached bodies do not count, and encoders have the offsets of the hypothesis.
     """
-    logged = np.moveaxis(_held(np.moveaxis(behaviour["joint_positions"], -1, -2)), -2, -1)
+    logged = np.moveaxis(_held(np.moveaxis(trajectory["joint_positions"], -1, -2)), -2, -1)
     angles = logged - build(robot, hypothesis).encoder_offset
     initial = [float(robot.model.joint(name).qpos0[0]) for name in robot.anatomy.hinges]
     poses = np.where(np.isfinite(angles), angles, initial)
@@ -373,12 +373,12 @@ def checked(score: Score, name: str) -> Score:
 
 
 def _checked(
-    score: Score, name: str, robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour
+    score: Score, name: str, robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory
 ) -> FloatArray:
-    runs = len(behaviour[score.record[0]])
+    runs = len(trajectory[score.record[0]])
     expected = f"the score {name!r}: expected one number for each of {runs} runs"
     try:
-        result: object = score.of(robot, hypothesis, behaviour)
+        result: object = score.of(robot, hypothesis, trajectory)
     except KeyError as error:
         if "was not recorded" not in str(error):
             raise
@@ -399,7 +399,7 @@ def _checked(
             f"gets signals of shape (runs, steps, width): sum over the steps, not over the runs"
         )
     # A run that was not observed whole, or diverged, may have no number.
-    known = [np.abs(behaviour[signal]) <= LARGEST for signal in score.record]
+    known = [np.abs(trajectory[signal]) <= LARGEST for signal in score.record]
     whole = np.all([signal.all(axis=(1, 2)) for signal in known], axis=0)
     wrong = whole & (np.isnan(values) | np.isposinf(values))
     if wrong.any():

@@ -12,7 +12,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 TRACKING = "tracking"
 """Name of the score."""
@@ -83,22 +83,22 @@ def _tracked(
     hinges: Sequence[str],
     robot: Robot,
     hypothesis: Hypothesis,
-    behaviour: Behaviour,
+    trajectory: Trajectory,
 ) -> FloatArray:
     """Returns the scores of a batch of runs, ``(n,)``; NaN for a run without any observation."""
     detached = build(robot, hypothesis).detached
     compared = [name for name in hinges if name not in detached] or hinges
-    steps = behaviour.time <= reference.time[-1]
+    steps = trajectory.time <= reference.time[-1]
     desired = [
         np.interp(
-            behaviour.time[steps],
+            trajectory.time[steps],
             reference.time,
             reference.positions[:, reference.hinges.index(name)],
         )
         for name in compared
     ]
     columns = [robot.anatomy.hinges.index(name) for name in compared]
-    positions = behaviour["joint_positions"][:, steps][..., columns]
+    positions = trajectory["joint_positions"][:, steps][..., columns]
     squares = np.square(positions - np.stack(desired, axis=-1))
     observed = np.isfinite(squares)
     count = observed.sum(axis=(1, 2))

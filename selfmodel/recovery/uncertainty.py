@@ -160,8 +160,8 @@ def _variances(simulator: Simulator, trial: Trial) -> tuple[FloatArray, FloatArr
         Variance of the readings and frequency of their flips, ``(sensors,)`` each; variance of the
         initial joint angles, and of the initial roll and pitch, NaN if not observed.
     """
-    logged = trial.behaviour
-    runs = simulator.run([(INTACT, trial.plan.controller)], logged.steps, NOISY).behaviour
+    logged = trial.trajectory
+    runs = simulator.run([(INTACT, trial.plan.controller)], logged.steps, NOISY).trajectory
     pairs = [(logged[signal], runs[signal][0]) for signal in NOISY]
     readings, angles, orientations = pairs
     roll_and_pitch = [directions(each)[:, 2:4] for each in orientations]
@@ -330,10 +330,10 @@ def _paths(
             conditions[first : first + size],
             uncertainty,
             [trial.plan.controller],
-            trial.behaviour.steps,
+            trial.trajectory.steps,
             ("base_position", "base_orientation"),
         )
-        simulated = outcome.behaviour
+        simulated = outcome.trajectory
         position, orientation = simulated["base_position"][0], simulated["base_orientation"][0]
         paths += [
             np.full(3 * MARKS, np.nan) if diverged else _path(_track(*run))
@@ -347,7 +347,7 @@ def _observed(trial: Trial) -> FloatArray:
 
     Steps at which the base was not observed are interpolated; all are NaN if it never was.
     """
-    logged = trial.behaviour
+    logged = trial.trajectory
     track = _track(logged["base_position"], logged["base_orientation"])
     steps = np.arange(len(track))
     for column in track.T:

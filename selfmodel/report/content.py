@@ -19,8 +19,8 @@ from selfmodel.report.scene import Motion, Shot, scene_of
 from selfmodel.report.subject import Subject
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.simulation.trial_replay import replay
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 NOT_FINISHED = "The recovery is not finished"
@@ -130,8 +130,8 @@ def _shot(subject: Subject, trial: Trial, hypotheses: Sequence[tuple[str, Hypoth
     for name, hypothesis in hypotheses:
         result = replay(trial, hypothesis, subject.simulator)
         signals = {signal: result.simulated[signal] for signal in SIGNALS}
-        behaviour = Behaviour(result.simulated.names, trial.behaviour.time, signals)
-        rollouts.append(Motion(name, hypothesis, behaviour, result.diverged))
+        trajectory = Trajectory(result.simulated.names, trial.trajectory.time, signals)
+        rollouts.append(Motion(name, hypothesis, trajectory, result.diverged))
     change = subject.change_of(trial)
     mark = None if change is None else change[0]
     return Shot(subject.names[trial.path], trial, tuple(rollouts), mark)
@@ -174,7 +174,7 @@ def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
     rows = []
     for one in shots:
         first = one.rollouts[0]
-        row: list[charts.Cell] = [one.name, one.trial.plan.stage, one.trial.behaviour.steps]
+        row: list[charts.Cell] = [one.name, one.trial.plan.stage, one.trial.trajectory.steps]
         row += [one.trial.displacement, first.displacement, str(first.hypothesis)]
         row += [] if result is None else _scores(results.get(one.name))
         rows.append(tuple(row))
@@ -319,19 +319,19 @@ def gait_section(subject: Subject, shots: Sequence[Shot]) -> Section | None:
 
 
 def _diagram(shot: Shot, touch: dict[str, int]) -> charts.GaitDiagram:
-    motions = [("measured", shot.trial.behaviour)]
-    motions += [(one.name, one.behaviour) for one in shot.rollouts[:1] if not one.diverged]
+    motions = [("measured", shot.trial.trajectory)]
+    motions += [(one.name, one.trajectory) for one in shot.rollouts[:1] if not one.diverged]
     return charts.GaitDiagram(
         title=f"Contacts in {shot.name}",
         groups={
             name: tuple(
-                charts.Lane(sensor, tuple(_spans(behaviour.time, behaviour["sensors"][:, i])))
+                charts.Lane(sensor, tuple(_spans(trajectory.time, trajectory["sensors"][:, i])))
                 for sensor, i in touch.items()
             )
-            for name, behaviour in motions
-            if np.isfinite(behaviour["sensors"][:, list(touch.values())]).any()
+            for name, trajectory in motions
+            if np.isfinite(trajectory["sensors"][:, list(touch.values())]).any()
         },
-        end=float(shot.trial.behaviour.time[-1]),
+        end=float(shot.trial.trajectory.time[-1]),
     )
 
 

@@ -81,7 +81,7 @@ def _axis(subject: Subject) -> tuple[dict[str, float], tuple[charts.Mark, ...]]:
         change = subject.change_of(trial)
         if change is not None:
             marks.append(charts.Mark("change of the robot", *(now + time for time in change)))
-        now += float(trial.behaviour.time[-1]) + subject.robot.control_timestep
+        now += float(trial.trajectory.time[-1]) + subject.robot.control_timestep
     return offsets, tuple(marks)
 
 
@@ -155,7 +155,7 @@ def sensor_errors(
         ``(2, windows)``; root mean square errors in units of ``PREDICTION_ERROR_SCALES``,
         ``(sensors, windows)``, NaN where nothing was observed.
     """
-    robot, behaviour = subject.simulator.robot, trial.behaviour
+    robot, trajectory = subject.simulator.robot, trial.trajectory
     request = prepared_trial(subject.comparator, robot, trial).request
     result = simulate(subject.simulator, request, trial, [hypothesis])
     if result.diverged.any():
@@ -163,22 +163,22 @@ def sensor_errors(
     if isinstance(request, Segments):
         rows = request.starts[:, np.newaxis] + np.arange(request.horizon + 1)
     elif isinstance(request, ClosedLoop):
-        count = min(WINDOWS, behaviour.steps)
-        rows = np.arange(behaviour.steps // count * count).reshape(count, -1)
+        count = min(WINDOWS, trajectory.steps)
+        rows = np.arange(trajectory.steps // count * count).reshape(count, -1)
     else:
         return None
     names: list[str] = []
     errors: list[FloatArray] = []
     for signal, prefix in SHOWN:
-        if signal in result.behaviour.signals:
-            predicted = result.behaviour[signal][0]
+        if signal in result.trajectory.signals:
+            predicted = result.trajectory[signal][0]
             predicted = predicted if isinstance(request, Segments) else predicted[rows]
-            error = difference(signal, predicted, behaviour[signal][rows])
+            error = difference(signal, predicted, trajectory[signal][rows])
             errors.append(_rms(error / PREDICTION_ERROR_SCALES[signal]))
-            names += [f"{prefix}{name}" for name in behaviour.names.columns(signal)]
+            names += [f"{prefix}{name}" for name in trajectory.names.columns(signal)]
     if not errors:
         return None
-    return names, behaviour.time[rows[:, [0, -1]]].T, np.concatenate(errors)
+    return names, trajectory.time[rows[:, [0, -1]]].T, np.concatenate(errors)
 
 
 def _rms(errors: FloatArray) -> FloatArray:
@@ -221,13 +221,13 @@ def _separating_trials(subject: Subject) -> tuple[Item, ...]:
     drivers: dict[str, CommandSource] = {
         subject.names[trial.path]: trial.plan.controller for trial in subject.damaged
     }
-    steps = min(trial.behaviour.steps for trial in subject.damaged)
+    steps = min(trial.trajectory.steps for trial in subject.damaged)
     separating = _separating_controller(subject, steps)
     if separating is not None:
         drivers["a separating trial"] = separating
     early = min(steps, EARLY_STEPS)
     runs = [(apart[0], driver) for driver in drivers.values()]
-    commands = simulator.run(runs, early, ("commands",)).behaviour["commands"]
+    commands = simulator.run(runs, early, ("commands",)).trajectory["commands"]
     values = disagreements_on(commands, apart, simulator).tolist()
     chart = charts.BarChart(
         title="Disagreement of these hypotheses by trial",

@@ -23,7 +23,7 @@ from selfmodel.robot.motion import (
     visible_geoms,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 MAX_POSES = 400_000
@@ -50,25 +50,25 @@ class Motion:
         name: Name in legends, such as ``measured`` or ``best hypothesis``.
         hypothesis: Faults of the robot in this motion; of the measured robot, those of the best
             hypothesis.
-        behaviour: The motion, with the signals of a pose.
+        trajectory: The motion, with the signals of a pose.
         diverged: Whether a simulation diverged; its signals are then invalid.
     """
 
     name: str
     hypothesis: Hypothesis
-    behaviour: Behaviour
+    trajectory: Trajectory
     diverged: bool = False
 
     @property
     def displacement(self) -> float:
         """Forward displacement, m; NaN if the simulation diverged."""
-        x = self.behaviour["base_position"][:, 0]
+        x = self.trajectory["base_position"][:, 0]
         return np.nan if self.diverged else float(x[-1] - x[0])
 
     @property
     def is_drawn(self) -> bool:
         """Whether the motion is finite."""
-        return not self.diverged and bool(np.isfinite(self.behaviour["joint_positions"]).all())
+        return not self.diverged and bool(np.isfinite(self.trajectory["joint_positions"]).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Shot:
     @property
     def motions(self) -> tuple[Motion, ...]:
         """The measured motion, then those that are drawn."""
-        measured = Motion("measured", self.rollouts[0].hypothesis, self.trial.behaviour)
+        measured = Motion("measured", self.rollouts[0].hypothesis, self.trial.trajectory)
         return (measured, *(one for one in self.rollouts if one.is_drawn))
 
 
@@ -102,7 +102,7 @@ def scene_of(robot: Robot, shots: Sequence[Shot], most_poses: int = MAX_POSES) -
     last remain.
     """
     bodies = bodies_of(robot.model, robot.root)
-    poses = sum(shot.trial.behaviour.steps * len(shot.motions) for shot in shots) * len(bodies)
+    poses = sum(shot.trial.trajectory.steps * len(shot.motions) for shot in shots) * len(bodies)
     stride = max(1, -(-poses // most_poses))
     return {**geometry_of(robot), "shots": [_shot(robot, bodies, one, stride) for one in shots]}
 
@@ -166,7 +166,7 @@ def _turned(robot: Robot, index: Mapping[int, int]) -> Iterator[dict[str, Any]]:
 
 
 def _shot(robot: Robot, bodies: IndexArray, shot: Shot, stride: int) -> dict[str, Any]:
-    time = shot.trial.behaviour.time
+    time = shot.trial.trajectory.time
     steps = np.unique(np.append(np.arange(0, len(time), stride), len(time) - 1))
     return {
         "name": shot.name,
@@ -179,7 +179,7 @@ def _shot(robot: Robot, bodies: IndexArray, shot: Shot, stride: int) -> dict[str
 def _motion(robot: Robot, bodies: IndexArray, motion: Motion, steps: IndexArray) -> dict[str, Any]:
     index = {int(body): i for i, body in enumerate(bodies)}
     # A welded hinge has its own rotation in the hypothesis's model; the geometry is the robot's.
-    poses = poses_of(robot, robot.model, motion.behaviour)
+    poses = poses_of(robot, robot.model, motion.trajectory)
     qpos = poses.qpos[steps]
     drawn = body_poses(robot.model, qpos)[:, bodies].reshape(-1, 7)
     hinges = [int(robot.model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]

@@ -97,7 +97,7 @@ class Anatomy:
 
     @property
     def names(self) -> Names:
-        """Column names of this robot's behaviours."""
+        """Column names of this robot's trajectories."""
         return Names(tuple(sensor.name for sensor in self.sensors), self.motors, self.hinges)
 
 

@@ -13,9 +13,9 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.robot.contacts import touching_geoms
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer, with_known_base
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.rotation import rotated
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 
 POSE: tuple[Signal, ...] = ("joint_positions", "base_position", "base_orientation")
 """Signals that determine a pose."""
@@ -62,22 +62,22 @@ class Poses:
     forward: FloatArray
 
 
-def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses:
-    """Returns the poses of a behaviour; the base of a robot that is fixed is known.
+def poses_of(robot: Robot, model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
+    """Returns the poses of a trajectory; the base of a robot that is fixed is known.
 
     A missing value is the last observation before it, or the first one.
 
     Args:
-        robot: Robot of the behaviour.
+        robot: Robot of the trajectory.
         model: Model with the robot's layout; positions in no signal are as in its reference pose.
-        behaviour: One run with the signals of ``POSE``.
+        trajectory: One run with the signals of ``POSE``.
     """
-    behaviour = with_known_base(robot, behaviour)
-    held = np.zeros(behaviour.steps, dtype=bool)
+    trajectory = with_known_base(robot, trajectory)
+    held = np.zeros(trajectory.steps, dtype=bool)
     missing: list[str] = []
     state: dict[Signal, FloatArray] = {}
     for signal in POSE:
-        values = behaviour[signal]
+        values = trajectory[signal]
         seen = np.isfinite(values)
         if signal != "joint_positions":
             # A position or a quaternion with a missing component is missing.
@@ -85,7 +85,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
         known: BoolArray = np.any(seen, axis=0)
         held |= (~seen & known).any(axis=1)
         if signal == "joint_positions":
-            names = behaviour.names.columns(signal)
+            names = trajectory.names.columns(signal)
             missing += [name for column, name in enumerate(names) if not known[column]]
             reference = [float(model.joint(name).qpos0[0]) for name in names]
             state[signal] = np.where(known, _filled(values, seen), reference)
@@ -93,8 +93,8 @@ def poses_of(robot: Robot, model: mujoco.MjModel, behaviour: Behaviour) -> Poses
             state[signal] = _filled(values, seen)
         else:
             missing.append(signal)
-    forward = behaviour["base_position"][:, 0]
-    return Poses(positions_of(robot, model, state, behaviour.steps), held, tuple(missing), forward)
+    forward = trajectory["base_position"][:, 0]
+    return Poses(positions_of(robot, model, state, trajectory.steps), held, tuple(missing), forward)
 
 
 def positions_of(

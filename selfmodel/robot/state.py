@@ -14,12 +14,12 @@ import numpy as np
 from selfmodel.arrays import FloatArray, columns
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import joints_of_body, reference_pose
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import with_joint_velocities
 from selfmodel.trials.rotation import product, rotated
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 Bind = Callable[[str], FloatArray]
@@ -283,17 +283,17 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
     }
 
 
-def observed_fields(robot: Robot, embodiments: Sequence[Embodiment]) -> dict[Signal, SignalSource]:
+def observed_fields(robot: Robot, variants: Sequence[ModelVariant]) -> dict[Signal, SignalSource]:
     """Returns ``signal_fields`` as robots log them: joint positions with the encoders' offsets.
 
     Args:
         robot: The healthy robot.
-        embodiments: An embodiment for all states, or one per state.
+        variants: A variant for all states, or one per state.
     """
-    fields = signal_fields(robot, *(embodiment.model for embodiment in embodiments))
-    offsets = np.array([embodiment.encoder_offset for embodiment in embodiments])
+    fields = signal_fields(robot, *(variant.model for variant in variants))
+    offsets = np.array([variant.encoder_offset for variant in variants])
     if offsets.any():
-        joints = _joint_fields(robot, embodiments[0].model)["joint_positions"]
+        joints = _joint_fields(robot, variants[0].model)["joint_positions"]
         fields["joint_positions"] = dataclasses.replace(joints, shift=offsets)
     return fields
 
@@ -349,26 +349,28 @@ def current_value(field: SignalSource, data: mujoco.MjData) -> FloatArray:
     return np.array(field.reader(bind_data(data))()[0])
 
 
-def with_known_base(robot: Robot, behaviour: Behaviour) -> Behaviour:
-    """Returns a behaviour with its robot's physics steps, and a known base if the base is fixed.
+def with_known_base(robot: Robot, trajectory: Trajectory) -> Trajectory:
+    """Returns a trajectory with its robot's physics steps, and a known base if the base is fixed.
 
     Values that were observed are unchanged.
 
     Args:
-        robot: The robot of the behaviour.
-        behaviour: Behaviour of one run.
+        robot: The robot of the trajectory.
+        trajectory: Trajectory of one run.
     """
-    if behaviour.substeps != robot.substeps:
-        behaviour = dataclasses.replace(behaviour, substeps=robot.substeps)
+    if trajectory.substeps != robot.substeps:
+        trajectory = dataclasses.replace(trajectory, substeps=robot.substeps)
     if not robot.has_fixed_base:
-        return behaviour
+        return trajectory
     fields, data = signal_fields(robot), mujoco.MjData(robot.model)
     known = dict[Signal, FloatArray]()
     for signal in BASE_SIGNALS:
         constant = current_value(fields[signal], data)
-        observed = behaviour.signals.get(signal, np.full((behaviour.steps, len(constant)), np.nan))
+        observed = trajectory.signals.get(
+            signal, np.full((trajectory.steps, len(constant)), np.nan)
+        )
         known[signal] = np.where(np.isnan(observed), constant, observed)
-    return dataclasses.replace(behaviour, signals={**behaviour.signals, **known})
+    return dataclasses.replace(trajectory, signals={**trajectory.signals, **known})
 
 
 def completed_trial(robot: Robot, trial: Trial) -> Trial:
@@ -376,10 +378,10 @@ def completed_trial(robot: Robot, trial: Trial) -> Trial:
 
     The base is known, and joint velocities that were not logged are estimated.
     """
-    behaviour = with_known_base(robot, trial.behaviour)
+    trajectory = with_known_base(robot, trial.trajectory)
     if robot.has_fixed_base:
-        behaviour = with_joint_velocities(behaviour)
-    return dataclasses.replace(trial, behaviour=behaviour)
+        trajectory = with_joint_velocities(trajectory)
+    return dataclasses.replace(trial, trajectory=trajectory)
 
 
 class SensorReader:
@@ -391,15 +393,15 @@ class SensorReader:
     Args:
         model: Model of any of the robots; they share one layout.
         anatomy: Parts of the robots.
-        embodiments: Embodiments with the faults of their sensors.
-        copies: Number of robots per embodiment, in adjacent rows.
+        variants: ModelVariants with the faults of their sensors.
+        copies: Number of robots per variant, in adjacent rows.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
         anatomy: Anatomy,
-        embodiments: Sequence[Embodiment],
+        variants: Sequence[ModelVariant],
         copies: int = 1,
     ) -> None:
         touches = [sensor for sensor in anatomy.sensors if sensor.kind == "touch"]
@@ -409,12 +411,12 @@ class SensorReader:
         self._angle = columns([int(model.joint(sensor.hinge).qposadr[0]) for sensor in angles])
         self._centre = np.array([sensor.centre for sensor in angles])
         self._scale = np.array([1 / sensor.half_range for sensor in angles])
-        gain = np.array([embodiment.gain for embodiment in embodiments])
-        offset = np.array([embodiment.offset + embodiment.bias for embodiment in embodiments])
+        gain = np.array([variant.gain for variant in variants])
+        offset = np.array([variant.offset + variant.bias for variant in variants])
         self._faulty = bool(np.any(gain != 1) or np.any(offset != 0))
         self._gain = np.repeat(gain, copies, axis=0)
         self._offset = np.repeat(offset, copies, axis=0)
-        self._noise = SensorNoise(embodiments, copies)
+        self._noise = SensorNoise(variants, copies)
 
     def read(self, sensordata: FloatArray, qpos: FloatArray, readings: FloatArray) -> None:
         """Writes the readings of the next control step.
@@ -439,28 +441,28 @@ class SensorReader:
 class SensorNoise:
     """Adds white noise to the readings of many robots, step by step.
 
-    The noise sequence of a sensor depends on the seed of the embodiment and the column of the
+    The noise sequence of a sensor depends on the seed of the variant and the column of the
     sensor only. It is the same in any batch and for all hypotheses of one seed, so that hypotheses
     do not differ by their noise.
 
     Args:
-        embodiments: Embodiments with the standard deviations of their sensors.
-        copies: Number of robots per embodiment, in adjacent rows; each copy has its own sequence.
+        variants: ModelVariants with the standard deviations of their sensors.
+        copies: Number of robots per variant, in adjacent rows; each copy has its own sequence.
     """
 
-    def __init__(self, embodiments: Sequence[Embodiment], copies: int = 1) -> None:
+    def __init__(self, variants: Sequence[ModelVariant], copies: int = 1) -> None:
         self._copies = copies
-        deviations = np.array([embodiment.noise for embodiment in embodiments])
+        deviations = np.array([variant.noise for variant in variants])
         noisy: dict[tuple[int, int], list[int]] = {}
         for row, column in zip(*np.nonzero(deviations), strict=True):
-            noisy.setdefault((embodiments[row].seed, int(column)), []).append(int(row))
+            noisy.setdefault((variants[row].seed, int(column)), []).append(int(row))
         self._noisy = [
             (np.random.default_rng(key), rows, key[1], deviations[rows, key[1]])
             for key, rows in noisy.items()
         ]
 
     def add(self, readings: FloatArray) -> None:
-        """Adds the noise of the next step to the readings, ``(embodiments * copies, sensors)``."""
+        """Adds the noise of the next step to the readings, ``(variants * copies, sensors)``."""
         robots, sensors = readings.shape
         by_copy = readings.reshape(robots // self._copies, self._copies, sensors)
         for rng, rows, column, deviations in self._noisy:

@@ -17,7 +17,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import WELD_ARMATURE, Embodiment
+from selfmodel.robot.model_variant import WELD_ARMATURE, ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
 from selfmodel.simulation.model_factors import ModelDistribution, Parameters, model_with_parameters
@@ -96,12 +96,12 @@ class DomainSample:
     delay: int
     seed: int | None
 
-    def embodiment(self, robot: Robot) -> Embodiment:
+    def variant(self, robot: Robot) -> ModelVariant:
         """Returns the model and sensor parameters of a robot, given its self-model."""
         perturb = partial(model_with_parameters, robot, self.model)
-        embodiment = build(robot, self.hypothesis, self.seed or 0, perturb=perturb)
-        embodiment.added_delay[0] += self.delay
-        return embodiment
+        variant = build(robot, self.hypothesis, self.seed or 0, perturb=perturb)
+        variant.added_delay[0] += self.delay
+        return variant
 
 
 def draw_samples(
@@ -126,17 +126,17 @@ def draw_samples(
 
 def initial_positions(
     robot: Robot,
-    embodiments: Sequence[Embodiment],
+    variants: Sequence[ModelVariant],
     conditions: Sequence[DomainSample],
     spread: StartSpread,
 ) -> FloatArray:
     """Returns the initial generalised positions of a robot, ``(conditions, nq)``."""
     poses = []
-    for embodiment, condition in zip(embodiments, conditions, strict=True):
-        data = mujoco.MjData(embodiment.model)
+    for variant, condition in zip(variants, conditions, strict=True):
+        data = mujoco.MjData(variant.model)
         if spread != NO_SPREAD:
             rng = np.random.default_rng((condition.seed or 0, 0))
-            randomize_initial_pose(robot, embodiment.model, data, spread, rng)
+            randomize_initial_pose(robot, variant.model, data, spread, rng)
         poses.append(data.qpos.copy())
     return np.array(poses)
 
@@ -228,11 +228,11 @@ class ReadingNoise:
     def __init__(
         self,
         anatomy: Anatomy,
-        embodiments: Sequence[Embodiment],
+        variants: Sequence[ModelVariant],
         conditions: Sequence[DomainSample],
         uncertainty: DomainDistribution,
     ) -> None:
-        silent = np.array([dead_sensors(anatomy, embodiment) for embodiment in embodiments])
+        silent = np.array([dead_sensors(anatomy, variant) for variant in variants])
         self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
         self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
         self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
@@ -248,14 +248,13 @@ class ReadingNoise:
         by_condition[:, wrong] = 1 - by_condition[:, wrong]
 
 
-def dead_sensors(anatomy: Anatomy, embodiment: Embodiment) -> BoolArray:
+def dead_sensors(anatomy: Anatomy, variant: ModelVariant) -> BoolArray:
     """Returns a mask of the sensors without any signal, ``(sensors,)``.
 
     The sensor of a joint that is welded at 0 reads 0 too, but is not dead.
     """
     welded = [
-        bool(sensor.hinge) and _is_welded(embodiment.model, sensor.hinge)
-        for sensor in anatomy.sensors
+        bool(sensor.hinge) and _is_welded(variant.model, sensor.hinge) for sensor in anatomy.sensors
     ]
-    silent = (embodiment.gain == 0) & (embodiment.offset == 0)
+    silent = (variant.gain == 0) & (variant.offset == 0)
     return np.asarray(silent & ~np.array(welded, dtype=bool))

@@ -8,13 +8,13 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, held
 from selfmodel.robot.anatomy import added_steps, split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, state_writer
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.rollout import RobotBatch, SimulationResult, SimulationStats, live_signals
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
 CHUNK_BYTES = 2**25
 """Memory of the fields that are recorded in every physics step before they are read, bytes."""
@@ -23,7 +23,7 @@ CHUNK_BYTES = 2**25
 @uncounted_warnings()
 def predict(
     robot: Robot,
-    embodiments: Sequence[Embodiment],
+    variants: Sequence[ModelVariant],
     segments: Segments,
     *,
     same_dynamics_as: Sequence[int] | None = None,
@@ -44,10 +44,10 @@ def predict(
 
     Args:
         robot: The healthy robot.
-        embodiments: At least one model, with the layout of the robot.
+        variants: At least one model, with the layout of the robot.
         segments: Initial states and commands.
-        same_dynamics_as: For each embodiment the index of the first embodiment with the same
-            dynamics, whatever its sensors: only that embodiment is simulated. By default all are.
+        same_dynamics_as: For each variant the index of the first variant with the same
+            dynamics, whatever its sensors: only that variant is simulated. By default all are.
         threads: Threads of MuJoCo's steps, including the caller's.
         stats: Statistics that are updated.
         delay: Control delay, control steps; the robot's by default.
@@ -56,18 +56,18 @@ def predict(
         Signals of ``(n, segments, horizon + 1, width)``; a run has diverged if any of its segments
         has.
     """
-    n, count, horizon = len(embodiments), len(segments.starts), segments.horizon
+    n, count, horizon = len(variants), len(segments.starts), segments.horizon
     simulated, source_of = np.unique(
         np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
         return_inverse=True,
     )
-    moving = [embodiments[i] for i in simulated]
+    moving = [variants[i] for i in simulated]
     lag = robot.control_delay if delay is None else delay
     loop = _OpenLoop(robot, moving, segments, lag, threads, stats)
     together = loop.together
     qpos, sensordata = loop.bind("qpos"), loop.bind("sensordata")
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
-    reader = SensorReader(robot.model, robot.anatomy, embodiments, together)
+    reader = SensorReader(robot.model, robot.anatomy, variants, together)
     readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
@@ -88,24 +88,24 @@ def predict(
     stats.diverged += int(diverged.sum())
     hinges = robot.anatomy.hinges
     addresses = [int(robot.model.joint(name).qposadr[0]) for name in hinges]
-    predicted = Behaviour(
+    predicted = Trajectory(
         robot.anatomy.names,
         np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep,
         kept,
         welded=np.array(
-            [np.isin(addresses, [address for address, _, _ in own.welded]) for own in embodiments]
+            [np.isin(addresses, [address for address, _, _ in own.welded]) for own in variants]
         ),
-        detached=np.array([[name in own.detached for name in hinges] for own in embodiments]),
+        detached=np.array([[name in own.detached for name in hinges] for own in variants]),
     )
     return SimulationResult(predicted, diverged)
 
 
 class _OpenLoop:
-    """A batch that follows the commands of segments, for every embodiment by its control delay.
+    """A batch that follows the commands of segments, for every variant by its control delay.
 
     Args:
         robot: The healthy robot.
-        moving: The embodiments, each in adjacent rows, one per segment that is simulated together.
+        moving: The variants, each in adjacent rows, one per segment that is simulated together.
         segments: Initial states and commands.
         lag: Control delay without faults, control steps.
         threads: Threads of the physics.
@@ -115,7 +115,7 @@ class _OpenLoop:
     def __init__(  # noqa: PLR0917  # as ``predict``
         self,
         robot: Robot,
-        moving: Sequence[Embodiment],
+        moving: Sequence[ModelVariant],
         segments: Segments,
         lag: float,
         threads: int,

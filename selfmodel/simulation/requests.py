@@ -7,8 +7,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, median_of_known
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Trajectory
 
 END = 1 / 3
 """Last part of a trial that shows the encoders of a failed joint: it may fail during the trial."""
@@ -111,7 +111,7 @@ def command_steps(starts: IndexArray, horizon: int) -> IndexArray:
 
 
 def cut_segments(
-    behaviour: Behaviour,
+    trajectory: Trajectory,
     states: Mapping[Signal, FloatArray],
     starts: IndexArray,
     horizon: int,
@@ -119,4 +119,4 @@ def cut_segments(
 ) -> Segments:
     """Returns segments of a trial, given the state at each of its steps, ``(steps, width)``."""
     at_starts = {signal: values[starts] for signal, values in states.items()}
-    return Segments(at_starts, behaviour["commands"], starts, horizon, record)
+    return Segments(at_starts, trajectory["commands"], starts, horizon, record)

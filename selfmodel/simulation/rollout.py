@@ -17,13 +17,13 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.isolation import available_memory
 from selfmodel.robot.anatomy import added_steps, split_delay
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import Bind, Reader, SensorReader, observed_fields
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 
 
 @dataclass
@@ -55,27 +55,27 @@ class SimulationResult:
     """Result of a batch of runs.
 
     Attributes:
-        behaviour: The recorded signals, with a leading axis of ``n``.
+        trajectory: The recorded signals, with a leading axis of ``n``.
         diverged: Mask of the runs that diverged, ``(n,)``; their signals are invalid.
     """
 
-    behaviour: Behaviour
+    trajectory: Trajectory
     diverged: BoolArray
 
     def grouped(self, *shape: int) -> "SimulationResult":
         """Returns the result with its axis of runs, ``(n,)``, reshaped in row-major order."""
-        flat = self.behaviour
+        flat = self.trajectory
         signals = {
             signal: values.reshape(*shape, *values.shape[1:])
             for signal, values in flat.signals.items()
         }
         return SimulationResult(
-            Behaviour(flat.names, flat.time, signals), np.asarray(self.diverged.reshape(shape))
+            Trajectory(flat.names, flat.time, signals), np.asarray(self.diverged.reshape(shape))
         )
 
 
 class RobotBatch:
-    """A batch with one simulation per embodiment, which continues when some of them diverge.
+    """A batch with one simulation per variant, which continues when some of them diverge.
 
     A simulation with a MuJoCo error is stepped no longer. MuJoCo resets a simulation with a
     warning, which continues to be stepped: its values are invalid, but the simulations of a batch
@@ -83,8 +83,8 @@ class RobotBatch:
     warnings.
 
     Args:
-        model: Model of the layout of all embodiments.
-        embodiments: The robot of each simulation.
+        model: Model of the layout of all variants.
+        variants: The robot of each simulation.
         threads: Threads of the physics.
 
     Attributes:
@@ -96,14 +96,14 @@ class RobotBatch:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, embodiments: Sequence[Embodiment], threads: int
+        self, model: mujoco.MjModel, variants: Sequence[ModelVariant], threads: int
     ) -> None:
         with mujoco_errors_as_input_errors("simulate the model"):
-            self._batch = Batch(model, len(embodiments), nthread=threads)
-            self._batch.set_models([embodiment.model for embodiment in embodiments])
+            self._batch = Batch(model, len(variants), nthread=threads)
+            self._batch.set_models([variant.model for variant in variants])
         self.bind: Bind = self._batch.bind
         self._ids: IndexArray | None = None
-        self._failed = np.zeros(len(embodiments), dtype=bool)
+        self._failed = np.zeros(len(variants), dtype=bool)
 
     @property
     def running(self) -> IndexArray:
@@ -152,14 +152,14 @@ class RobotBatch:
 
 
 def live_signals(
-    robot: Robot, bind: Bind, embodiments: Sequence[Embodiment], record: Sequence[Signal]
+    robot: Robot, bind: Bind, variants: Sequence[ModelVariant], record: Sequence[Signal]
 ) -> dict[Signal, Reader]:
     """Returns functions that read the current values of recorded signals from fields of a batch.
 
     The readings and the commands of the controllers are not part of MuJoCo's state, and are
     omitted.
     """
-    state = observed_fields(robot, embodiments)
+    state = observed_fields(robot, variants)
     return {
         signal: state[signal].reader(bind)
         for signal in record
@@ -172,7 +172,7 @@ class Rollout:
 
     Args:
         robot: The robot as its model describes it.
-        embodiments: The robot of each rollout, with its faults.
+        variants: The robot of each rollout, with its faults.
         drivers: Source of the commands of each rollout.
         record: Signals that ``live`` reads.
         threads: Threads of the physics.
@@ -193,7 +193,7 @@ class Rollout:
     def __init__(
         self,
         robot: Robot,
-        embodiments: Sequence[Embodiment],
+        variants: Sequence[ModelVariant],
         drivers: Sequence[CommandSource],
         record: Sequence[Signal],
         *,
@@ -205,24 +205,24 @@ class Rollout:
     ) -> None:
         self._stats = SimulationStats() if stats is None else stats
         self._substeps, self._disturb = robot.substeps, disturb
-        model = embodiments[0].model
-        self._batch = batch = RobotBatch(model, embodiments, threads)
-        self._reader = SensorReader(model, robot.anatomy, embodiments)
+        model = variants[0].model
+        self._batch = batch = RobotBatch(model, variants, threads)
+        self._reader = SensorReader(model, robot.anatomy, variants)
         self._controllers = make_batch(
             drivers,
-            [embodiment.silent_neurons for embodiment in embodiments],
+            [variant.silent_neurons for variant in variants],
             len(robot.anatomy.sensors),
         )
         self._sensordata, self._qpos = batch.bind("sensordata"), batch.bind("qpos")
         whole, self._part = split_delay(robot.control_delay, robot.substeps)
         added = [
-            added_delay + added_steps(robot.control_delay, float(embodiment.added_delay[0]))
-            for embodiment in embodiments
+            added_delay + added_steps(robot.control_delay, float(variant.added_delay[0]))
+            for variant in variants
         ]
         delays = whole + bool(self._part) + np.array(added, dtype=np.intp)
         self._motors = _DelayLine(batch.bind("ctrl"), delays)
         self.live: dict[Signal, Callable[[], FloatArray]] = {
-            **live_signals(robot, batch.bind, embodiments, record),
+            **live_signals(robot, batch.bind, variants, record),
             "sensors": lambda: self._controllers.readings,
             # Those of the controllers, before the control delay.
             "commands": lambda: self._motors.inlet,
@@ -315,7 +315,7 @@ def largest_batch(robot: Robot, request: Request, steps: int) -> int:
 def hypothesis_bytes(robot: Robot, request: Request, steps: int) -> int:
     """Returns the memory of the simulations of one hypothesis, bytes.
 
-    Each embodiment has its own model, with all height fields, meshes and textures.
+    Each variant has its own model, with all height fields, meshes and textures.
     """
     match request:
         case ClosedLoop():

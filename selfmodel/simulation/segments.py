@@ -23,7 +23,6 @@ from selfmodel.simulation.model_factors import Parameters, model_with_parameters
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.simulation.rollout import SimulationStats, largest_batch
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import (
     BASE,
     JOINTS,
@@ -35,6 +34,7 @@ from selfmodel.trials.estimation import (
     with_joint_velocities,
 )
 from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
 
 MAX_SEGMENTS = 40
@@ -113,15 +113,15 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
         InputError: Too few states and commands are known for any segments, or a value is infinite
             or absurdly large.
     """
-    behaviour = with_known_base(robot, trial.behaviour)
+    trajectory = with_known_base(robot, trial.trajectory)
     if robot.has_fixed_base:
-        found = _consecutive(trial, behaviour)
+        found = _consecutive(trial, trajectory)
     else:
-        if behaviour.steps <= LEAD + HORIZON:
-            raise _unusable(trial, f"the trial has {behaviour.steps}")
-        some = _spread(behaviour) or _sequential(behaviour)
+        if trajectory.steps <= LEAD + HORIZON:
+            raise _unusable(trial, f"the trial has {trajectory.steps}")
+        some = _spread(trajectory) or _sequential(trajectory)
         if some is None:
-            never = _never_known(behaviour)
+            never = _never_known(trajectory)
             raise _unusable(
                 trial, f"the log never has {never}" if never else "the log has no such segment"
             )
@@ -130,16 +130,16 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     return found
 
 
-def _spread(behaviour: Behaviour) -> ObservedSegments | None:
+def _spread(trajectory: Trajectory) -> ObservedSegments | None:
     """Returns segments of the whole state; None if there are too few.
 
     They are independent and spread over the trial. With unknown hinges, which continue from the
     segment before, they follow each other.
     """
-    last = behaviour.steps - 1 - HORIZON
+    last = trajectory.steps - 1 - HORIZON
     begins = np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(np.intp))
-    states = estimated_states(behaviour, STATE)
-    onboard = _known({signal: states[signal] for signal in ONBOARD}) & _steady(behaviour)
+    states = estimated_states(trajectory, STATE)
+    onboard = _known({signal: states[signal] for signal in ONBOARD}) & _steady(trajectory)
     known = onboard & _known(states)
     whole = _all_known(known, begins)
     if not whole.any() or whole.sum() < MIN_BASE_SHARE * _all_known(onboard, begins).sum():
@@ -149,46 +149,46 @@ def _spread(behaviour: Behaviour) -> ObservedSegments | None:
         whole = _all_known(known, begins)
         if not whole.any():
             return None
-    return _cut(behaviour, states, begins[whole], HORIZON, STATE)
+    return _cut(trajectory, states, begins[whole], HORIZON, STATE)
 
 
-def _sequential(behaviour: Behaviour) -> ObservedSegments | None:
+def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     """Returns consecutive segments of the onboard state; None if too few steps are valid.
 
     Every segment with a known initial state and known commands is simulated, because later segments
     continue from its end. A step is valid if its state was observed and no command before it, in
     the segment or in its lead, was held for other than a control time step.
     """
-    begins = np.arange(0, behaviour.steps - HORIZON, HORIZON)
-    states = estimated_states(behaviour, ONBOARD)
-    starts = begins[_known(states)[begins] & _all_known(_commanded(behaviour), begins)]
-    segments = _cut(behaviour, states, starts, HORIZON, ONBOARD)
+    begins = np.arange(0, trajectory.steps - HORIZON, HORIZON)
+    states = estimated_states(trajectory, ONBOARD)
+    starts = begins[_known(states)[begins] & _all_known(_commanded(trajectory), begins)]
+    segments = _cut(trajectory, states, starts, HORIZON, ONBOARD)
     return segments if segments.valid.sum() >= HORIZON else None
 
 
-def _consecutive(trial: Trial, measured: Behaviour) -> ObservedSegments:
+def _consecutive(trial: Trial, measured: Trajectory) -> ObservedSegments:
     """Returns segments of the joints of a fixed base that begin in a known state.
 
     Joint velocities that were not measured are estimated, as the initial velocity of a segment.
     """
-    behaviour, steps = with_joint_velocities(measured), measured.steps
+    trajectory, steps = with_joint_velocities(measured), measured.steps
     compared = JOINTS[:1] if lacks_joint_velocities(measured) else JOINTS
-    timestep = float(behaviour.time[1] - behaviour.time[0]) if steps > 1 else 1.0
+    timestep = float(trajectory.time[1] - trajectory.time[0]) if steps > 1 else 1.0
     horizon = min(round(SEGMENT_SECONDS / timestep), (steps - 1 - LEAD) // MIN_SEGMENTS)
     if horizon < MIN_HORIZON:
         raise _unusable(trial, f"the trial has {steps} steps", fixed=True)
-    states = estimated_states(behaviour, STATE)
+    states = estimated_states(trajectory, STATE)
     starts = np.arange(LEAD, steps - horizon, horizon)
-    commanded = _commanded(behaviour)[command_steps(starts, horizon)].all(axis=1)
+    commanded = _commanded(trajectory)[command_steps(starts, horizon)].all(axis=1)
     starts = starts[_known(states)[starts] & commanded]
-    starts = starts[_cut(behaviour, states, starts, horizon, compared).valid.any(axis=1)]
+    starts = starts[_cut(trajectory, states, starts, horizon, compared).valid.any(axis=1)]
     if len(starts) < MIN_SEGMENTS // 2:
         raise _unusable(trial, f"the log has {len(starts)} such segments", fixed=True)
-    return _cut(behaviour, states, starts, horizon, compared)
+    return _cut(trajectory, states, starts, horizon, compared)
 
 
 def _cut(
-    behaviour: Behaviour,
+    trajectory: Trajectory,
     states: Mapping[Signal, FloatArray],
     starts: IndexArray,
     horizon: int,
@@ -196,10 +196,10 @@ def _cut(
 ) -> ObservedSegments:
     before = np.maximum(command_steps(starts, horizon), 0)
     after = starts[:, np.newaxis] + np.arange(1, horizon + 1)
-    steady = np.logical_and.accumulate(_steady(behaviour)[before], axis=1)
+    steady = np.logical_and.accumulate(_steady(trajectory)[before], axis=1)
     observed = {signal: states[signal] for signal in compared}
     return ObservedSegments(
-        segments=cut_segments(behaviour, states, starts, horizon, record=compared),
+        segments=cut_segments(trajectory, states, starts, horizon, record=compared),
         observed={signal: values[after] for signal, values in observed.items()},
         valid=steady[:, LEAD:] & _known(observed)[after],
     )
@@ -215,14 +215,14 @@ def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
     return np.asarray(complete if complete.sum() >= MIN_COMPLETE_SHARE * some.sum() else some)
 
 
-def _commanded(behaviour: Behaviour) -> BoolArray:
+def _commanded(trajectory: Trajectory) -> BoolArray:
     """Returns a mask of the steps with known commands, ``(steps,)``."""
-    return np.asarray(np.isfinite(behaviour["commands"]).all(axis=1))
+    return np.asarray(np.isfinite(trajectory["commands"]).all(axis=1))
 
 
-def _steady(behaviour: Behaviour) -> BoolArray:
+def _steady(trajectory: Trajectory) -> BoolArray:
     """Returns a mask of the known commands held for one control time step, ``(steps,)``."""
-    return np.asarray(np.isfinite(behaviour.steady_commands).all(axis=1))
+    return np.asarray(np.isfinite(trajectory.steady_commands).all(axis=1))
 
 
 def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
@@ -230,7 +230,7 @@ def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _never_known(behaviour: Behaviour) -> str:
+def _never_known(trajectory: Trajectory) -> str:
     """Returns the required signals that were never observed, with columns if only some are.
 
     Of the joints, one hinge is enough.
@@ -238,8 +238,8 @@ def _never_known(behaviour: Behaviour) -> str:
     never = []
     signals: tuple[Signal, ...] = (*ONBOARD, "commands")
     for signal in signals:
-        names = np.array(behaviour.names.columns(signal))
-        lacking = ~np.isfinite(behaviour[signal]).any(axis=0)
+        names = np.array(trajectory.names.columns(signal))
+        lacking = ~np.isfinite(trajectory[signal]).any(axis=0)
         if lacking.all() or (lacking.any() and signal not in JOINTS):
             some = "" if lacking.all() else f" of {', '.join(names[lacking])}"
             never.append(signal + some)
@@ -394,20 +394,20 @@ class SegmentErrors:
 
     def _predictor(
         self, models: Sequence[Parameters], stats: SimulationStats
-    ) -> Callable[[Segments], Behaviour]:
+    ) -> Callable[[Segments], Trajectory]:
         """Returns a function that predicts segments with models of equal delay.
 
         The signals of its result are ``(models, segments, horizon + 1, width)``.
         """
         robot, delay = self.robot, models[0].delay
-        embodiments = [
+        variants = [
             apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
             for parameters in models
         ]
 
-        def predict_with(segments: Segments) -> Behaviour:
+        def predict_with(segments: Segments) -> Trajectory:
             return predict(
-                robot, embodiments, segments, threads=self.threads, stats=stats, delay=delay
-            ).behaviour
+                robot, variants, segments, threads=self.threads, stats=stats, delay=delay
+            ).trajectory
 
         return predict_with

@@ -13,7 +13,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, state_writer, with_known_base
@@ -27,15 +27,15 @@ from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.simulation.rollout import Rollout, SimulationResult, SimulationStats, batch_bytes
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import STATE, estimated_states, known_steps
 from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 
 Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
 
-MAX_CACHED_EMBODIMENTS = 1024
+MAX_CACHED_VARIANTS = 1024
 """Largest number of cached models, if the memory does not limit it."""
 
 MAX_CACHED_ENSEMBLES = 16
@@ -63,7 +63,7 @@ class Simulator:
         >>> damaged = selfmodel.parse_hypothesis("break:front_left_knee", robot)
         >>> runs = [(selfmodel.Hypothesis(), walk), (damaged, walk)]
         >>> result = selfmodel.Simulator(robot).run(runs, steps=20, record=["base_position"])
-        >>> result.behaviour["base_position"].shape
+        >>> result.trajectory["base_position"].shape
         (2, 20, 3)
 
     Args:
@@ -80,38 +80,38 @@ class Simulator:
         self.stats = SimulationStats() if stats is None else stats
         # A quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB.
         affordable = int(CACHED_SHARE * batch_bytes()) // int(robot.model.nbuffer)
-        models = max(1, min(MAX_CACHED_EMBODIMENTS, affordable))
+        models = max(1, min(MAX_CACHED_VARIANTS, affordable))
         ensembles = max(1, min(MAX_CACHED_ENSEMBLES, affordable // _ENSEMBLE_MODELS))
-        self._embodiment = lru_cache(models)(partial(build, robot))
+        self._variant = lru_cache(models)(partial(build, robot))
         self._members = lru_cache(ensembles)(partial(perturbed_models, robot))
         points = partial(ground_contact_points, robot)
         self._contact_points = lru_cache(MAX_CACHED_ENSEMBLES)(points)
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``."""
-        embodiments = [self._embodiment(hypothesis) for hypothesis, _ in runs]
-        return self._run(embodiments, [driver for _, driver in runs], steps, record)
+        variants = [self._variant(hypothesis) for hypothesis, _ in runs]
+        return self._run(variants, [driver for _, driver in runs], steps, record)
 
     def predict(
         self,
         hypotheses: Sequence[Hypothesis],
         segments: Segments,
-        observed: Behaviour | None = None,
+        observed: Trajectory | None = None,
     ) -> SimulationResult:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``.
 
         Args:
             hypotheses: At least one hypothesis.
             segments: Initial states and commands.
-            observed: Behaviour of the trial, for fault kinds whose model adapts to its ground
+            observed: Trajectory of the trial, for fault kinds whose model adapts to its ground
                 contacts. If None, or without the base's position in the segments, such a fault
                 has the self-model's own ground.
         """
-        embodiments = [self._embodiment(hypothesis) for hypothesis in hypotheses]
+        variants = [self._variant(hypothesis) for hypothesis in hypotheses]
         if observed is not None and "base_position" in segments.states:
-            embodiments = [
-                self._adapted_to_contacts(embodiment, hypothesis, observed)
-                for embodiment, hypothesis in zip(embodiments, hypotheses, strict=True)
+            variants = [
+                self._adapted_to_contacts(variant, hypothesis, observed)
+                for variant, hypothesis in zip(variants, hypotheses, strict=True)
             ]
         first: dict[Hypothesis, int] = {}
         same_dynamics_as = [
@@ -119,7 +119,7 @@ class Simulator:
         ]
         return predict(
             self.robot,
-            embodiments,
+            variants,
             segments,
             same_dynamics_as=same_dynamics_as,
             threads=self.threads,
@@ -127,12 +127,12 @@ class Simulator:
         )
 
     def _adapted_to_contacts(
-        self, embodiment: Embodiment, hypothesis: Hypothesis, observed: Behaviour
-    ) -> Embodiment:
+        self, variant: ModelVariant, hypothesis: Hypothesis, observed: Trajectory
+    ) -> ModelVariant:
         faults = [fault for fault in hypothesis.faults if fault.kind.adapts_to_contacts]
         if not faults:
-            return embodiment
-        adapted = copy.deepcopy(embodiment)  # the argument is in the cache
+            return variant
+        adapted = copy.deepcopy(variant)  # the argument is in the cache
         for fault in faults:
             fault.kind.adapt_to_contacts(adapted, fault, self._contact_points(observed))
         return adapted
@@ -149,14 +149,14 @@ class Simulator:
         Returns:
             Signals of ``(n, members, steps, width)``; a hypothesis has diverged if any member has.
         """
-        embodiments = [
+        variants = [
             apply_faults(model, self.robot.anatomy, hypothesis)
             for hypothesis in hypotheses
             for model in self._members(hypothesis.spec_part, ensemble.members, ensemble.level)
         ]
-        flat = self._run(embodiments, [driver] * len(embodiments), steps, ensemble.record)
+        flat = self._run(variants, [driver] * len(variants), steps, ensemble.record)
         grouped = flat.grouped(len(hypotheses), ensemble.members)
-        return SimulationResult(grouped.behaviour, np.asarray(grouped.diverged.any(axis=1)))
+        return SimulationResult(grouped.trajectory, np.asarray(grouped.diverged.any(axis=1)))
 
     def run_under(
         self,
@@ -173,22 +173,22 @@ class Simulator:
             ``(drivers, conditions)``.
         """
         robot, count = self.robot, len(drivers)
-        embodiments = [condition.embodiment(robot) for condition in conditions]
-        start = initial_positions(robot, embodiments, conditions, uncertainty.start)
+        variants = [condition.variant(robot) for condition in conditions]
+        start = initial_positions(robot, variants, conditions, uncertainty.start)
         flat = self._run(
-            [*embodiments] * count,
+            [*variants] * count,
             [driver for driver in drivers for _ in conditions],
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            disturb=ReadingNoise(robot.anatomy, embodiments, conditions, uncertainty).add,
+            disturb=ReadingNoise(robot.anatomy, variants, conditions, uncertainty).add,
         )
         return flat.grouped(count, len(conditions))
 
     @uncounted_warnings()
     def _run(
         self,
-        embodiments: Sequence[Embodiment],
+        variants: Sequence[ModelVariant],
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
@@ -196,10 +196,10 @@ class Simulator:
         start: FloatArray | None = None,
         disturb: Callable[[FloatArray], None] = lambda _: None,
     ) -> SimulationResult:
-        robot, n, threads, stats = self.robot, len(embodiments), self.threads, self.stats
+        robot, n, threads, stats = self.robot, len(variants), self.threads, self.stats
         names = robot.anatomy.names
         rollout = Rollout(
-            *(robot, embodiments, drivers, record),
+            *(robot, variants, drivers, record),
             threads=threads,
             stats=stats,
             start=start,
@@ -217,14 +217,14 @@ class Simulator:
             signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
         }
         time = np.arange(steps, dtype=np.float64) * robot.control_timestep
-        return SimulationResult(Behaviour(names, time, signals), diverged)
+        return SimulationResult(Trajectory(names, time, signals), diverged)
 
 
 MAX_GROUND_DISTANCE = 10.0
 """Largest distance between a foot and the model's level ground, m."""
 
 
-def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
+def ground_contact_points(robot: Robot, trajectory: Trajectory) -> FloatArray:
     """Returns the ground contact points of the bodies with touch sensors in a trial.
 
     A contact point is the lowest point of a body, at each step with a touch reading of 1. Wrong
@@ -236,8 +236,8 @@ def ground_contact_points(robot: Robot, behaviour: Behaviour) -> FloatArray:
     model, feet = robot.model, _feet(robot)
     ground, points = _level_ground(model), []
     if ground is not None and feet:
-        states = estimated_states(with_known_base(robot, behaviour), STATE)
-        touched = behaviour["sensors"] == 1
+        states = estimated_states(with_known_base(robot, trajectory), STATE)
+        touched = trajectory["sensors"] == 1
         touched[:, [column for column in range(touched.shape[1]) if column not in feet]] = False
         unknown = np.isnan(states["joint_positions"])
         data, nearest = mujoco.MjData(model), np.empty(6)

@@ -9,8 +9,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 
@@ -30,7 +30,7 @@ class Replay:
         diverged: Whether the simulation diverged; its signals are then invalid.
     """
 
-    simulated: Behaviour
+    simulated: Trajectory
     observed: bool
     identical: bool
     first_divergence_step: int | None
@@ -88,10 +88,12 @@ def replay(
     A log of another MuJoCo version requires a tolerance above 0: the largest difference of two
     equal numbers, in the unit of the signal.
     """
-    logged = trial.behaviour
+    logged = trial.trajectory
     outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
-    batch = outcome.behaviour
-    simulated = Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
+    batch = outcome.trajectory
+    simulated = Trajectory(
+        batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS}
+    )
     recorded, predicted = (
         np.concatenate([own[signal] for signal in SIGNALS], axis=1) for own in (logged, simulated)
     )

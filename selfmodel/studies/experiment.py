@@ -197,8 +197,8 @@ def is_correct(
 
     def alike(trial: Trial) -> bool:
         runs = [(one, trial.plan.controller) for one in (best, truth)]
-        behaviour = simulator.run(runs, trial.behaviour.steps, SIGNALS).behaviour
-        return all(np.array_equal(*behaviour[signal]) for signal in SIGNALS)
+        trajectory = simulator.run(runs, trial.trajectory.steps, SIGNALS).trajectory
+        return all(np.array_equal(*trajectory[signal]) for signal in SIGNALS)
 
     return best == truth or all(map(alike, trials))
 
@@ -328,12 +328,12 @@ def read_reference(path: Path, robot: Robot) -> Reference:
     """
     if path.suffix.lower() == ".mcap":
         (log,) = read_logs([path])
-        behaviour = log.trial.behaviour
-        seen = np.isfinite(behaviour["joint_positions"])
+        trajectory = log.trial.trajectory
+        seen = np.isfinite(trajectory["joint_positions"])
         columns = np.flatnonzero(seen.any(axis=0))
         rows = seen[:, columns].all(axis=1)
-        hinges = tuple(behaviour.names.hinges[column] for column in columns)
-        time, positions = behaviour.time[rows], behaviour["joint_positions"][rows][:, columns]
+        hinges = tuple(trajectory.names.hinges[column] for column in columns)
+        time, positions = trajectory.time[rows], trajectory["joint_positions"][rows][:, columns]
     elif is_table(path):
         table = read_table(path, (TIME, *robot.anatomy.hinges)).series[TABLE]
         hinges = tuple(name for name in robot.anatomy.hinges if name in table.columns)
@@ -357,5 +357,5 @@ def read_reference(path: Path, robot: Robot) -> Reference:
 
 def simulated_reference(robot: Robot, driver: CommandSource, steps: int) -> Reference:
     """Returns the joint trajectory of a controller of the healthy robot in simulation."""
-    run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, ["joint_positions"]).behaviour
+    run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, ["joint_positions"]).trajectory
     return Reference(run.names.hinges, run.time, run["joint_positions"][0])

@@ -324,7 +324,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         score.of_trial(robot, truth if number else INTACT, trial)
         for number, trial in enumerate(recovery.trials)
     ]
-    best = recovery.trials[2 + recoveries.index(max(recoveries))].behaviour
+    best = recovery.trials[2 + recoveries.index(max(recoveries))].trajectory
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
@@ -373,7 +373,7 @@ def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
     robot = planned_entry(parameters).robot()
     settings = Settings(**parameters["shared"]["settings"])
     simulator, gait = Simulator(robot, threads=1), read_gait(needs["gait"], robot)
-    walk = simulator.run([(INTACT, gait)], settings.steps, DISPLACEMENT.record).behaviour
+    walk = simulator.run([(INTACT, gait)], settings.steps, DISPLACEMENT.record).trajectory
     before = float(DISPLACEMENT.of(robot, INTACT, walk)[0])
     rows: list[Row] = []
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 
 JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities")
 IMU: tuple[Signal, ...] = ("base_orientation", "base_angular_velocity")
@@ -59,7 +59,7 @@ that is smoothed, in the position's unit."""
 
 @np.errstate(invalid="ignore", over="ignore")  # infinite values are handled as not observed
 def estimated_states(
-    behaviour: Behaviour, signals: tuple[Signal, ...] = STATE
+    trajectory: Trajectory, signals: tuple[Signal, ...] = STATE
 ) -> Mapping[Signal, FloatArray]:
     """Returns the estimated state at each step of one run, ``(steps, width)`` for each signal.
 
@@ -67,19 +67,21 @@ def estimated_states(
     whose velocity was never observed. Otherwise the result is NaN where a value it depends on was
     not observed, or a late step is in between.
     """
-    states = {signal: behaviour[signal] for signal in signals}
-    timestep = float(behaviour.time[1] - behaviour.time[0]) if behaviour.steps > 1 else 0.0
+    states = {signal: trajectory[signal] for signal in signals}
+    timestep = float(trajectory.time[1] - trajectory.time[0]) if trajectory.steps > 1 else 0.0
     for position, velocity, half_width, smallest_noise in _SMOOTHED:
         if position in states:
-            values = behaviour[position]
-            displacements = _integrated(behaviour[velocity], timestep, behaviour.substeps)
-            if behaviour.late is not None:
-                late = behaviour.late[1:, np.newaxis]
+            values = trajectory[position]
+            displacements = _integrated(trajectory[velocity], timestep, trajectory.substeps)
+            if trajectory.late is not None:
+                late = trajectory.late[1:, np.newaxis]
                 displacements = np.where(late, np.nan, displacements)
             residuals = np.diff(values, axis=0) - displacements
-            changes = np.diff(behaviour[velocity], axis=0) * timestep
+            changes = np.diff(trajectory[velocity], axis=0) * timestep
             if _is_noise(residuals, smallest_noise) and not _is_linear_in(changes, residuals):
-                states[position] = _averaged(values, behaviour[velocity], displacements, half_width)
+                states[position] = _averaged(
+                    values, trajectory[velocity], displacements, half_width
+                )
     return states
 
 
@@ -169,39 +171,39 @@ _MIN_HALF_WIDTH = 2
 """Smallest half width of the smoother, in steps: a cubic has four coefficients."""
 
 
-def with_joint_velocities(behaviour: Behaviour) -> Behaviour:
-    """Returns a behaviour with joint velocities; a behaviour that has any is returned unchanged.
+def with_joint_velocities(trajectory: Trajectory) -> Trajectory:
+    """Returns a trajectory with joint velocities; a trajectory that has any is returned unchanged.
 
     The velocity at a step is the slope of the cubic polynomial of least squares over the positions
     within ``HALF_WIDTH`` (Savitzky & Golay 1964, Analytical Chemistry 36), with a window that is
-    shifted inwards at the ends of the behaviour. It is NaN if a position in its window is unknown,
+    shifted inwards at the ends of the trajectory. It is NaN if a position in its window is unknown,
     or a step in its window is late.
     """
-    if not lacks_joint_velocities(behaviour):
-        return behaviour
-    return behaviour.with_signals({"joint_velocities": _slopes(behaviour)})
+    if not lacks_joint_velocities(trajectory):
+        return trajectory
+    return trajectory.with_signals({"joint_velocities": _slopes(trajectory)})
 
 
-def lacks_joint_velocities(behaviour: Behaviour) -> bool:
+def lacks_joint_velocities(trajectory: Trajectory) -> bool:
     """Returns whether joint positions were observed and no joint velocity was."""
-    velocities = behaviour.signals.get("joint_velocities")
+    velocities = trajectory.signals.get("joint_velocities")
     return bool(
-        np.isfinite(behaviour["joint_positions"]).any()
+        np.isfinite(trajectory["joint_positions"]).any()
         and (velocities is None or not np.isfinite(velocities).any())
     )
 
 
-def _slopes(behaviour: Behaviour) -> FloatArray:
-    positions, steps = behaviour["joint_positions"], behaviour.steps
+def _slopes(trajectory: Trajectory) -> FloatArray:
+    positions, steps = trajectory["joint_positions"], trajectory.steps
     slopes = np.full(positions.shape, np.nan)
     if steps <= 2 * _MIN_HALF_WIDTH:
         return slopes
-    timestep = float(behaviour.time[1] - behaviour.time[0])
+    timestep = float(trajectory.time[1] - trajectory.time[0])
     half = max(_MIN_HALF_WIDTH, min(round(HALF_WIDTH / timestep), (steps - 1) // 2))
     offsets = np.arange(-half, half + 1)
     known = np.isfinite(positions)
-    if behaviour.late is not None:
-        known &= ~behaviour.late[:, np.newaxis]
+    if trajectory.late is not None:
+        known &= ~trajectory.late[:, np.newaxis]
     for step in range(steps):
         centre = min(max(step, half), steps - 1 - half)
         rows = centre + offsets

@@ -40,7 +40,7 @@ range). ``commands``: actuator controls, each in its own unit: a position servo'
 
 @dataclass(frozen=True)
 class Names:
-    """Column names of the signals of a behaviour.
+    """Column names of the signals of a trajectory.
 
     Attributes:
         sensors: Inputs of the controller, in its order.

@@ -17,14 +17,14 @@ from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.trials.behaviour import (
-    Behaviour,
+from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import (
     Described,
-    behaviour_of_arrays,
+    Trajectory,
     columns_of,
     forward_displacement,
+    trajectory_of_arrays,
 )
-from selfmodel.trials.signals import Signal
 
 Stage = Literal["before", "after", "recovery", "single"]
 """Stage of a recovery: ``before`` (healthy robot), ``after`` (failed robot, old controller),
@@ -81,32 +81,32 @@ class Trial:
     Attributes:
         plan: The plan of the trial.
         robot: Name of the robot.
-        behaviour: Observed signals: ``plan.steps`` steps, or fewer if the trial was interrupted;
+        trajectory: Observed signals: ``plan.steps`` steps, or fewer if the trial was interrupted;
             NaN for values that were not observed.
         path: Path of the log; for a trial without one, its name and the digest of its signals.
     """
 
     plan: TrialPlan
     robot: str
-    behaviour: Behaviour
+    trajectory: Trajectory
     path: str
 
     @cached_property
     def content(self) -> tuple[str, CommandSource]:
         """What was run and observed, for look-ups: trials of equal content are the same trial."""
-        return _digest(self.behaviour), self.plan.controller
+        return _digest(self.trajectory), self.plan.controller
 
     @property
     def early_end(self) -> str:
         """Clause about an early end, such as ``, ended at step 55 of 150``; "" without one."""
-        steps = self.behaviour.steps
+        steps = self.trajectory.steps
         return "" if steps == self.plan.steps else f", ended at step {steps} of {self.plan.steps}"
 
     def __repr__(self) -> str:
         plan = self.plan
         return (
             f"<Trial {plan.name} of {self.robot}: stage {plan.stage}, "
-            f"{self.behaviour.steps} of {plan.steps} steps"
+            f"{self.trajectory.steps} of {plan.steps} steps"
             f"\n  {plan.controller.summary}"
             f"\n  {self.path}>"
         )
@@ -140,10 +140,10 @@ class Trial:
         Example:
             >>> import selfmodel
             >>> robot = selfmodel.load_robot("quadruped")
-            >>> logged = selfmodel.read_log("after.mcap").trial.behaviour
+            >>> logged = selfmodel.read_log("after.mcap").trial.trajectory
             >>> selfmodel.Trial.from_arrays(
             ...     robot, logged["joint_positions"], logged["commands"], name="mine"
-            ... ).behaviour.steps
+            ... ).trajectory.steps
             60
 
         Args:
@@ -185,17 +185,17 @@ class Trial:
             "base_angular_velocity": base_angular_velocity,
         }
         orders = {**dict.fromkeys(joints, joint_names), "commands": motor_names}
-        behaviour = behaviour_of_arrays(robot, arrays, time, orders)
+        trajectory = trajectory_of_arrays(robot, arrays, time, orders)
         if stage not in STAGES:
             raise unknown_name("stage", stage, STAGES)
         try:
-            played = played_back(behaviour.names.motors, behaviour["commands"])
+            played = played_back(trajectory.names.motors, trajectory["commands"])
         except ValueError as error:
             raise InputError(
                 f"{error}: begin the arrays at the first row with all commands"
             ) from error
-        plan = TrialPlan(name, stage, controller or played, behaviour.steps, seed=0)
-        return cls(plan, robot.name, behaviour, f"{name} ({_digest(behaviour)[:16]})")
+        plan = TrialPlan(name, stage, controller or played, trajectory.steps, seed=0)
+        return cls(plan, robot.name, trajectory, f"{name} ({_digest(trajectory)[:16]})")
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
         """Returns the signals as a ``pandas.DataFrame``, with the columns of ``logs export``.
@@ -208,19 +208,19 @@ class Trial:
         Raises:
             InputError: pandas is not installed.
         """
-        return data_frame(columns_of(self.behaviour))
+        return data_frame(columns_of(self.trajectory))
 
     @property
     def displacement(self) -> float:
         """Forward displacement, m."""
-        return float(forward_displacement(self.behaviour))
+        return float(forward_displacement(self.trajectory))
 
 
-def _digest(behaviour: Behaviour) -> str:
-    """SHA-256 of the times, the late steps and the signals of a behaviour."""
-    late = () if behaviour.late is None else (behaviour.late,)
+def _digest(trajectory: Trajectory) -> str:
+    """SHA-256 of the times, the late steps and the signals of a trajectory."""
+    late = () if trajectory.late is None else (trajectory.late,)
     digest = hashlib.sha256()
-    for values in (behaviour.time, *late, *behaviour.signals.values()):
+    for values in (trajectory.time, *late, *trajectory.signals.values()):
         digest.update(values.tobytes())
     return digest.hexdigest()
 
@@ -247,9 +247,9 @@ class TrialPart:
     @property
     def rows(self) -> Trial:
         """The trial with the rows of the part alone."""
-        behaviour = self.trial.behaviour
-        kept = (behaviour.time >= self.begin) & (behaviour.time <= self.end)
-        return dataclasses.replace(self.trial, behaviour=behaviour.rows(kept))
+        trajectory = self.trial.trajectory
+        kept = (trajectory.time >= self.begin) & (trajectory.time <= self.end)
+        return dataclasses.replace(self.trial, trajectory=trajectory.rows(kept))
 
 
 def whole(trial: Trial | TrialPart) -> TrialPart:
@@ -286,13 +286,13 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """
     reduced: dict[Signal, FloatArray] = {}
     for signal in LOSABLE_SIGNALS:
-        observed = [np.isfinite(own.behaviour[signal]).any(axis=0) for own in (trial, *others)]
+        observed = [np.isfinite(own.trajectory[signal]).any(axis=0) for own in (trial, *others)]
         lost = observed[0] & ~np.logical_and.reduce(observed)
         if lost.any():
-            reduced[signal] = np.where(lost, np.nan, trial.behaviour[signal])
+            reduced[signal] = np.where(lost, np.nan, trial.trajectory[signal])
     if not reduced:
         return trial
-    return dataclasses.replace(trial, behaviour=trial.behaviour.with_signals(reduced))
+    return dataclasses.replace(trial, trajectory=trial.trajectory.with_signals(reduced))
 
 
 MAX_VALUE = 1e8
@@ -303,11 +303,11 @@ at 1e8 m, a number still resolves 1e-8 m."""
 def check_magnitudes(trial: Trial, signals: Iterable[Signal]) -> None:
     """Raises ``InputError`` if a value of some signals is infinite or above ``MAX_VALUE``."""
     for signal in signals:
-        values = trial.behaviour[signal]
+        values = trial.trajectory[signal]
         wrong = np.argwhere(np.abs(values) > MAX_VALUE)
         if len(wrong):
             step, column = wrong[0].tolist()
-            name = trial.behaviour.names.columns(signal)[column]
+            name = trial.trajectory.names.columns(signal)[column]
             raise InputError(
                 f"{trial.path}: {signal} {name} is {values[step, column]:g} at step {step}, "
                 f"expected at most {MAX_VALUE:g} in SI units, or NaN where nothing was observed: "
@@ -345,5 +345,5 @@ def command_difference(one: Trial, other: Trial) -> float:
 
 
 def _known(trial: Trial) -> FloatArray:
-    commands = trial.behaviour["commands"]
+    commands = trial.trajectory["commands"]
     return np.asarray(commands[np.isfinite(commands).all(axis=1)])

@@ -15,8 +15,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Stage, TrialPlan
 from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_motion

@@ -82,7 +82,7 @@ def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(
 
         assert log.trial.displacement == trial["displacement"]
         assert log.trial.plan.stage == trial["stage"]
-        assert log.trial.behaviour.steps == 60
+        assert log.trial.trajectory.steps == 60
     assert not list(folder.rglob("*.part"))
 
 
@@ -259,12 +259,12 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
     assert "interrupted: the finished trials are in run" in told
     assert "Traceback" not in told
     for name in ("00-before", "01-after"):
-        assert read_log(trials / f"{name}.mcap").trial.behaviour.steps == 1000
+        assert read_log(trials / f"{name}.mcap").trial.trajectory.steps == 1000
 
 
 def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
     (tmp_path / "mine.py").write_text(
-        "from selfmodel.trials.behaviour import forward_displacement\n"
+        "from selfmodel.trials.trajectory import forward_displacement\n"
         "from selfmodel.simulation.requests import ClosedLoop\n"
         "class Prepared:\n"
         "    request = ClosedLoop(record=('base_position',))\n"

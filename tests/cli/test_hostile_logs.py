@@ -13,8 +13,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Sample
 from tests.helpers.command import Done, selfmodel
 from tests.logs.conftest import MJCF, plan_of
 from tests.logs.edits import attach

@@ -83,8 +83,8 @@ def test_an_error_after_a_trial_names_the_folder_of_the_finished_trials(tmp_path
 from dataclasses import replace
 from selfmodel.recovery import DISPLACEMENT
 
-def of(robot, hypothesis, behaviour):
-    values = DISPLACEMENT.of(robot, hypothesis, behaviour)
+def of(robot, hypothesis, trajectory):
+    values = DISPLACEMENT.of(robot, hypothesis, trajectory)
     return values if hypothesis.faults == () else values * float("nan")
 
 HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)

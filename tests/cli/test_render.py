@@ -27,8 +27,8 @@ from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers
@@ -54,10 +54,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
 def film(robot: Robot, text: str, frames: int = 2, unseen: slice = slice(0)) -> Film:
     """A film of a random motion with some steps of it not observed."""
     (controller,) = random_controllers(robot, 1)
-    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).behaviour
+    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).trajectory
     signals = {signal: batch[signal][0].copy() for signal in POSE}
     signals["joint_positions"][unseen] = np.nan
-    seen = Behaviour(batch.names, batch.time, signals)
+    seen = Trajectory(batch.names, batch.time, signals)
     moments = np.linspace(0, batch.time[-1], frames)
     hypothesis = parse(text, robot.anatomy)
     return film_of(robot, hypothesis, [("logged: $x_1", seen), ("model", seen)], moments)
@@ -242,8 +242,8 @@ def test_a_failing_ffmpeg_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 def test_a_film_takes_as_long_as_the_trial_however_long_a_control_step_is(quadruped: Robot):
     slow = replace(quadruped, control_timestep=0.1)
-    run = Simulator(slow, 1).run([(INTACT, random_controllers(slow, 1)[0])], 21, SIGNALS).behaviour
-    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    run = Simulator(slow, 1).run([(INTACT, random_controllers(slow, 1)[0])], 21, SIGNALS).trajectory
+    seen = Trajectory(run.names, run.time, {name: run[name][0] for name in SIGNALS})
     film = film_of(slow, INTACT, [("seen", seen)], np.arange(51) / 25)
 
     assert len(film.time) == 51
@@ -255,9 +255,9 @@ def test_the_ground_of_a_stick_figure_slopes_as_the_world_does(quadruped: Robot)
     run = (
         Simulator(quadruped, 1)
         .run([(slope, random_controllers(quadruped, 1)[0])], 2, SIGNALS)
-        .behaviour
+        .trajectory
     )
-    seen = Behaviour(run.names, run.time, {name: run[name][0] for name in SIGNALS})
+    seen = Trajectory(run.names, run.time, {name: run[name][0] for name in SIGNALS})
     film = film_of(quadruped, slope, [("seen", seen)], run.time)
 
     np.testing.assert_allclose(film.normal, [-np.sin(0.2), 0, np.cos(0.2)])

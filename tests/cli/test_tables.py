@@ -43,7 +43,7 @@ def test_an_exported_trial_is_imported_as_the_same_trial(form: str, folder: Path
     assert done.returncode == 0, done.stderr
 
     original, again = (
-        read_log(folder / name).trial.behaviour for name in ("after.mcap", f"{form}.mcap")
+        read_log(folder / name).trial.trajectory for name in ("after.mcap", f"{form}.mcap")
     )
     for signal, values in original.signals.items():
         assert values.tobytes() == again[signal].tobytes(), signal
@@ -72,9 +72,9 @@ def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path)
     done = selfmodel("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
-    behaviour = read_log(tmp_path / "g.mcap").trial.behaviour
+    trajectory = read_log(tmp_path / "g.mcap").trial.trajectory
     with np.load(table) as recorded:
         position = recorded["position"][::4]
-    assert behaviour.steps == 750
-    assert np.abs(behaviour["joint_positions"] - position).max() < 0.01
-    assert np.isnan(behaviour["base_position"]).all()
+    assert trajectory.steps == 750
+    assert np.abs(trajectory["joint_positions"] - position).max() < 0.01
+    assert np.isnan(trajectory["base_position"]).all()

@@ -21,12 +21,12 @@ from selfmodel.cli.view import HOST, LOGGED, SIMULATED, archetype, is_listening,
 from selfmodel.errors import InputError, WorkError
 from selfmodel.robot.motion import shapes_of
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.command import selfmodel
 
 pytest.importorskip("rerun", reason="the extra rerun is not installed")
 
-Shown = tuple[dict[tuple[str, str], list[list]], Behaviour, Behaviour]
+Shown = tuple[dict[tuple[str, str], list[list]], Trajectory, Trajectory]
 
 STEPS = 20
 
@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def shown(folder: Path) -> Shown:
-    """The columns of a recording by entity and name, with the logged and simulated behaviour."""
+    """The columns of a recording by entity and name, with the logged and simulated trajectory."""
     from rerun.chunk import RrdReader  # noqa: PLC0415  # an extra
 
     log, hypothesis = folder / "a.mcap", "jam:back_left_knee"
@@ -60,20 +60,20 @@ def shown(folder: Path) -> Shown:
         for name in batch.schema.names:
             values[chunk.entity_path, name] = batch.column(name).to_pylist()
     given = replayed_log(Simulated(file=log, threads=1), hypothesis)
-    return values, given.log.trial.behaviour, given.simulated().simulated
+    return values, given.log.trial.trajectory, given.simulated().simulated
 
 
 def test_both_bodies_move_as_logged_and_as_simulated(shown: Shown, quadruped: Robot):
     values, logged, simulated = shown
     model, data = quadruped.model, mujoco.MjData(quadruped.model)
-    for name, behaviour in ((LOGGED, logged), (SIMULATED, simulated)):
+    for name, trajectory in ((LOGGED, logged), (SIMULATED, simulated)):
         shin = np.array(values[f"/world/{name}/front_left_lower", "Transform3D:translation"])
         turn = np.array(values[f"/world/{name}/front_left_lower", "Transform3D:quaternion"])
         for step in (0, STEPS - 1):
-            data.qpos[:3] = behaviour["base_position"][step]
-            data.qpos[3:7] = behaviour["base_orientation"][step]
-            angles = behaviour["joint_positions"][step]
-            for hinge, angle in zip(behaviour.names.hinges, angles, strict=True):
+            data.qpos[:3] = trajectory["base_position"][step]
+            data.qpos[3:7] = trajectory["base_orientation"][step]
+            angles = trajectory["joint_positions"][step]
+            for hinge, angle in zip(trajectory.names.hinges, angles, strict=True):
                 data.joint(hinge).qpos[:] = angle
             mujoco.mj_kinematics(model, data)
             body = data.body("front_left_lower")
@@ -84,11 +84,11 @@ def test_both_bodies_move_as_logged_and_as_simulated(shown: Shown, quadruped: Ro
 
 def test_the_plotted_joints_are_those_of_the_log_to_the_bit(shown: Shown):
     values, logged, simulated = shown
-    for name, behaviour in ((LOGGED, logged), (SIMULATED, simulated)):
-        for column, hinge in enumerate(behaviour.names.hinges):
+    for name, trajectory in ((LOGGED, logged), (SIMULATED, simulated)):
+        for column, hinge in enumerate(trajectory.names.hinges):
             line = np.array(values[f"/joints/{hinge}/{name}", "Scalars:scalars"])[:, 0]
 
-            assert np.array_equal(line, behaviour["joint_positions"][:, column])
+            assert np.array_equal(line, trajectory["joint_positions"][:, column])
     times = values["/joints/front_left_knee/logged", "trial time"]
     assert [round(time.total_seconds(), 6) for time in times] == pytest.approx(logged.time)
 

@@ -15,13 +15,13 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.testing import check_comparator, shown
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces, distances_of
 from tests.helpers.drivers import random_controllers
 
-Both = tuple[Trial, Behaviour]
+Both = tuple[Trial, Trajectory]
 
 
 def hypotheses_about(robot: Robot) -> list[str]:
@@ -36,24 +36,24 @@ def logged_and_simulated(robot: Robot) -> Both:
     # No joint oscillates at every step: such joints are taken for noisy, and averaged.
     controller = random_controllers(robot, 5)[4]
     runs = [(parse(text, robot.anatomy), controller) for text in hypotheses_about(robot)]
-    simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).behaviour
-    observed = Behaviour(
+    simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).trajectory
+    observed = Trajectory(
         simulated.names, simulated.time, {signal: simulated[signal][0] for signal in SIGNALS}
     )
     plan = TrialPlan("00-after", "after", controller, 300, 0)
     return Trial(plan, robot.name, observed, "nowhere.mcap"), simulated
 
 
-def with_the_perfect_one(outcome: Behaviour, perfect: Behaviour) -> Behaviour:
+def with_the_perfect_one(outcome: Trajectory, perfect: Trajectory) -> Trajectory:
     """The simulations with another one before them."""
     signals = {
         signal: np.concatenate([perfect[signal], values])
         for signal, values in outcome.signals.items()
     }
-    return Behaviour(outcome.names, outcome.time, signals, **with_none_fixed(outcome))
+    return Trajectory(outcome.names, outcome.time, signals, **with_none_fixed(outcome))
 
 
-def with_none_fixed(outcome: Behaviour) -> dict[str, np.ndarray | None]:
+def with_none_fixed(outcome: Trajectory) -> dict[str, np.ndarray | None]:
     """The hinges that the hypotheses fix, with those of the healthy robot before them."""
     return {
         name: None if mask is None else np.concatenate([np.zeros_like(mask[:1]), mask])
@@ -68,7 +68,7 @@ def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_sim
     prepared = comparator.prepare(trial)
     request = prepared.request
     hypotheses = [parse(text, robot.anatomy) for text in hypotheses_about(robot)]
-    outcome = simulate(Simulator(robot, 2), request, trial, hypotheses).behaviour
+    outcome = simulate(Simulator(robot, 2), request, trial, hypotheses).trajectory
 
     check_comparator(comparator, trial, with_the_perfect_one(outcome, shown(request, trial)))
     distances = distances_of(prepared, outcome)
@@ -110,9 +110,9 @@ class Broken:
         if self.way == "nothing":
             return None
         if self.way == "trial":
-            trial.behaviour["base_position"][0] = 0
+            trial.trajectory["base_position"][0] = 0
 
-        def distances(simulated: Behaviour) -> FloatArray:
+        def distances(simulated: Trajectory) -> FloatArray:
             self.calls += 1
             right = sound.distances(simulated)
             if self.way == "simulated":
@@ -154,14 +154,14 @@ def test_the_contract_kit_sees_each_way_to_break_it(
     way: str, message: str, logged_and_simulated: Both
 ):
     trial, simulated = logged_and_simulated
-    own = replace(trial, behaviour=copied(trial.behaviour))
+    own = replace(trial, trajectory=copied(trial.trajectory))
     with pytest.raises(ValueError, match=message):
         check_comparator(Broken(way), own, copied(simulated))
 
 
-def copied(behaviour: Behaviour) -> Behaviour:
-    signals = {signal: values.copy() for signal, values in behaviour.signals.items()}
-    return Behaviour(behaviour.names, behaviour.time, signals)
+def copied(trajectory: Trajectory) -> Trajectory:
+    signals = {signal: values.copy() for signal, values in trajectory.signals.items()}
+    return Trajectory(trajectory.names, trajectory.time, signals)
 
 
 class Pieces:
@@ -178,7 +178,7 @@ class Pieces:
         """Requests what it was made with."""
         return PreparedPieces(self.asks, self._losses)
 
-    def _losses(self, simulated: Behaviour) -> FloatArray:
+    def _losses(self, simulated: Trajectory) -> FloatArray:
         """Returns how far each joint is from the first run's, spoilt."""
         self.calls += 1
         right = self._sound(simulated)
@@ -191,7 +191,7 @@ class Pieces:
             "crowd": right * (1 + 1e-15 * len(right)),
         }[self.way]
 
-    def _sound(self, simulated: Behaviour) -> FloatArray:
+    def _sound(self, simulated: Trajectory) -> FloatArray:
         values = simulated["joint_positions"]
         return np.abs(values - TRUTH).reshape(len(values), -1, values.shape[-1]).mean(axis=1)
 
@@ -200,20 +200,20 @@ TRUTH = 0.25
 """Where all joints stand in the runs that the pieces of these tests are about."""
 
 
-def runs_of_shape(trial: Trial, *lengths: int) -> Behaviour:
+def runs_of_shape(trial: Trial, *lengths: int) -> Trajectory:
     """Two runs of joints that stand still, the first where the trial has them."""
-    names = trial.behaviour.names
+    names = trial.trajectory.names
     values = np.full((2, *lengths, len(names.hinges)), TRUTH)
     values[1] += 0.5
-    return Behaviour(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
+    return Trajectory(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
 
 
 def segments(trial: Trial, horizon: int = 25) -> Segments:
     """Three segments of a trial."""
-    names = trial.behaviour.names
+    names = trial.trajectory.names
     return Segments(
         states={"joint_positions": np.zeros((3, len(names.hinges)))},
-        commands=np.zeros((trial.behaviour.steps, len(names.motors))),
+        commands=np.zeros((trial.trajectory.steps, len(names.motors))),
         starts=np.array([0, 10, 20]),
         horizon=horizon,
         record=("joint_positions",),
@@ -277,7 +277,7 @@ def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
 def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
     rows, signals = np.array([7, 40, 41]), ("joint_positions", "joint_velocities")
-    logged = trial.behaviour
+    logged = trial.trajectory
     asks = Segments(
         states={signal: logged[signal][rows] for signal in signals},
         commands=logged["commands"],

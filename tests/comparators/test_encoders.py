@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from selfmodel.comparators.encoders import encoder_motion_loss, hinge_losses, logged_motion
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import HINGE_ERROR_SCALES, Signal
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.gaits import gait
 
 HORIZON, STEPS, HINGES = 12, 961, 4
@@ -44,7 +44,7 @@ def mean_loss(predicted: np.ndarray, logged: np.ndarray, *, detaches: bool = Fal
     """
     stands = np.ptp(predicted, axis=0) == 0
     first = np.arange(HINGES) == 0
-    simulated = Behaviour(
+    simulated = Trajectory(
         gait().names,
         np.arange(HORIZON + 1) * 0.01,
         {"joint_positions": segments(predicted)[np.newaxis]},
@@ -95,16 +95,16 @@ def predicted(
     positions: np.ndarray = MOTION,
     velocities: np.ndarray = MOTION,
     detached: np.ndarray | None = None,
-) -> Behaviour:
+) -> Trajectory:
     signals: dict[Signal, np.ndarray] = {
         "joint_positions": positions,
         "joint_velocities": velocities,
     }
-    return Behaviour(gait().names, np.arange(STEP_COUNT + 1) * 0.01, signals, detached=detached)
+    return Trajectory(gait().names, np.arange(STEP_COUNT + 1) * 0.01, signals, detached=detached)
 
 
 def losses(
-    prediction: Behaviour,
+    prediction: Trajectory,
     positions: np.ndarray = MOTION,
     velocities: np.ndarray = MOTION,
 ) -> np.ndarray:

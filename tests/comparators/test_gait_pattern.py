@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 from selfmodel.comparators import GAIT_PATTERN
 from selfmodel.comparators.gait_pattern import LARGE_DIFFERENCES
 from selfmodel.testing import check_comparator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
 
@@ -47,7 +47,7 @@ def test_when_the_strides_begin_does_not_matter(
         ("posture", changed(gait(), joint_positions=gait()["joint_positions"] + 0.2)),
     ],
 )
-def test_each_group_sees_what_it_is_there_for(group: str, different: Behaviour):
+def test_each_group_sees_what_it_is_there_for(group: str, different: Trajectory):
     losses = GAIT_PATTERN.prepare(logged(gait())).losses(batch(gait(), different))
     by_group = losses.reshape(2, -1, len(LARGE_DIFFERENCES))
 
@@ -55,7 +55,7 @@ def test_each_group_sees_what_it_is_there_for(group: str, different: Behaviour):
     assert np.all(by_group[1, :, GROUP.index(group)] > 0.2)
 
 
-def still() -> Behaviour:
+def still() -> Trajectory:
     """A robot that lies still, its feet in the air."""
     walking = gait()
     return changed(
@@ -66,7 +66,7 @@ def still() -> Behaviour:
 
 
 @pytest.mark.parametrize("shown", [gait(), still(), gait(steps=30), gait(steps=2), gait(steps=1)])
-def test_degenerate_trials_keep_the_contract(shown: Behaviour):
+def test_degenerate_trials_keep_the_contract(shown: Trajectory):
     runs = [shown, gait(TROT, steps=shown.steps), gait(frequency=3, steps=shown.steps)]
     if shown.steps == 1000:
         runs.append(still())

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.comparators.encoders import LooseEncoders, loose_encoders, with_loose_encoders
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.gaits import LEGS, changed, gait
 
 HORIZON = 12
@@ -43,7 +43,7 @@ def under_load(commands: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * lagging(commands, 3.0) + 0.4 * own)
 
 
-def behaviour_of(*angles: np.ndarray, sensors: np.ndarray | None = None) -> Behaviour:
+def trajectory_of(*angles: np.ndarray, sensors: np.ndarray | None = None) -> Trajectory:
     run = gait(steps=STEPS)
     positions = np.stack(angles, axis=1)
     return changed(
@@ -60,7 +60,7 @@ LOADED = [under_load(column) for column in COMMANDS.T]
 
 def one_loose(first: np.ndarray, sensors: np.ndarray | None = None) -> LooseEncoders | None:
     """Loose encoders of a robot whose first encoder has given angles."""
-    return loose_encoders(behaviour_of(first, *LOADED[1:], sensors=sensors), STARTS, HORIZON)
+    return loose_encoders(trajectory_of(first, *LOADED[1:], sensors=sensors), STARTS, HORIZON)
 
 
 @settings(max_examples=6)
@@ -111,13 +111,13 @@ def test_readings_derived_from_the_angle_follow_it_and_others_stay():
     np.testing.assert_allclose(found.readings[..., 0], 0.2 - 0.5 * found.angles[..., 0])
 
 
-def simulated(detached: bool) -> Behaviour:  # noqa: FBT001  # of a table
+def simulated(detached: bool) -> Trajectory:  # noqa: FBT001  # of a table
     """Predictions of a hypothesis about the first leg, ``(1, segments, horizon + 1, width)``."""
-    run = behaviour_of(np.zeros(STEPS) if detached else LOADED[0], *LOADED[1:])
+    run = trajectory_of(np.zeros(STEPS) if detached else LOADED[0], *LOADED[1:])
     rows = STARTS[:, np.newaxis] + np.arange(HORIZON + 1)
     signals = {name: values[rows][np.newaxis] for name, values in run.signals.items()}
     mask = np.array([[detached, *[False] * (LEGS - 1)]])
-    return Behaviour(run.names, run.time[: HORIZON + 1], signals, detached=mask)
+    return Trajectory(run.names, run.time[: HORIZON + 1], signals, detached=mask)
 
 
 @pytest.mark.parametrize("detached", [True, False])

@@ -7,33 +7,33 @@ from hypothesis import given, settings, strategies as st
 from selfmodel.comparators import NOISY_TRANSFER
 from selfmodel.comparators.noisy_transfer import WINDOW
 from selfmodel.testing import check_comparator, shown
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, batch, changed, gait, logged
 
 MEMBERS = 6
 
 
-def ensembles(*groups: list[Behaviour]) -> Behaviour:
+def ensembles(*groups: list[Trajectory]) -> Trajectory:
     """Ensembles of runs as a simulator gives them, ``(n, members, steps, width)``."""
     members = [batch(*group) for group in groups]
     signals = {
         signal: np.stack([group[signal] for group in members]) for signal in members[0].signals
     }
-    return Behaviour(members[0].names, members[0].time, signals)
+    return Trajectory(members[0].names, members[0].time, signals)
 
 
-def turned(run: Behaviour, *by: float) -> list[Behaviour]:
+def turned(run: Trajectory, *by: float) -> list[Trajectory]:
     """The run by members whose joints are all turned, each by so many rad."""
     return [changed(run, joint_positions=run["joint_positions"] + angle) for angle in by]
 
 
-def around(middle: float, spread: float) -> list[Behaviour]:
+def around(middle: float, spread: float) -> list[Trajectory]:
     """Members of the made-up walk, spread evenly around an error of their joints, rad."""
     return turned(gait(), *(middle + spread * np.linspace(-1, 1, MEMBERS)))
 
 
-def distances(*groups: list[Behaviour]) -> np.ndarray:
+def distances(*groups: list[Trajectory]) -> np.ndarray:
     return distances_of(NOISY_TRANSFER.prepare(logged(gait())), ensembles(*groups))
 
 
@@ -109,7 +109,9 @@ def test_trials_of_any_length_keep_the_contract(steps: int):
         for signal, values in perfect.signals.items()
     }
 
-    check_comparator(NOISY_TRANSFER, trial, Behaviour(trial.behaviour.names, perfect.time, signals))
+    check_comparator(
+        NOISY_TRANSFER, trial, Trajectory(trial.trajectory.names, perfect.time, signals)
+    )
 
 
 def test_a_window_of_which_nothing_was_observed_is_no_piece():

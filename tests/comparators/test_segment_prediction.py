@@ -21,9 +21,9 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import shown
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
@@ -33,16 +33,16 @@ TOUCH = 0
 """The column of a sensor of touch."""
 
 
-def losses(trial: Behaviour, readings: np.ndarray) -> np.ndarray:
+def losses(trial: Trajectory, readings: np.ndarray) -> np.ndarray:
     """The loss of each segment where only these readings, ``(segments, 13, 4)``, are predicted."""
     one = logged(trial)
     perfect = shown(SEGMENT_PREDICTION.prepare(one).request, one)
     signals = {**perfect.signals, "sensors": readings[np.newaxis]}
-    found = Behaviour(perfect.names, perfect.time, signals)
+    found = Trajectory(perfect.names, perfect.time, signals)
     return SEGMENT_PREDICTION.prepare(one).losses(found).total[0]
 
 
-def predicted(trial: Behaviour) -> np.ndarray:
+def predicted(trial: Trajectory) -> np.ndarray:
     """The readings of a perfect prediction, ``(segments, 13, 4)``."""
     one = logged(trial)
     return shown(SEGMENT_PREDICTION.prepare(one).request, one)["sensors"][0].copy()
@@ -74,13 +74,13 @@ def test_a_touch_that_is_never_predicted_counts_three_times_where_it_comes():
     assert CONTRADICTION == 3
 
 
-def motion_loss(run: Behaviour, predicted: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+def motion_loss(run: Trajectory, predicted: np.ndarray, hinges: np.ndarray) -> np.ndarray:
     """The loss of the motion of some encoders, ``(1, segments)``."""
     request = SEGMENT_PREDICTION.prepare(logged(run)).request
     angles = np.full_like(run["joint_positions"], np.nan)
     angles[:, hinges] = run["joint_positions"][:, hinges]
     time = run.time[: request.horizon + 1]
-    simulated = Behaviour(run.names, time, {"joint_positions": predicted})
+    simulated = Trajectory(run.names, time, {"joint_positions": predicted})
     return encoder_motion_loss(simulated, logged_motion(angles, request.starts, request.horizon))
 
 
@@ -96,7 +96,7 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int, see
     exact = shown(SEGMENT_PREDICTION.prepare(logged(walking)).request, logged(walking))
     rng = np.random.default_rng(seed)
     wrong = {signal: exact[signal] + rng.normal(0, 0.1, exact[signal].shape) for signal in JOINTS}
-    simulated = Behaviour(exact.names, exact.time, {**exact.signals, **wrong})
+    simulated = Trajectory(exact.names, exact.time, {**exact.signals, **wrong})
     found = prepared.losses(simulated).total
 
     expected = np.zeros_like(found)
@@ -119,9 +119,11 @@ def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
 
 
 def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
-    behaviour = one.behaviour
-    changed = {**{signal: behaviour[signal] for signal in SIGNALS}, **signals}
-    return dataclasses.replace(one, behaviour=Behaviour(behaviour.names, behaviour.time, changed))
+    trajectory = one.trajectory
+    changed = {**{signal: trajectory[signal] for signal in SIGNALS}, **signals}
+    return dataclasses.replace(
+        one, trajectory=Trajectory(trajectory.names, trajectory.time, changed)
+    )
 
 
 @pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])
@@ -153,7 +155,7 @@ def test_a_silent_neuron_causes_errors_in_every_motor_at_once(robot: Robot):
 
 def test_a_wrong_command_is_the_error_at_its_step_and_motor(quadruped: Robot):
     one = trial(quadruped)
-    commands = one.behaviour["commands"].copy()
+    commands = one.trajectory["commands"].copy()
     commands[20, 3] += 0.25
     errors = command_errors(with_signals(one, commands=commands))
 
@@ -164,7 +166,7 @@ def test_a_wrong_command_is_the_error_at_its_step_and_motor(quadruped: Robot):
 
 def test_errors_are_nan_from_the_first_unobserved_reading(quadruped: Robot):
     one = trial(quadruped)
-    readings = one.behaviour["sensors"].copy()
+    readings = one.trajectory["sensors"].copy()
     readings[25, 2] = np.nan
     errors = command_errors(with_signals(one, sensors=readings))
 
@@ -174,7 +176,7 @@ def test_errors_are_nan_from_the_first_unobserved_reading(quadruped: Robot):
 
 def test_a_playback_has_errors_of_exactly_0(quadruped: Robot):
     one = trial(quadruped, "neuron:0")
-    driver = Playback(quadruped.anatomy.motors, one.behaviour["commands"])
+    driver = Playback(quadruped.anatomy.motors, one.trajectory["commands"])
     played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
 
     assert np.array_equal(command_errors(played), np.zeros((STEPS, len(driver.motors))))

@@ -8,14 +8,14 @@ from selfmodel.comparators import PAPER_SENSORS, SENSOR_SERIES
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError
 from selfmodel.testing import check_comparator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.comparators import distances_of
 from tests.helpers.gaits import TROT, batch, changed, gait, logged
 
 BOTH = [SENSOR_SERIES, PAPER_SENSORS]
 
 
-def disturbed(start: int, stop: int) -> Behaviour:
+def disturbed(start: int, stop: int) -> Trajectory:
     """The walk, its legs somewhere else for a while."""
     joints = gait()["joint_positions"].copy()
     joints[start:stop] += 0.3
@@ -27,7 +27,7 @@ def disturbed(start: int, stop: int) -> Behaviour:
 def test_the_unit_of_a_column_does_not_matter(factor: float):
     walking, trot = gait(swing=0.8), gait(TROT, swing=0.8)
 
-    def scaled(run: Behaviour) -> Behaviour:
+    def scaled(run: Trajectory) -> Trajectory:
         return changed(run, joint_positions=run["joint_positions"] * factor)
 
     plain = distances_of(SENSOR_SERIES.prepare(logged(walking)), batch(trot))

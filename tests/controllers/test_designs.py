@@ -133,9 +133,9 @@ def test_a_robot_with_a_cpg_moves_the_same_to_the_bit_in_any_batch_on_any_thread
     texts += [f"sensor:{robot.anatomy.sensors[0].name}", "intact"]
     hypotheses = [parse(text, robot.anatomy) for text in texts]
     runs = list(zip(hypotheses, random_cpgs(robot, 4), strict=True))
-    together = Simulator(robot, 2).run(runs, 60, SIGNALS).behaviour
-    backwards = Simulator(robot, 1).run(runs[::-1], 60, SIGNALS).behaviour
-    single = Simulator(robot, 1).run(runs[2:3], 60, SIGNALS).behaviour
+    together = Simulator(robot, 2).run(runs, 60, SIGNALS).trajectory
+    backwards = Simulator(robot, 1).run(runs[::-1], 60, SIGNALS).trajectory
+    single = Simulator(robot, 1).run(runs[2:3], 60, SIGNALS).trajectory
     for signal in SIGNALS:
         assert together[signal].tobytes() == backwards[signal][::-1].tobytes()
         assert together[signal][2].tobytes() == single[signal].tobytes()
@@ -151,7 +151,9 @@ def test_a_failed_sensor_changes_the_motion_only_with_feedback(quadruped: Robot)
         parse(text, quadruped.anatomy) for text in ("sensor:front_left_touch", "intact")
     )
     runs = [(intact, one), (dead, one), (intact, unheard), (dead, unheard)]
-    moved = Simulator(quadruped, 1).run(runs, 150, ["joint_positions"]).behaviour["joint_positions"]
+    moved = (
+        Simulator(quadruped, 1).run(runs, 150, ["joint_positions"]).trajectory["joint_positions"]
+    )
 
     assert np.abs(moved[0] - moved[1]).max() > 0.01
     assert np.array_equal(moved[2], moved[3])

@@ -20,7 +20,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
@@ -44,11 +44,11 @@ def trial(robot: Robot, gait: Controller, truth: str, steps: int = STEPS) -> Tri
 def glued(first: Trial, second: Trial, step: int) -> Trial:
     """The rows of one trial before a step, and of another from it on."""
     signals = {
-        name: np.concatenate([values[:step], second.behaviour[name][step:]])
-        for name, values in first.behaviour.signals.items()
+        name: np.concatenate([values[:step], second.trajectory[name][step:]])
+        for name, values in first.trajectory.signals.items()
     }
-    behaviour = Behaviour(first.behaviour.names, first.behaviour.time, signals)
-    return dataclasses.replace(second, behaviour=behaviour, path=f"glued-{step}.mcap")
+    trajectory = Trajectory(first.trajectory.names, first.trajectory.time, signals)
+    return dataclasses.replace(second, trajectory=trajectory, path=f"glued-{step}.mcap")
 
 
 def diagnosed(robot: Robot, *trials: Trial, intact: tuple[Trial, ...] = ()) -> Diagnosis:

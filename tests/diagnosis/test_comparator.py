@@ -40,10 +40,10 @@ def trial(robot: Robot) -> Trial:
 
 
 def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Trial:
-    run = trial.behaviour
+    run = trial.trajectory
     lost = {signal: np.full_like(run[signal], np.nan) for signal in signals}
-    behaviour = dataclasses.replace(run, signals={**run.signals, **lost})
-    return dataclasses.replace(trial, behaviour=behaviour, path=path)
+    trajectory = dataclasses.replace(run, signals={**run.signals, **lost})
+    return dataclasses.replace(trial, trajectory=trajectory, path=path)
 
 
 @pytest.mark.parametrize(

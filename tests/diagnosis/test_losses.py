@@ -27,7 +27,7 @@ from selfmodel.simulation import rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
@@ -71,7 +71,7 @@ class Plain:
         """Prepares with both."""
         return (PreparedPieces if self.has_pieces else Prepared)(self.asks, self._given)
 
-    def _given(self, simulated: Behaviour) -> object:
+    def _given(self, simulated: Trajectory) -> object:
         return self.gives(len(next(iter(simulated.signals.values()))))
 
 
@@ -155,14 +155,14 @@ def test_a_trial_is_known_by_its_content_and_prepared_once(
         name = "counting"
 
         def prepare(self, trial: Trial) -> PreparedTrial:
-            times[trial.behaviour.steps] += 1
+            times[trial.trajectory.steps] += 1
             return SENSOR_SERIES.prepare(trial)
 
     trial, table = trials[0], LossTable(Simulator(quadruped, 1), Counting())
-    opening = dataclasses.replace(trial, behaviour=trial.behaviour.first(STEPS // 2))
-    position = trial.behaviour["base_position"] + np.linspace(0, 5, STEPS)[:, np.newaxis]
+    opening = dataclasses.replace(trial, trajectory=trial.trajectory.first(STEPS // 2))
+    position = trial.trajectory["base_position"] + np.linspace(0, 5, STEPS)[:, np.newaxis]
     elsewhere = dataclasses.replace(
-        trial, behaviour=changed(trial.behaviour, base_position=position)
+        trial, trajectory=changed(trial.trajectory, base_position=position)
     )
     first = table.losses(three, [trial])
 
@@ -261,8 +261,8 @@ def test_the_timeline_has_the_times_of_the_columns_of_the_losses(
     np.testing.assert_allclose(timeline.end - timeline.begin, SEGMENT_PREDICTION.horizon * 0.01)
     for index, trial in enumerate(long):
         inside = timeline.trial == index
-        assert timeline.begin[inside][0] == trial.behaviour.time[0]
-        assert timeline.end[inside][-1] == trial.behaviour.time[-1]
+        assert timeline.begin[inside][0] == trial.trajectory.time[0]
+        assert timeline.end[inside][-1] == trial.trajectory.time[-1]
         assert (np.diff(timeline.begin[inside]) > 0).all()
 
 
@@ -270,10 +270,10 @@ def test_an_error_within_a_piece_is_in_the_column_of_its_time(
     table: LossTable, long: list[Trial], three: list[Hypothesis]
 ):
     trial = long[0]
-    orientation = trial.behaviour["base_orientation"].copy()
+    orientation = trial.trajectory["base_orientation"].copy()
     orientation[100:103] = [0, 1, 0, 0]
     wrong = dataclasses.replace(
-        trial, behaviour=changed(trial.behaviour, base_orientation=orientation)
+        trial, trajectory=changed(trial.trajectory, base_orientation=orientation)
     )
     timeline = table.timeline([wrong])
     assert timeline is not None
@@ -310,7 +310,7 @@ def test_a_jam_shows_in_its_hinge_and_a_detached_hinge_has_no_losses(
     table: LossTable, long: list[Trial], three: list[Hypothesis]
 ):
     intact, broken, jam = table.by_hinge(three, long)
-    hinges = long[0].behaviour.names.hinges
+    hinges = long[0].trajectory.names.hinges
 
     assert hinges[int(np.argmax(intact.mean(axis=0)))] == KNEE
     unknown = np.isnan(broken).all(axis=0)
@@ -337,10 +337,10 @@ def test_a_reading_contradicts_a_fault_of_its_sensor_in_every_piece_with_its_ste
     sensors[[12, 65], quadruped.anatomy.names.sensors.index(sensor)] = 1.0
     positions = np.zeros((120, len(quadruped.anatomy.hinges)))
     commands = np.zeros((120, len(quadruped.anatomy.motors)))
-    behaviour = Trial.from_arrays(quadruped, positions, commands, sensors=sensors).behaviour
+    trajectory = Trial.from_arrays(quadruped, positions, commands, sensors=sensors).trajectory
     hypothesis = parse(f"sensor:{sensor}{fault}+break:back_left_knee", quadruped.anatomy)
 
-    losses = contradiction_losses([INTACT, hypothesis], behaviour, PIECES)
+    losses = contradiction_losses([INTACT, hypothesis], trajectory, PIECES)
 
     assert losses.tolist() == [[0] * 4, [CONTRADICTION * one for one in contradicted]]
 

@@ -38,7 +38,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import forward_displacement
+from selfmodel.trials.trajectory import forward_displacement
 from selfmodel.trials.trial import Stage, Trial, TrialPlan, trial_names
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers
@@ -160,7 +160,7 @@ def test_hypotheses_that_no_trial_tells_apart_are_rivals(quadruped: Robot, gait:
     ]
     runs = [(one, gait) for one in (INTACT, *singles)]
     outcome = Simulator(quadruped, 1).run(runs, SMALL.steps, ["base_position"])
-    intact, *ways = forward_displacement(outcome.behaviour)
+    intact, *ways = forward_displacement(outcome.trajectory)
     apart, one, other = min(
         (abs(ways[i] - ways[k]), singles[i], singles[k])
         for i, k in itertools.combinations(range(len(singles)), 2)

@@ -80,23 +80,23 @@ def test_delays_and_silence_are_marked_and_the_trial_goes_on(tmp_path: Path):
     assert process.returncode == 0, errors
     assert told == f"250 steps: {tmp_path / 'trial.mcap'}\n"
     log = verify(tmp_path / "trial.mcap").log
-    behaviour, timing = log.trial.behaviour, log.timing
+    trajectory, timing = log.trial.trajectory, log.timing
 
-    assert (log.status, log.reason, behaviour.steps) == ("finished", "", 250)
+    assert (log.status, log.reason, trajectory.steps) == ("finished", "", 250)
     assert timing is not None
-    assert np.array_equal(behaviour.late, timing.late)
+    assert np.array_equal(trajectory.late, timing.late)
     assert timing.late[[30, 90, 91]].all()
     assert timing.missing[[90, 91]].all()
-    assert np.array_equal(np.isnan(behaviour["sensors"]).any(axis=1), timing.missing)
-    assert np.isfinite(behaviour["commands"]).all()
+    assert np.array_equal(np.isnan(trajectory["sensors"]).any(axis=1), timing.missing)
+    assert np.isfinite(trajectory["commands"]).all()
     # Real time: a robot that moves 20 ms a step cannot be done sooner.
     assert timing.elapsed[-1] > 249 * TIMESTEP
     assert np.all(np.diff(timing.elapsed)[[29, 89, 90]] > [0.06, 0.1, 0.1])
     assert heard(tmp_path) == [STOP, *range(250), STOP]
     # The robot moves one step a message, so what it observed can be had again.
-    for k, seen in enumerate(observed(behaviour["commands"])):
+    for k, seen in enumerate(observed(trajectory["commands"])):
         for name in OBSERVED:
-            assert timing.missing[k] or np.array_equal(behaviour[name][k], seen[name])
+            assert timing.missing[k] or np.array_equal(trajectory[name][k], seen[name])
 
 
 def observed(commands: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
@@ -119,7 +119,7 @@ def test_a_dropped_connection_stops_the_robot_and_leaves_a_whole_log(tmp_path: P
     assert process.returncode == 1
     assert "the environment failed: ConnectionError: the robot closed the connection" in errors
     assert "the environment failed: ConnectionError: the robot closed the connection" in log.reason
-    assert (log.status, log.trial.behaviour.steps) == ("stopped", 70)
+    assert (log.status, log.trial.trajectory.steps) == ("stopped", 70)
     assert heard(tmp_path) == [STOP, *range(71), STOP]
     told = selfmodel("logs", "info", "trial.mcap", cwd=tmp_path, PYTHONPATH=str(ROOT))
     assert f"of quadruped, stopped: {log.reason}" in " ".join(told.stdout.split("\n"))
@@ -187,7 +187,7 @@ def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
     first, *commands, last = heard(tmp_path)
     assert (first, last) == (STOP, STOP)
     assert commands == list(range(len(commands)))
-    assert len(commands) - 1 <= log.trial.behaviour.steps <= len(commands)
+    assert len(commands) - 1 <= log.trial.trajectory.steps <= len(commands)
 
 
 @pytest.mark.process
@@ -198,6 +198,6 @@ def test_the_trial_of_the_docs_runs(tmp_path: Path):
     subprocess.run([sys.executable, "-c", block.text], cwd=tmp_path, env=environment, check=True)
     log = verify(tmp_path / "walk.mcap").log
 
-    assert (log.status, log.trial.behaviour.steps) == ("finished", 100)
+    assert (log.status, log.trial.trajectory.steps) == ("finished", 100)
     assert log.timing is not None
     assert not log.timing.late.any()

@@ -19,7 +19,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.exactness import exactness, prediction_error, with_options

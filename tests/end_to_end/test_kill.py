@@ -88,7 +88,7 @@ def read_or_salvage(log: Path) -> TrialLog:
 
 @pytest.mark.parametrize("kills", [3, pytest.param(8, marks=pytest.mark.process)])
 def test_no_kill_costs_more_than_the_steps_of_one_flush(whole: Path, tmp_path: Path, kills: int):
-    true = read_log(whole).trial.behaviour
+    true = read_log(whole).trial.trajectory
     rng = np.random.default_rng(11)
     moments = rng.integers(1, STEPS + 1, kills)
     finishing = rng.choice(kills, max(1, kills * 8 // 50), replace=False)
@@ -100,9 +100,9 @@ def test_no_kill_costs_more_than_the_steps_of_one_flush(whole: Path, tmp_path: P
         taken = kill_at(process, page, moments[number], delays[number])
         read = read_or_salvage(tmp_path / f"{number}.mcap")
         ends[read.status] += 1
-        behaviour = read.trial.behaviour
-        assert taken - FLUSH_STEPS <= behaviour.steps <= taken
+        trajectory = read.trial.trajectory
+        assert taken - FLUSH_STEPS <= trajectory.steps <= taken
         for signal in SIGNALS:
-            assert behaviour[signal].tobytes() == true[signal][: behaviour.steps].tobytes()
+            assert trajectory[signal].tobytes() == true[signal][: trajectory.steps].tobytes()
 
     assert ends["interrupted"] > 0

@@ -25,8 +25,8 @@ from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
-from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import estimated_states
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 
@@ -76,35 +76,37 @@ def trial() -> Trial:
     env = load("quadruped", "walk")
     physical = EnvironmentRobot(Stuttering(env), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
-    behaviour = collect(NAMES, physical.run(driver, STEPS))
-    return Trial(TrialPlan("00", "after", driver, STEPS, 0), "quadruped", behaviour, "nowhere.mcap")
+    trajectory = collect(NAMES, physical.run(driver, STEPS))
+    return Trial(
+        TrialPlan("00", "after", driver, STEPS, 0), "quadruped", trajectory, "nowhere.mcap"
+    )
 
 
 def without_marks(trial: Trial) -> Trial:
-    return replace(trial, behaviour=replace(trial.behaviour, late=None))
+    return replace(trial, trajectory=replace(trial.trajectory, late=None))
 
 
 def test_the_marks_are_those_of_the_environment_and_a_command_before_one_is_not_steady(
     trial: Trial,
 ):
-    behaviour = trial.behaviour
-    stood_longer = np.isnan(behaviour.steady_commands).all(axis=1)
-    unmarked = without_marks(trial).behaviour
+    trajectory = trial.trajectory
+    stood_longer = np.isnan(trajectory.steady_commands).all(axis=1)
+    unmarked = without_marks(trial).trajectory
 
-    assert np.flatnonzero(behaviour.late).tolist() == list(LATE)
+    assert np.flatnonzero(trajectory.late).tolist() == list(LATE)
     assert np.flatnonzero(stood_longer).tolist() == [k - 1 for k in LATE]
-    steady = behaviour.steady_commands[~stood_longer]
-    np.testing.assert_array_equal(steady, behaviour["commands"][~stood_longer])
+    steady = trajectory.steady_commands[~stood_longer]
+    np.testing.assert_array_equal(steady, trajectory["commands"][~stood_longer])
     assert unmarked.steady_commands is unmarked["commands"]
     with pytest.raises(ValueError, match=r"late must be \(steps,\) = \(250,\), got \(3,\)"):
-        replace(behaviour, late=np.zeros(3, dtype=bool))
+        replace(trajectory, late=np.zeros(3, dtype=bool))
 
 
 def losses(trial: Trial, comparator: SegmentPrediction, *texts: str) -> np.ndarray:
     """The loss of each hypothesis."""
     hypotheses = [parse(text, QUADRUPED.anatomy) for text in texts]
     prepared = comparator.prepare(trial)
-    predicted = Simulator(QUADRUPED, 1).predict(hypotheses, prepared.request).behaviour
+    predicted = Simulator(QUADRUPED, 1).predict(hypotheses, prepared.request).trajectory
     return prepared.losses(predicted).total.mean(axis=1)
 
 
@@ -144,12 +146,12 @@ def test_a_model_that_is_exact_predicts_it_exactly_for_calibration_too(trial: Tr
 
 
 def test_positions_are_not_averaged_across_a_step_that_was_late(trial: Trial):
-    behaviour = trial.behaviour
-    noise = np.random.default_rng(0).normal(0, 3e-3, behaviour["base_position"].shape)
-    noisy = {**behaviour.signals, "base_position": behaviour["base_position"] + noise}
+    trajectory = trial.trajectory
+    noise = np.random.default_rng(0).normal(0, 3e-3, trajectory["base_position"].shape)
+    noisy = {**trajectory.signals, "base_position": trajectory["base_position"] + noise}
     marked, unmarked = (
-        estimated_states(replace(behaviour, signals=noisy, late=late))["base_position"]
-        for late in (behaviour.late, None)
+        estimated_states(replace(trajectory, signals=noisy, late=late))["base_position"]
+        for late in (trajectory.late, None)
     )
     # Six steps to either side: from the sixth row before the late one to the fifth after it.
     across = np.zeros(STEPS, dtype=bool)
@@ -162,6 +164,6 @@ def test_positions_are_not_averaged_across_a_step_that_was_late(trial: Trial):
 
 
 def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
-    late = replace(trial, behaviour=replace(trial.behaviour, late=np.ones(STEPS, dtype=bool)))
+    late = replace(trial, trajectory=replace(trial.trajectory, late=np.ones(STEPS, dtype=bool)))
     with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
         SEGMENT_PREDICTION.prepare(late)

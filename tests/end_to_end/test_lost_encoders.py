@@ -25,14 +25,14 @@ def lost(robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice) -> Tri
     gait = random_controllers(robot, 1, seed=5)[0]
     plan = TrialPlan("after", "after", gait, 500, seed=0)
     trial = in_memory(robot)(physical, plan)
-    signals = {signal: trial.behaviour[signal].copy() for signal in SIGNALS}
+    signals = {signal: trial.trajectory[signal].copy() for signal in SIGNALS}
     for signal in JOINTS:
         signals[signal][steps, [robot.anatomy.hinges.index(hinge) for hinge in hinges]] = np.nan
     for column, sensor in enumerate(robot.anatomy.sensors):
         if sensor.kind == "angle" and sensor.hinge in hinges:
             signals["sensors"][steps, column] = np.nan
     return dataclasses.replace(
-        trial, behaviour=dataclasses.replace(trial.behaviour, signals=signals)
+        trial, trajectory=dataclasses.replace(trial.trajectory, signals=signals)
     )
 
 

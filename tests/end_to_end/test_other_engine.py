@@ -25,7 +25,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.trajectory import Trajectory, collect
 
 CASES = [(name, case) for name in ROBOTS for case in range(1, 10, 3)]
 
@@ -37,7 +37,7 @@ def random_gait(robot: Robot, seed: int = 1) -> Controller:
 
 def walked(
     robot: Robot, reality: Reality, damage: Damage, steps: int = 60, stream: int = 0
-) -> Behaviour:
+) -> Trajectory:
     with BulletEnvironment(robot, reality, damage, stream) as environment:
         samples = physical_robot(environment, robot).run(random_gait(robot), steps)
         return collect(robot.anatomy.names, samples)
@@ -119,25 +119,25 @@ def test_every_case_of_table_one_is_a_damage_under_which_a_walk_stays_finite(nam
     robot = ROBOTS[name].robot()
     damage = damage_of(ROBOTS[name].cases[case], robot.anatomy)
 
-    behaviour = walked(robot, draw_reality(robot, 3), damage, steps=30)
+    trajectory = walked(robot, draw_reality(robot, 3), damage, steps=30)
 
-    for signal, values in behaviour.signals.items():
+    for signal, values in trajectory.signals.items():
         assert np.isfinite(values).all() or signal == "joint_efforts"
     for sensor in damage.dead:
-        assert not behaviour["sensors"][:, behaviour.names.sensors.index(sensor)].any()
+        assert not trajectory["sensors"][:, trajectory.names.sensors.index(sensor)].any()
 
 
 def test_the_encoder_of_an_absent_joint_holds_its_last_value(quadruped: Robot):
     damage = damage_of("break:front_left_shoulder", quadruped.anatomy)
 
-    behaviour = walked(quadruped, draw_reality(quadruped, 0), damage)
+    trajectory = walked(quadruped, draw_reality(quadruped, 0), damage)
 
     held = [quadruped.anatomy.hinges.index(name) for name in sorted(damage.lost)]
-    reading = behaviour.names.sensors.index("front_left_angle")
+    reading = trajectory.names.sensors.index("front_left_angle")
     assert len(held) == 2
-    assert not np.ptp(behaviour["joint_positions"][:, held], axis=0).any()
-    assert not np.ptp(behaviour["sensors"][:, reading])
-    others = np.delete(behaviour["joint_positions"], held, axis=1)
+    assert not np.ptp(trajectory["joint_positions"][:, held], axis=0).any()
+    assert not np.ptp(trajectory["sensors"][:, reading])
+    others = np.delete(trajectory["joint_positions"], held, axis=1)
     assert np.ptp(others, axis=0).min() > 0.01
 
 

@@ -28,10 +28,10 @@ def test_a_trial_is_logged_and_read_back(quadruped: Robot, tmp_path: Path):
         trial = run_trial(physical, gait, log, robot=quadruped, steps=40)
 
     again = read_log(log).trial
-    assert again.behaviour.steps == 40
+    assert again.trajectory.steps == 40
     assert np.isfinite(trial.displacement)
     np.testing.assert_array_equal(
-        again.behaviour["base_position"], trial.behaviour["base_position"]
+        again.trajectory["base_position"], trial.trajectory["base_position"]
     )
 
 

@@ -16,7 +16,7 @@ from selfmodel.controllers.controller import CommandSource
 from selfmodel.logs.inspection import verify
 from selfmodel.physical.safety import STOP_SIGNALS
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trajectory import Sample
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.signalled_driver import PHASES, STEPS
 

@@ -93,13 +93,13 @@ def test_a_slope_is_the_model_on_tilted_ground(robot: Robot, angle: float):
 @pytest.mark.parametrize("roughness", ["", "+roughness=0.02"])
 def test_a_robot_on_a_slope_stands_on_the_ground_as_on_level_ground(robot: Robot, roughness: str):
     for text in (f"slope=0.2{roughness}", roughness.removeprefix("+") or "intact"):
-        embodiment = build(robot, parse(text, robot.anatomy))
-        data = mujoco.MjData(embodiment.model)
-        mujoco.mj_forward(embodiment.model, data)
+        variant = build(robot, parse(text, robot.anatomy))
+        data = mujoco.MjData(variant.model)
+        mujoco.mj_forward(variant.model, data)
         place = data.body(robot.root).xpos
 
-        assert place @ embodiment.normal == pytest.approx(robot.standing_height)
-        assert data.body(robot.root).xmat.reshape(3, 3)[:, 2] == pytest.approx(embodiment.normal)
+        assert place @ variant.normal == pytest.approx(robot.standing_height)
+        assert data.body(robot.root).xmat.reshape(3, 3)[:, 2] == pytest.approx(variant.normal)
 
 
 def test_wind_is_the_model_with_that_wind(robot: Robot):
@@ -160,8 +160,8 @@ def forces_at_the_start(model: mujoco.MjModel) -> np.ndarray:
 
 def test_readings_have_the_gain_and_then_the_bias(quadruped: Robot):
     def first(text: str) -> np.ndarray:
-        embodiment = build(quadruped, parse(text, quadruped.anatomy))
-        senses = SensorReader(quadruped.model, quadruped.anatomy, [embodiment])
+        variant = build(quadruped, parse(text, quadruped.anatomy))
+        senses = SensorReader(quadruped.model, quadruped.anatomy, [variant])
         qpos = quadruped.model.qpos0 + 0.1
         readings = np.empty((1, 8))
         senses.read(np.full((1, 8), 5.0), qpos[np.newaxis], readings)
@@ -183,8 +183,8 @@ def test_noise_has_its_deviation_and_is_the_same_whatever_else_is_wrong(quadrupe
     noisy = "sensor:front_left_angle=noise0.2"
     texts = ["intact", noisy, f"{noisy}+sensor:back_left_angle=noise0.1", "slope=0.1"]
     runs = [(parse(text, quadruped.anatomy), controller) for text in texts]
-    ran = Simulator(quadruped, 2).run(runs, 1000, ["sensors", "joint_positions"]).behaviour
-    alone = Simulator(quadruped, 1).run(runs[1:2], 1000, ["sensors"]).behaviour
+    ran = Simulator(quadruped, 2).run(runs, 1000, ["sensors", "joint_positions"]).trajectory
+    alone = Simulator(quadruped, 1).run(runs[1:2], 1000, ["sensors"]).trajectory
     hinge = quadruped.anatomy.hinges.index("front_left_shoulder")
     half = quadruped.anatomy.sensor("front_left_angle").half_range
     noise = ran["sensors"][:, :, 4] - ran["joint_positions"][:, :, hinge] / half

@@ -13,8 +13,8 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from tests.faults.test_registry import BARE
 from tests.helpers.drivers import random_motion
 
@@ -26,11 +26,11 @@ STATES = tuple(
 )
 
 
-def simulated(robot: Robot, texts: list[str]) -> Behaviour:
-    """The behaviours of hypotheses under given commands."""
+def simulated(robot: Robot, texts: list[str]) -> Trajectory:
+    """The trajectories of hypotheses under given commands."""
     driver = Playback(robot.anatomy.motors, random_motion(robot, STEPS))
     runs = [(parse(text, robot.anatomy), driver) for text in texts]
-    return Simulator(robot, 1).run(runs, STEPS, SIGNALS).behaviour
+    return Simulator(robot, 1).run(runs, STEPS, SIGNALS).trajectory
 
 
 def shift(robot: Robot) -> np.ndarray:
@@ -56,11 +56,11 @@ def test_an_offset_shifts_the_encoder_and_its_sensor_and_nothing_else(quadruped:
 def test_a_prediction_begins_at_the_true_angle(quadruped: Robot, prefix: str):
     text = f"encoder-offset:{JOINT}={prefix}{OFFSET}"
     run = simulated(quadruped, [text])
-    logged = Behaviour(run.names, run.time, {signal: run[signal][0] for signal in SIGNALS})
+    logged = Trajectory(run.names, run.time, {signal: run[signal][0] for signal in SIGNALS})
     starts = np.array([0, 20, 40])
     segments = cut_segments(logged, {s: logged[s] for s in STATES}, starts, 10, STATES)
     hypotheses = [INTACT, parse(text, quadruped.anatomy)]
-    predicted = Simulator(quadruped, 1).predict(hypotheses, segments).behaviour
+    predicted = Simulator(quadruped, 1).predict(hypotheses, segments).trajectory
 
     for signal in STATES:
         expected = np.stack([logged[signal][start : start + 11] for start in starts])

@@ -23,7 +23,7 @@ from selfmodel.faults.registry import (
     kind_names,
 )
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
@@ -77,7 +77,7 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
     runs = [
         (Hypothesis(tuple(sorted(said))), driver) for pair in absorbed for said in (pair, pair[:1])
     ]
-    path = Simulator(robot, 2).run(runs, 60, ["base_position"]).behaviour["base_position"]
+    path = Simulator(robot, 2).run(runs, 60, ["base_position"]).trajectory["base_position"]
 
     for pair, said, meant in zip(absorbed, path[::2], path[1::2], strict=True):
         np.testing.assert_allclose(said, meant, atol=1e-9, rtol=0, err_msg=str(pair))
@@ -94,9 +94,9 @@ def with_methods(**methods: Callable[..., object]) -> FaultKind:
     return type("Odd", (type(GRADED),), own)(**fields)
 
 
-def heavier_each_time(embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+def heavier_each_time(variant: ModelVariant, _anatomy: Anatomy, _fault: Fault) -> None:
     """Edits the model differently at each call."""
-    embodiment.model.body_mass[1] += next(CALLS)
+    variant.model.body_mass[1] += next(CALLS)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_the_contract_kit_sees_each_way_to_break_it(kind: FaultKind, said: str, 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
     robot = arguments.unadapted_robot("quadruped", 0.01)
 
-    def wrong(_embodiment: Embodiment, _anatomy: Anatomy, _fault: Fault) -> None:
+    def wrong(_variant: ModelVariant, _anatomy: Anatomy, _fault: Fault) -> None:
         robot.model.body_mass[1] = 5.0
 
     with pytest.raises(ValueError, match=r"does not make the same robot|changes the robot itself"):

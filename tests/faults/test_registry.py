@@ -13,7 +13,7 @@ from selfmodel.faults.registry import (
     PAPER_KINDS,
 )
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import check_fault_kind
 
@@ -70,6 +70,6 @@ def test_kinds_that_a_fault_is_of_at_some_degree_can_be_named(quadruped: Robot):
 class Stick(FaultKind):
     """Friction in every joint."""
 
-    def apply(self, embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
+    def apply(self, variant: ModelVariant, _anatomy: Anatomy, fault: Fault) -> None:
         """Adds the friction."""
-        embodiment.model.dof_frictionloss[6:] += 0.1 + fault.severity
+        variant.model.dof_frictionloss[6:] += 0.1 + fault.severity

@@ -15,8 +15,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_motion
 
@@ -42,20 +42,20 @@ def test_a_grown_delay_is_the_robot_with_that_delay_beside_robots_without_it(
     hypotheses = [INTACT, parse(f"delay={added}", robot.anatomy), INTACT]
     driver = playback(robot)
     runs = Simulator(robot, 1).run([(each, driver) for each in hypotheses], STEPS, SIGNALS)
-    expected = Simulator(truth, 1).run([(INTACT, driver)], STEPS, SIGNALS).behaviour
-    prompt = Simulator(robot, 1).run([(INTACT, driver)], STEPS, SIGNALS).behaviour
+    expected = Simulator(truth, 1).run([(INTACT, driver)], STEPS, SIGNALS).trajectory
+    prompt = Simulator(robot, 1).run([(INTACT, driver)], STEPS, SIGNALS).trajectory
     for signal in SIGNALS:
-        np.testing.assert_array_equal(runs.behaviour[signal][1], expected[signal][0])
+        np.testing.assert_array_equal(runs.trajectory[signal][1], expected[signal][0])
         for row in (0, 2):
-            np.testing.assert_array_equal(runs.behaviour[signal][row], prompt[signal][0])
+            np.testing.assert_array_equal(runs.trajectory[signal][row], prompt[signal][0])
     assert not np.array_equal(expected["base_position"], prompt["base_position"])
 
     signals = {signal: expected[signal][0] for signal in SIGNALS}
-    logged = Behaviour(expected.names, expected.time, signals)
+    logged = Trajectory(expected.names, expected.time, signals)
     states = {signal: logged[signal] for signal in STATES}
     segments = cut_segments(logged, states, np.array([0, 10, 30]), 10, STATES)
-    predicted = Simulator(robot, 1).predict(hypotheses, segments).behaviour
-    alone = Simulator(truth, 1).predict([INTACT], segments).behaviour
+    predicted = Simulator(robot, 1).predict(hypotheses, segments).trajectory
+    alone = Simulator(truth, 1).predict([INTACT], segments).trajectory
     for signal in STATES:
         np.testing.assert_array_equal(predicted[signal][1], alone[signal][0])
 

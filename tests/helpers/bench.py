@@ -10,8 +10,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers
 
@@ -88,7 +88,7 @@ def bench_robot(bench: Bench, **options: object) -> EnvironmentRobot:
     return EnvironmentRobot(bench, QUADRUPED, stop=bench.stop, clock=bench.clock, **options)
 
 
-def driven(bench: Bench, steps: int = STEPS, **options: object) -> Behaviour:
+def driven(bench: Bench, steps: int = STEPS, **options: object) -> Trajectory:
     return collect(NAMES, bench_robot(bench, **options).run(CONTROLLER, steps))
 
 

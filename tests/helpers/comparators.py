@@ -8,9 +8,9 @@ import numpy as np
 
 from selfmodel.diagnosis.comparator import Losses, PiecewiseTrial
 from selfmodel.simulation.requests import Request
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 
-Compare = Callable[[Behaviour], Any]
+Compare = Callable[[Trajectory], Any]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class PreparedPieces:
     losses: Compare
 
 
-def distances_of(prepared: Any, simulated: Behaviour) -> np.ndarray:  # noqa: ANN401  # of any kind
+def distances_of(prepared: Any, simulated: Trajectory) -> np.ndarray:  # noqa: ANN401  # of any kind
     """Returns the distance of each simulation from a prepared trial, ``(n,)``."""
     if not isinstance(prepared, PiecewiseTrial):
         return np.asarray(prepared.distances(simulated))

@@ -13,8 +13,8 @@ from selfmodel.robot.mjcf.structure import MIN_ITERATIONS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import STATE
+from selfmodel.trials.trajectory import Trajectory, collect
 
 HORIZON = 12
 """Control steps of a segment, as in ``segment-prediction``."""
@@ -38,16 +38,16 @@ def exactness(robot: Robot, hypothesis: Hypothesis, driver: CommandSource, steps
     """
     log = collect(robot.anatomy.names, SimulatedRobot(robot, hypothesis).run(driver, steps))
     simulator = Simulator(robot, 1)
-    run = simulator.run([(hypothesis, driver)], steps, ("base_position",)).behaviour
+    run = simulator.run([(hypothesis, driver)], steps, ("base_position",)).trajectory
     difference = run["base_position"][0, -1] - log["base_position"][-1]
     return Exactness(prediction_error(simulator, hypothesis, log), np.abs(difference).max())
 
 
-def prediction_error(simulator: Simulator, hypothesis: Hypothesis, log: Behaviour) -> float:
+def prediction_error(simulator: Simulator, hypothesis: Hypothesis, log: Trajectory) -> float:
     """Returns the largest difference of a predicted state from the logged state."""
     starts = np.arange(0, log.steps - HORIZON, 5)
     segments = cut_segments(log, {s: log[s] for s in STATE}, starts, HORIZON, STATE)
-    predicted = simulator.predict([hypothesis], segments).behaviour
+    predicted = simulator.predict([hypothesis], segments).trajectory
     rows = starts[:, np.newaxis] + np.arange(HORIZON + 1)
     return max(float(np.abs(predicted[s][0] - log[s][rows]).max()) for s in STATE)
 

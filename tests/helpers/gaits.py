@@ -3,8 +3,8 @@
 import numpy as np
 
 from selfmodel.controllers.playback import Playback
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS, Names, Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 
 LEGS = 4
@@ -25,7 +25,7 @@ def gait(
     swing: float = 0.4,
     late: float = 0.0,
     steps: int = 1000,
-) -> Behaviour:
+) -> Trajectory:
     """One run of a robot that walks straight on, its strides beginning ``late`` seconds late."""
     time = np.arange(steps) * 0.01
     cycle = (time[:, np.newaxis] + 10 - late) * frequency + phases
@@ -39,21 +39,21 @@ def gait(
     signals["base_position"] = base
     signals["base_orientation"] = np.tile([1.0, 0, 0, 0], (steps, 1))
     signals["base_linear_velocity"] = np.tile([0.3, 0, 0], (steps, 1))
-    return Behaviour(NAMES, time, signals)
+    return Trajectory(NAMES, time, signals)
 
 
-def batch(*runs: Behaviour) -> Behaviour:
+def batch(*runs: Trajectory) -> Trajectory:
     """The runs as a simulator gives them, ``(n, steps, width)``."""
     signals = {signal: np.stack([run[signal] for run in runs]) for signal in runs[0].signals}
-    return Behaviour(runs[0].names, runs[0].time, signals)
+    return Trajectory(runs[0].names, runs[0].time, signals)
 
 
-def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
+def changed(run: Trajectory, **signals: np.ndarray) -> Trajectory:
     """The run with other values of some signals."""
     return run.with_signals(signals)
 
 
-def logged(run: Behaviour) -> Trial:
+def logged(run: Trajectory) -> Trial:
     """The trial whose log shows that run."""
     driver = Playback(run.names.motors, np.zeros((run.steps, len(run.names.motors))))
     return Trial(

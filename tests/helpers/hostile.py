@@ -17,7 +17,7 @@ from selfmodel.trials.trial import Trial
 def exploding(simulator: Simulator, text: str) -> Hypothesis:
     """Returns a hypothesis whose model in this simulator diverges: its joints amplify motion."""
     hypothesis = parse(text, simulator.robot.anatomy)
-    built = simulator._embodiment(hypothesis)
+    built = simulator._variant(hypothesis)
     built.model.dof_damping[6:] = -1e3
     return hypothesis
 
@@ -38,9 +38,9 @@ def without_encoders(trial: Trial, hinges: Sequence[int], steps: slice = slice(N
 
 def with_value(trial: Trial, signal: Signal, step: object, column: object, value: float) -> Trial:
     """Returns the trial with another number at some steps in some columns of a signal."""
-    values = trial.behaviour[signal].copy()
+    values = trial.trajectory[signal].copy()
     values[step, column] = value
-    return replace(trial, behaviour=trial.behaviour.with_signals({signal: values}))
+    return replace(trial, trajectory=trial.trajectory.with_signals({signal: values}))
 
 
 def unstable(robot: Robot) -> Robot:

@@ -4,7 +4,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.recover import RunTrial
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import collect
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
 

@@ -13,8 +13,8 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample, StepTiming
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Sample, StepTiming
 from selfmodel.trials.trial import TrialPlan
 
 MJCF = """

@@ -24,7 +24,7 @@ from tests.helpers.damage import damaged
 
 def content(log: TrialLog) -> tuple[object, ...]:
     """Returns all that a log says, but its path and its status."""
-    signals = log.trial.behaviour.signals
+    signals = log.trial.trajectory.signals
     return (
         log.mjcf,
         log.root,
@@ -74,9 +74,9 @@ def test_the_salvage_of_a_damaged_log_has_its_first_steps_and_nothing_else(
         assert content(read_log(spoilt)) == content(expected)
     else:
         found = read_log(saved)
-        assert found.trial.behaviour.steps == result.steps
-        for name, values in found.trial.behaviour.signals.items():
-            assert values.tobytes() == expected.trial.behaviour[name][: result.steps].tobytes()
+        assert found.trial.trajectory.steps == result.steps
+        for name, values in found.trial.trajectory.signals.items():
+            assert values.tobytes() == expected.trial.trajectory[name][: result.steps].tobytes()
         assert content(found)[:-1] == content(expected)[:-1]
 
 

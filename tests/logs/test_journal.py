@@ -19,7 +19,7 @@ from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.result_files import result_bytes
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample
+from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Trial
 from tests.logs.conftest import made_up, plan_of
 

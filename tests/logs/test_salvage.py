@@ -67,8 +67,8 @@ def test_the_steps_before_the_first_damage_are_saved(
     assert salvageable_steps(log) == steps
     assert (found.status, found.trial.plan) == ("interrupted", true.trial.plan)
     for signal in SIGNALS:
-        expected = true.trial.behaviour[signal][:steps]
-        assert found.trial.behaviour[signal].tobytes() == expected.tobytes()
+        expected = true.trial.trajectory[signal][:steps]
+        assert found.trial.trajectory[signal].tobytes() == expected.tobytes()
 
 
 def test_a_timed_trial_with_meshes_keeps_its_clock_and_its_files(

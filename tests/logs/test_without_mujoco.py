@@ -13,7 +13,7 @@ class Blocker:
 sys.meta_path.insert(0, Blocker())
 import selfmodel.logs
 log = selfmodel.logs.read_log(sys.argv[1])
-print(log.trial.behaviour.steps, selfmodel.logs.read_truth(sys.argv[1]))
+print(log.trial.trajectory.steps, selfmodel.logs.read_truth(sys.argv[1]))
 """
 
 

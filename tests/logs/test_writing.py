@@ -30,8 +30,8 @@ from selfmodel.physical.safety import HangError
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Behaviour, Sample, collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Sample, Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
 from tests.logs.conftest import STEPS, made_up, plan_of, timed
 
@@ -94,12 +94,12 @@ def full(*_: object) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def assert_same_bits(behaviour: Behaviour, expected: Behaviour):
-    assert behaviour.names == expected.names
-    assert behaviour.time.tobytes() == expected.time.tobytes()
-    assert set(behaviour.signals) == set(SIGNALS)
+def assert_same_bits(trajectory: Trajectory, expected: Trajectory):
+    assert trajectory.names == expected.names
+    assert trajectory.time.tobytes() == expected.time.tobytes()
+    assert set(trajectory.signals) == set(SIGNALS)
     for name in SIGNALS:
-        assert behaviour[name].tobytes() == expected[name].tobytes(), name
+        assert trajectory[name].tobytes() == expected[name].tobytes(), name
 
 
 @settings(max_examples=12, deadline=None)
@@ -118,13 +118,13 @@ def test_every_signal_comes_back_to_the_bit_whatever_its_value(
     ]
     with np.errstate(invalid="ignore"):  # infinity minus infinity, a displacement of nowhere
         path = write(tmp_path_factory.mktemp("logs") / "a.mcap", biped, samples, steps)
-        assert_same_bits(read_log(path).trial.behaviour, collect(names, samples))
+        assert_same_bits(read_log(path).trial.trajectory, collect(names, samples))
 
 
 def test_a_simulated_trial_of_every_robot_comes_back_to_the_bit(robot: Robot, tmp_path: Path):
     samples = list(SimulatedRobot(robot).run(plan_of(robot, 101).controller, 101))
     path = write(tmp_path / "a.mcap", robot, samples, 101)
-    assert_same_bits(read_log(path).trial.behaviour, collect(robot.anatomy.names, samples))
+    assert_same_bits(read_log(path).trial.trajectory, collect(robot.anatomy.names, samples))
 
 
 def test_a_log_has_its_plan_and_the_same_trial_the_same_bytes(
@@ -134,7 +134,7 @@ def test_a_log_has_its_plan_and_the_same_trial_the_same_bytes(
     assert (read.trial.plan, read.trial.robot, read.trial.path) == (plan, "biped", str(log))
     assert (read.mjcf, read.control_timestep) == (biped.mjcf, biped.control_timestep)
     assert (read.settings, read.status, read.reason) == (Settings(), "finished", "")
-    assert (read.timing, read.trial.behaviour.late) == (None, None)
+    assert (read.timing, read.trial.trajectory.late) == (None, None)
     assert set(read.software) == {"selfmodel", "mujoco", "numpy", "python", "mcap"}
     way = [float(sample.values["base_position"][0]) for sample in made_up(biped, STEPS)]
     assert read.trial.displacement == way[-1] - way[0]
@@ -177,7 +177,7 @@ def test_a_clock_comes_back_to_the_bit(biped: Robot, tmp_path: Path):
     assert read.timing.elapsed.tolist() == [moment.elapsed for moment in moments]
     assert read.timing.late.tolist() == [moment.late for moment in moments]
     assert read.timing.missing.tolist() == [moment.missing for moment in moments]
-    assert np.array_equal(read.trial.behaviour.late, read.timing.late)
+    assert np.array_equal(read.trial.trajectory.late, read.timing.late)
 
 
 @pytest.mark.parametrize(("column", "value"), [(0, 0.0), (0, np.inf), (1, 0.5), (2, -1.0)], ids=str)
@@ -309,7 +309,7 @@ def test_a_trial_with_a_clock_that_is_stopped_is_a_whole_log(
 
     assert caught.value is error
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
-    assert (log.status, log.trial.behaviour.steps, log.reason) == ("stopped", at, reason)
+    assert (log.status, log.trial.trajectory.steps, log.reason) == ("stopped", at, reason)
     with pytest.raises(InputError, match="the trial in it is stopped"):
         salvage(tmp_path / "a.mcap", tmp_path / "b.mcap")
 
@@ -466,7 +466,7 @@ def test_a_physical_trial_is_that_of_its_log_and_timed_as_the_robot_is(
 
     assert (log.timing is not None) == (kind is Timed)
     assert (trial.plan, trial.path) == (log.trial.plan, str(path))
-    assert_same_bits(trial.behaviour, log.trial.behaviour)
+    assert_same_bits(trial.trajectory, log.trial.trajectory)
 
 
 @pytest.mark.parametrize("case", ["whole", "short", "hanging", "not stopped", "before"])
@@ -486,5 +486,5 @@ def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
         return
     trial, log = run(robot, plan), read_log(tmp_path / "02-recovery.mcap")
 
-    assert (trial.plan.steps, trial.behaviour.steps) == (2 * MIN_STEPS, MIN_STEPS)
+    assert (trial.plan.steps, trial.trajectory.steps) == (2 * MIN_STEPS, MIN_STEPS)
     assert (log.status, log.reason) == ("stopped", "TrialError: it fell")

@@ -27,8 +27,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import load
 from selfmodel.tasks.walking import motion_capture
-from selfmodel.trials.behaviour import collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.bench import (
     CONTROLLER,
@@ -205,7 +205,7 @@ def test_the_log_of_a_recovery_s_trial_has_the_timing_of_a_robot_with_a_clock(tm
     assert timing is not None
     assert np.flatnonzero(timing.late).tolist() == [5]
     assert np.flatnonzero(timing.missing).tolist() == [8]
-    assert np.flatnonzero(trial.behaviour.late).tolist() == [5]
+    assert np.flatnonzero(trial.trajectory.late).tolist() == [5]
     assert isinstance(trial.plan.controller, Controller)
     assert np.isnan(command_errors(trial)[8:]).all()
     assert not np.any(command_errors(trial)[:8])

@@ -18,8 +18,8 @@ from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.interface import Limit, joint_limits, tilt_limit
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.bench import (
     CONTROLLER,
@@ -117,7 +117,7 @@ def test_an_emergency_stops_the_robot_first_and_leaves_a_whole_log(tmp_path: Pat
     verified = verify(tmp_path / "trial.mcap")
     log = verified.log
     assert verified.model_loaded
-    assert (log.status, log.trial.behaviour.steps, log.trial.plan.steps) == ("stopped", 7, STEPS)
+    assert (log.status, log.trial.trajectory.steps, log.trial.plan.steps) == ("stopped", 7, STEPS)
     assert log.reason == f"{error.__name__}: {caught.value}".removesuffix(": ")
 
 
@@ -152,7 +152,7 @@ def test_an_episode_that_ends_too_soon_is_said_so(tmp_path: Path):
     with pytest.raises(TrialError, match="ended its episode after 12 of 30 steps"):
         logged(bench, tmp_path)
     assert bench.done[-1] == "stop"
-    assert read_log(tmp_path / "trial.mcap").trial.behaviour.steps == 12
+    assert read_log(tmp_path / "trial.mcap").trial.trajectory.steps == 12
     assert driven(Bench(last=STEPS - 1)).steps == STEPS
 
 

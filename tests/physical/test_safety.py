@@ -294,7 +294,7 @@ def test_a_driver_that_hangs_is_stopped_and_its_log_is_whole(bench: Hanging, tmp
     log = verify(tmp_path / "trial.mcap").log
 
     assert bench.executed[-1] == "stop"
-    assert (log.status, log.trial.behaviour.steps) == ("stopped", 7)
+    assert (log.status, log.trial.trajectory.steps) == ("stopped", 7)
     assert log.reason == (
         "HangError: the driver did not return from step within 0.1 s; "
         "nor within another 0.1 s, after the safe command"

@@ -27,8 +27,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import DEBRIS_PREFIX, RealityGap
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import random_controllers, random_motion
@@ -49,12 +49,12 @@ JOINTS = [
 ]
 
 
-def ran(physical: SimulatedRobot, robot: Robot, steps: int = STEPS) -> Behaviour:
+def ran(physical: SimulatedRobot, robot: Robot, steps: int = STEPS) -> Trajectory:
     (controller,) = random_controllers(robot, 1)
     return collect(robot.anatomy.names, physical.run(controller, steps))
 
 
-def same(one: Behaviour, other: Behaviour) -> bool:
+def same(one: Trajectory, other: Trajectory) -> bool:
     return all(one[signal].tobytes() == other[signal].tobytes() for signal in SIGNALS)
 
 
@@ -62,7 +62,7 @@ def same(one: Behaviour, other: Behaviour) -> bool:
 def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot, text: str):
     truth = parse(text.format(joint=robot.anatomy.joints[0].name), robot.anatomy)
     (controller,) = random_controllers(robot, 1)
-    simulated = Simulator(robot, 1).run([(truth, controller)], STEPS, SIGNALS).behaviour
+    simulated = Simulator(robot, 1).run([(truth, controller)], STEPS, SIGNALS).trajectory
     for gap in (None, drawn(robot, 0.0)):
         found = ran(SimulatedRobot(robot, truth, gap), robot)
 
@@ -88,7 +88,7 @@ def test_a_command_reaches_the_motors_so_many_steps_later(quadruped: Robot, dela
     motion = random_motion(quadruped, STEPS)
     later = np.concatenate([np.zeros((delay, motion.shape[1])), motion])[:STEPS]
 
-    def trial(commands: np.ndarray, late: int) -> Behaviour:
+    def trial(commands: np.ndarray, late: int) -> Trajectory:
         playback = played_back(quadruped.anatomy.motors, commands)
         physical = SimulatedRobot(quadruped, gap=dataclasses.replace(gap, delay=late))
         return collect(quadruped.anatomy.names, physical.run(playback, STEPS))
@@ -216,7 +216,7 @@ def test_the_log_hides_the_gap_where_only_scoring_looks(quadruped: Robot, tmp_pa
         write_trial(tmp_path / f"{name}.mcap", quadruped, plan, samples, header)
         assert read_truth(tmp_path / f"{name}.mcap") == "intact"
         log = read_log(tmp_path / f"{name}.mcap")
-        assert same(log.trial.behaviour, collect(quadruped.anatomy.names, samples))
+        assert same(log.trial.trajectory, collect(quadruped.anatomy.names, samples))
         assert "delay" not in repr(log)
     assert read_gap(tmp_path / "known.mcap") == gap.as_dict()
     assert read_gap(tmp_path / "none.mcap") is None
@@ -232,7 +232,7 @@ def left_alone(
     physical: SimulatedRobot, seconds: float
 ) -> tuple[mujoco.MjModel, mujoco.MjData, list[np.ndarray]]:
     """Lets a physical robot stand with its motors at 0, and returns where its debris went."""
-    model = physical._embodiment.model
+    model = physical._variant.model
     data = mujoco.MjData(model)
     seen: list[np.ndarray] = []
     pieces = [b for b in range(model.nbody) if model.body(b).name.startswith(DEBRIS_PREFIX)]
@@ -280,7 +280,7 @@ def test_debris_stands_behind_all_that_is_the_robots(name: str):
     robot = ROBOTS[name].robot()
     joints = [joint.name for joint in robot.anatomy.joints if len(joint.bodies) > 1][:2]
     text = "+".join(f"break:{joint}" for joint in joints)
-    model = broken(robot, text)._embodiment.model
+    model = broken(robot, text)._variant.model
 
     assert repr(signal_fields(robot, model)) == repr(signal_fields(robot)), "the same columns"
     assert (model.nu, model.nsensor) == (robot.model.nu, robot.model.nsensor)
@@ -295,7 +295,7 @@ def test_debris_is_as_heavy_as_the_limb_was_and_collides_with_the_ground_and_the
     quadruped: Robot,
 ):
     gap = drawn(quadruped, LEVEL, seed=1)
-    model = broken(quadruped, "break:front_left_shoulder")._embodiment.model
+    model = broken(quadruped, "break:front_left_shoulder")._variant.model
     for body in ("front_left_upper", "front_left_lower"):
         np.testing.assert_allclose(
             model.body(DEBRIS_PREFIX + body).mass, quadruped.model.body(body).mass * gap.mass[body]
@@ -321,7 +321,7 @@ def test_there_is_debris_only_where_a_limb_fell_off_across_a_gap(quadruped: Robo
         ("sensor:front_left_touch", LEVEL),
         ("intact", LEVEL),
     ]:
-        model = broken(quadruped, text, level)._embodiment.model
+        model = broken(quadruped, text, level)._variant.model
         assert model.nbody == quadruped.model.nbody
 
 
@@ -338,7 +338,7 @@ def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
     physical = broken(quadruped, "break:front_left_shoulder", 0.3)
     (controller,) = random_controllers(quadruped, 1)
     next(iter(physical.run(controller, 3)))
-    mujoco.mj_forward(physical._embodiment.model, starts[-1])
+    mujoco.mj_forward(physical._variant.model, starts[-1])
     for body in ("front_left_upper", "front_left_lower"):
         lost, left = starts[-1].body(DEBRIS_PREFIX + body), starts[-1].body(body)
         np.testing.assert_allclose(lost.xpos, left.xpos, atol=1e-9)
@@ -362,5 +362,5 @@ def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_pat
     assert len(paths) == 3
     assert hidden[0] == hidden[1] == hidden[2]
     assert hidden[0]["level"] == 0.1
-    starts = {read_log(path).trial.behaviour["joint_positions"][0].tobytes() for path in paths}
+    starts = {read_log(path).trial.trajectory["joint_positions"][0].tobytes() for path in paths}
     assert len(starts) == 3

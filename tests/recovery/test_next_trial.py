@@ -34,8 +34,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, Names, Signal
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 
@@ -124,7 +124,7 @@ def test_what_is_asked_is_bred_to_ask_more_and_of_its_seed_at_any_number_of_thre
     assert len(simulator.times) > GENERATIONS * SMALL.survivors
     column = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
     runs = simulator.run([(INTACT, one) for one in (best, bred)], EARLY_STEPS, ("sensors",))
-    less, more = runs.behaviour["sensors"][..., column].mean(axis=1)
+    less, more = runs.trajectory["sensors"][..., column].mean(axis=1)
     assert more > less
     assert bred == again
     assert bred not in [*first, *known]
@@ -151,7 +151,7 @@ def loop_of(
     on_event: Callable[[Event], None] = lambda _event: None,
 ) -> RecoveryLoop:
     """A recovery after trials of some controllers, in which the repair finds others."""
-    empty = Behaviour(robot.anatomy.names, np.zeros(1), {})
+    empty = Trajectory(robot.anatomy.names, np.zeros(1), {})
     trials = [
         Trial(TrialPlan(f"{i:02d}-after", "after", one, 1, 0), robot.name, empty, f"{i:02d}-after")
         for i, one in enumerate(tried)
@@ -271,7 +271,7 @@ class Oracle:
                 diverged[row] = True
                 signals["joint_positions"][row, -1] = np.nan
         time = np.arange(steps) * 0.01
-        return SimulationResult(Behaviour(NAMES, time, signals), diverged)
+        return SimulationResult(Trajectory(NAMES, time, signals), diverged)
 
 
 def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
@@ -281,7 +281,7 @@ def test_a_dead_sensor_is_asked_for_where_it_would_read_most(quadruped: Robot):
     pool = random_controllers(quadruped, 12)
     touch = [sensor.name for sensor in quadruped.anatomy.sensors].index("front_left_touch")
     runs = simulator.run([(INTACT, one) for one in pool], EARLY_STEPS, ("sensors",))
-    touches = runs.behaviour["sensors"][..., touch].mean(axis=1)
+    touches = runs.trajectory["sensors"][..., touch].mean(axis=1)
 
     assert len(set(touches)) > 4
     assert (
@@ -331,10 +331,10 @@ def test_disagreement_is_a_part_of_one_and_knows_no_order_of_the_hypotheses(
     signals["base_orientation"] = turned.as_quat(scalar_first=True).reshape(*shape, 4)
     order = rng.permutation(hypotheses)
     time = np.arange(7) * 0.01
-    found = disagreements(Behaviour(NAMES, time, signals))
+    found = disagreements(Trajectory(NAMES, time, signals))
     shuffled = {signal: values[:, order] for signal, values in signals.items()}
 
     assert np.all((found >= 0) & (found <= 1))
-    assert disagreements(Behaviour(NAMES, time, shuffled)) == pytest.approx(found, abs=1e-12)
+    assert disagreements(Trajectory(NAMES, time, shuffled)) == pytest.approx(found, abs=1e-12)
     if hypotheses == 1 or size == 0:
         assert np.all(found == 0)

@@ -43,8 +43,8 @@ from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Run, Simulator
-from selfmodel.trials.behaviour import Behaviour, Sample
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Sample, Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
@@ -157,8 +157,8 @@ def test_a_recovery_is_of_its_seed_at_any_number_of_threads_and_sees_nothing_hid
         assert [t.displacement for t in same.trials] == [t.displacement for t in one.trials]
     assert other.trials[0].plan.controller != gait
     assert given.repair_evaluations < one.repair_evaluations, "a given gait saves its search"
-    with pytest.raises(AssertionError, match="reached for _embodiment"):
-        _ = Sealed(SimulatedRobot(quadruped))._embodiment
+    with pytest.raises(AssertionError, match="reached for _variant"):
+        _ = Sealed(SimulatedRobot(quadruped))._variant
 
 
 def test_every_search_starts_from_what_the_database_holds(
@@ -219,8 +219,8 @@ def test_the_logs_are_all_that_is_known_and_what_they_hide_changes_nothing(
     assert len(stored.diagnoses) == 2
     for trial, again in zip(outcomes[0].trials, stored.trials, strict=True):
         assert (trial.path, trial.plan) == (again.path, again.plan)
-        for signal, rows in trial.behaviour.signals.items():
-            assert rows.tobytes() == again.behaviour[signal].tobytes()
+        for signal, rows in trial.trajectory.signals.items():
+            assert rows.tobytes() == again.trajectory[signal].tobytes()
 
 
 def test_the_choice_of_the_next_trial_is_asked_before_each_and_obeyed(quadruped: Robot):
@@ -303,9 +303,9 @@ def stubbed(quadruped: Robot, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespac
             weighted.append((len(trials), str(hypothesis)))
             return super().after(trials, hypothesis)
 
-    def score(_robot: Robot, hypothesis: Hypothesis, behaviour: Behaviour) -> np.ndarray:
+    def score(_robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> np.ndarray:
         scored.append(str(hypothesis))
-        return behaviour["base_position"][:, -1, 0]
+        return trajectory["base_position"][:, -1, 0]
 
     monkeypatch.setattr(module, "DiagnosticSearch", lambda *_rest, **_options: StubDiagnosis())
     monkeypatch.setattr(module, "Posterior", Posterior)
@@ -415,7 +415,7 @@ def test_a_comparator_names_what_a_trial_lacks(name: str, quadruped: Robot):
 
 def test_a_trial_that_other_software_drove_is_explained_by_its_commands(quadruped: Robot):
     (trial,) = trials_of(quadruped, 1)
-    playback = Playback(quadruped.anatomy.motors, trial.behaviour["commands"])
+    playback = Playback(quadruped.anatomy.motors, trial.trajectory["commands"])
     plan = dataclasses.replace(trial.plan, controller=playback)
     search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, TINY)
     hypotheses = [parse(text, quadruped.anatomy) for text in (TRUTH, "intact")]

@@ -34,7 +34,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import forward_displacement
+from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable
 from tests.recovery.test_repertoire import ORIGIN
@@ -141,11 +141,11 @@ def test_the_papers_repair_returns_its_survivors_with_their_exact_fitness(quadru
     simulator = Simulator(quadruped, 2)
     found = found_by(RepairSearch, simulator, seeds=seeds)
     runs = [(INTACT, each.controller) for each in found]
-    behaviour = simulator.run(runs, TINY.steps, ["base_position"]).behaviour
+    trajectory = simulator.run(runs, TINY.steps, ["base_position"]).trajectory
     of_seeds = simulator.run([(INTACT, each) for each in seeds], TINY.steps, ["base_position"])
 
-    assert [each.predicted for each in found] == forward_displacement(behaviour).tolist()
-    assert found[0].predicted >= forward_displacement(of_seeds.behaviour).max()
+    assert [each.predicted for each in found] == forward_displacement(trajectory).tolist()
+    assert found[0].predicted >= forward_displacement(of_seeds.trajectory).max()
     assert 1 < len({each.controller for each in found}) == len(found) <= TINY.survivors
 
 

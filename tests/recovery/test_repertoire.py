@@ -27,7 +27,7 @@ from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import forward_displacement
+from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers
 from tests.helpers.robots.arms import arm
 
@@ -138,15 +138,15 @@ def test_gaits_that_fall_or_go_backwards_have_no_score(
     damaged = parse("break:front_left_shoulder+break:front_right_shoulder", quadruped.anatomy)
     scores, descriptors = simulated_evaluation(simulator, damaged, 150)(controllers)
     runs = [(damaged, one) for one in controllers]
-    behaviour = simulator.run(runs, 150, module.RECORD).behaviour
-    walks = forward_displacement(behaviour)
-    falls = falls_of(quadruped, damaged, behaviour) < 150
+    trajectory = simulator.run(runs, 150, module.RECORD).trajectory
+    walks = forward_displacement(trajectory)
+    falls = falls_of(quadruped, damaged, trajectory) < 150
 
     assert falls.any()
     assert (~falls & (walks > 0)).any()
     assert np.array_equal(scores, np.where(falls | (walks <= 0), -np.inf, walks))
     touch = [k for k, sensor in enumerate(quadruped.anatomy.sensors) if sensor.kind == "touch"]
-    assert np.array_equal(descriptors, (behaviour["sensors"][..., touch] == 1).mean(axis=1))
+    assert np.array_equal(descriptors, (trajectory["sensors"][..., touch] == 1).mean(axis=1))
     monkeypatch.setattr(module, "BATCH", 7)
     again = simulated_evaluation(simulator, damaged, 150)(controllers)
     assert all(map(np.array_equal, (scores, descriptors), again))

@@ -51,10 +51,10 @@ CHOSEN = ChosenComparator(FORWARD_DISPLACEMENT, "given")
 
 
 def without_base(trial: Trial) -> Trial:
-    behaviour = trial.behaviour
-    unobserved = np.full_like(behaviour["base_position"], np.nan)
-    signals = {**behaviour.signals, "base_position": unobserved}
-    return dataclasses.replace(trial, behaviour=dataclasses.replace(behaviour, signals=signals))
+    trajectory = trial.trajectory
+    unobserved = np.full_like(trajectory["base_position"], np.nan)
+    signals = {**trajectory.signals, "base_position": unobserved}
+    return dataclasses.replace(trial, trajectory=dataclasses.replace(trajectory, signals=signals))
 
 
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):

@@ -33,8 +33,8 @@ from selfmodel.recovery.scores import (
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Names
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.robots.arms import arm
@@ -44,7 +44,7 @@ UP, HEIGHT = np.array([0.0, 0.0, 1.0]), 0.3
 LOW, UPSIDE_DOWN = 0.4 * HEIGHT, [0.0, 1.0, 0, 0]
 
 
-def observed(steps: int = 100, **changes: tuple[slice, object]) -> Behaviour:
+def observed(steps: int = 100, **changes: tuple[slice, object]) -> Trajectory:
     """Steps of 0.01 s on level ground, of which some poses are replaced."""
     signals = {
         "base_position": np.full((steps, 3), HEIGHT),
@@ -52,7 +52,7 @@ def observed(steps: int = 100, **changes: tuple[slice, object]) -> Behaviour:
     }
     for name, (which, value) in changes.items():
         signals[f"base_{name}"][which] = value
-    return Behaviour(NAMES, np.arange(steps) / 100, signals)
+    return Trajectory(NAMES, np.arange(steps) / 100, signals)
 
 
 @given(
@@ -72,7 +72,7 @@ def test_a_base_has_fallen_when_it_leans_from_its_start_or_is_near_the_ground_of
     turns = Rotation.concatenate([lying, about * lying]).as_quat(scalar_first=True)
     position = np.array([HEIGHT * normal, way * along + height * normal])
     signals = {"base_position": position, "base_orientation": turns}
-    falls = first_falls(Behaviour(NAMES, np.array([0, FALLEN_TIME]), signals), normal, HEIGHT)
+    falls = first_falls(Trajectory(NAMES, np.array([0, FALLEN_TIME]), signals), normal, HEIGHT)
 
     margins = [lean - np.pi / 3, FALLEN_HEIGHT * HEIGHT - height]
     if np.abs(margins).min() > 1e-6:
@@ -109,7 +109,7 @@ def test_a_base_has_fallen_that_is_low_in_most_of_a_quarter_of_a_second(
     signals = {"base_position": position, "base_orientation": orientation}
     for begin in (0.0, 1.7e9):
         time = begin + np.arange(steps) / 100
-        assert first_falls(Behaviour(NAMES, time, signals), UP, HEIGHT).tolist() == [steps, fall]
+        assert first_falls(Trajectory(NAMES, time, signals), UP, HEIGHT).tolist() == [steps, fall]
 
 
 REFERENCE = np.tile(UPSIDE_DOWN, (100, 1))
@@ -144,13 +144,13 @@ def test_a_base_that_is_missed_while_it_is_low_has_fallen():
 STEPS = 5
 
 
-def walked(robot: Robot, x: list[float], tilts: list[float], heights: list[float]) -> Behaviour:
+def walked(robot: Robot, x: list[float], tilts: list[float], heights: list[float]) -> Trajectory:
     """A run of the base alone, tilted about its y axis by angles in rad."""
     half = np.array(tilts) / 2
     orientation = np.stack([np.cos(half), 0 * half, np.sin(half), 0 * half], axis=1)
     position = np.stack([x, np.zeros(len(x)), heights], axis=1)
     signals = {"base_position": position[None], "base_orientation": orientation[None]}
-    return Behaviour(robot.anatomy.names, np.arange(len(x)) * FALLEN_TIME, signals)
+    return Trajectory(robot.anatomy.names, np.arange(len(x)) * FALLEN_TIME, signals)
 
 
 @pytest.mark.parametrize("fall", range(1, STEPS + 1))
@@ -185,12 +185,12 @@ def test_height_is_measured_from_the_ground_of_the_hypothesis(quadruped: Robot):
 def test_the_score_of_a_run_does_not_depend_on_its_batch(quadruped: Robot, name: str):
     score = SCORES[name]
     runs = [(INTACT, driver) for driver in random_controllers(quadruped, 6, seed=3)]
-    batch = Simulator(quadruped, 1).run(runs, 150, score.record).behaviour
+    batch = Simulator(quadruped, 1).run(runs, 150, score.record).trajectory
     alone = [
         score.of(
             quadruped,
             INTACT,
-            Behaviour(
+            Trajectory(
                 batch.names,
                 batch.time,
                 {signal: values[k : k + 1] for signal, values in batch.signals.items()},
@@ -208,9 +208,9 @@ def test_the_last_pose_of_a_trial_that_ended_early_counts_as_if_it_remained(
     (driver,) = random_controllers(quadruped, 1)
     batch = walked(quadruped, [0.0] * 40, [0.0] * 39 + [np.pi], [quadruped.standing_height] * 40)
     signals = {name: values[0] for name, values in batch.signals.items()}
-    behaviour = Behaviour(batch.names, np.arange(40) * 0.01, signals)
+    trajectory = Trajectory(batch.names, np.arange(40) * 0.01, signals)
     trial = Trial(
-        TrialPlan("single", "single", driver, planned, 0), quadruped.name, behaviour, "a log"
+        TrialPlan("single", "single", driver, planned, 0), quadruped.name, trajectory, "a log"
     )
 
     assert fall_of(quadruped, INTACT, trial) == fall
@@ -218,11 +218,11 @@ def test_the_last_pose_of_a_trial_that_ended_early_counts_as_if_it_remained(
 
 def test_a_fixed_base_does_not_fall():
     runs = [(INTACT, driver) for driver in random_cpgs(arm(), 1)]
-    behaviour = Simulator(arm(), 1).run(runs, 50, UPRIGHT.record).behaviour
-    assert falls_of(arm(), INTACT, behaviour) == 50
+    trajectory = Simulator(arm(), 1).run(runs, 50, UPRIGHT.record).trajectory
+    assert falls_of(arm(), INTACT, trajectory) == 50
 
 
-def hurried(robot: Robot, x: list[float], speeds: list[float], torques: list[float]) -> Behaviour:
+def hurried(robot: Robot, x: list[float], speeds: list[float], torques: list[float]) -> Trajectory:
     """An upright run with one fast joint and one that has torque."""
     steps, hinges = len(x), len(robot.anatomy.hinges)
     position = np.stack([x, np.zeros(steps), np.full(steps, robot.standing_height)], axis=1)
@@ -234,7 +234,7 @@ def hurried(robot: Robot, x: list[float], speeds: list[float], torques: list[flo
         "joint_velocities": velocity,
         "joint_efforts": effort,
     }
-    return Behaviour(robot.anatomy.names, np.arange(steps) * 0.01, signals)
+    return Trajectory(robot.anatomy.names, np.arange(steps) * 0.01, signals)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_limits_cost_displacement_and_without_limits_it_is_the_score_upright(
 ):
     score = upright_within(speed, torque)
     runs = [(INTACT, driver) for driver in random_controllers(quadruped, 3, seed=2)]
-    run = Simulator(quadruped, 1).run(runs, 60, score.record).behaviour
+    run = Simulator(quadruped, 1).run(runs, 60, score.record).trajectory
     upright = UPRIGHT.of(quadruped, INTACT, run)
 
     assert (score.of(quadruped, INTACT, run) <= upright + 1e-9).all()
@@ -281,12 +281,12 @@ def crossed(hexapod: Robot) -> np.ndarray:
     return poses[np.argmax(penetration_depths(hexapod, poses))]
 
 
-def crossing(robot: Robot, x: list[float], crossed: np.ndarray, steps: list[int]) -> Behaviour:
+def crossing(robot: Robot, x: list[float], crossed: np.ndarray, steps: list[int]) -> Trajectory:
     """An upright run in which two legs cross in some steps."""
     run = hurried(robot, x, [0.0] * len(x), [0.0] * len(x))
     positions = np.zeros((1, len(x), len(crossed)))
     positions[0, steps] = crossed
-    return Behaviour(run.names, run.time, {**run.signals, "joint_positions": positions})
+    return Trajectory(run.names, run.time, {**run.signals, "joint_positions": positions})
 
 
 X = [0.0, 1, 3, 2, 6, 7, 8, 9]
@@ -340,7 +340,7 @@ def test_what_came_off_collides_with_nothing_and_an_encoder_is_corrected(
     for joint in hexapod.anatomy.joints:
         wrong = parse(f"encoder-offset:{joint.name}=0.5", hexapod.anatomy)
         logged = true + build(hexapod, wrong).encoder_offset
-        shifted = Behaviour(run.names, run.time, {**run.signals, "joint_positions": logged})
+        shifted = Trajectory(run.names, run.time, {**run.signals, "joint_positions": logged})
         assert upright_within(max_self_collision=depth + 1e-9).of(hexapod, wrong, shifted) == 9
         assert upright_within(max_self_collision=depth - 1e-9).of(hexapod, wrong, shifted) == 0
 
@@ -380,10 +380,10 @@ def test_work_is_power_over_time_in_either_direction(quadruped: Robot):
     effort, velocity = np.zeros((1, 3, hinges)), np.ones((1, 3, hinges))
     effort[0, 0, 0], effort[0, 1, 1], effort[0, 2, 2] = 2.0, -3.0, np.nan
     names, time = quadruped.anatomy.names, np.arange(3) * quadruped.control_timestep
-    run = Behaviour(names, time, {"joint_efforts": effort, "joint_velocities": velocity})
+    run = Trajectory(names, time, {"joint_efforts": effort, "joint_velocities": velocity})
     np.testing.assert_allclose(joint_work(quadruped, run), [5 * quadruped.control_timestep])
     unknown = {"joint_efforts": np.full_like(effort, np.nan), "joint_velocities": velocity}
-    assert np.isnan(joint_work(quadruped, Behaviour(names, time, unknown))).all()
+    assert np.isnan(joint_work(quadruped, Trajectory(names, time, unknown))).all()
 
 
 def test_the_score_is_the_upright_displacement_less_the_work_over_the_weight(quadruped: Robot):
@@ -391,7 +391,7 @@ def test_the_score_is_the_upright_displacement_less_the_work_over_the_weight(qua
     lost = parse("break:front_left_shoulder", quadruped.anatomy)
     for hypothesis in (INTACT, lost):
         runs = [(hypothesis, driver) for driver in drivers]
-        run = Simulator(quadruped, 1).run(runs, 100, ENERGY.record).behaviour
+        run = Simulator(quadruped, 1).run(runs, 100, ENERGY.record).trajectory
         spent = UPRIGHT.of(quadruped, hypothesis, run) - ENERGY.of(quadruped, hypothesis, run)
         weight = joint_work(quadruped, run) * WORK_WEIGHT / spent
         gravity = np.linalg.norm(quadruped.model.opt.gravity)
@@ -404,18 +404,18 @@ def test_the_score_is_the_upright_displacement_less_the_work_over_the_weight(qua
 RUNS = 3
 
 
-def ran(robot: Robot, x: float = 1.0) -> Behaviour:
+def ran(robot: Robot, x: float = 1.0) -> Trajectory:
     """Three runs, of which the last ends at ``x``."""
     position = np.ones((RUNS, 4, 3))
     position[-1, -1, 0] = x
-    return Behaviour(robot.anatomy.names, np.arange(4) * 0.01, {"base_position": position})
+    return Trajectory(robot.anatomy.names, np.arange(4) * 0.01, {"base_position": position})
 
 
-def scored(robot: Robot, of: Callable[[Behaviour], object], x: float = 1.0) -> FloatArray:
+def scored(robot: Robot, of: Callable[[Trajectory], object], x: float = 1.0) -> FloatArray:
     """What a score of a plug-in returns once it is checked."""
 
-    def mine(_robot: Robot, _hypothesis: Hypothesis, behaviour: Behaviour) -> FloatArray:
-        return of(behaviour)  # type: ignore[return-value]
+    def mine(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+        return of(trajectory)  # type: ignore[return-value]
 
     score = checked(Score("mine", ("base_position",), mine), "my.module:SCORE")
     return score.of(robot, INTACT, ran(robot, x))
@@ -447,7 +447,7 @@ def test_signals_that_are_unknown_are_refused_when_the_score_is_loaded(record: o
     ],
 )
 def test_values_that_are_no_scores_are_refused_with_the_remedy(
-    quadruped: Robot, of: Callable[[Behaviour], object], message: str
+    quadruped: Robot, of: Callable[[Trajectory], object], message: str
 ):
     with pytest.raises(InputError, match=f"the score 'my.module:SCORE'.*{message}"):
         scored(quadruped, of)

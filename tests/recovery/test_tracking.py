@@ -7,7 +7,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery.tracking import Reference, tracking
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_cpgs
 from tests.helpers.robots.arms import arm
@@ -20,8 +20,8 @@ def ramp(rates: np.ndarray) -> np.ndarray:
     return TIME[:, np.newaxis] * rates
 
 
-def moved(positions: np.ndarray) -> Behaviour:
-    return Behaviour(arm().anatomy.names, TIME, {"joint_positions": positions})
+def moved(positions: np.ndarray) -> Trajectory:
+    return Trajectory(arm().anatomy.names, TIME, {"joint_positions": positions})
 
 
 @pytest.mark.parametrize(("offset", "joint"), [(-2.0, 0), (0.5, 5), (0.0, 3)])

@@ -203,7 +203,7 @@ def test_the_healthy_trial_is_simulated_without_the_fault(
 ):
     walked = healthy[0]
     # A recording of other software is a trial, too.
-    played = Playback(walked.behaviour.names.motors, walked.behaviour["commands"])
+    played = Playback(walked.trajectory.names.motors, walked.trajectory["commands"])
     plan = dataclasses.replace(walked.plan, stage="after", controller=played)
     after = dataclasses.replace(walked, plan=plan, path="after")
     own, fault = posterior(calibration, [walked]), parse("break:front_left_knee", quadruped.anatomy)

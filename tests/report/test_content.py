@@ -71,11 +71,11 @@ def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: t
     first = dataclasses.replace(shots[0].rollouts[0], diverged=True)
     alone = gait_section(subject, (dataclasses.replace(shots[0], rollouts=(first,)),))
     assert list(alone.items[0].groups) == ["measured"], "a simulation that diverged has none"
-    behaviour = shots[0].trial.behaviour
+    trajectory = shots[0].trial.trajectory
     for lane in diagram.groups["measured"]:
-        column = behaviour.names.sensors.index(lane.label)
-        contact = np.zeros(behaviour.steps, dtype=bool)
+        column = trajectory.names.sensors.index(lane.label)
+        contact = np.zeros(trajectory.steps, dtype=bool)
         for begin, end in lane.spans:
-            contact |= (behaviour.time >= begin) & (behaviour.time < end)
+            contact |= (trajectory.time >= begin) & (trajectory.time < end)
 
-        assert np.array_equal(contact[:-1], (behaviour["sensors"][:, column] > 0.5)[:-1])
+        assert np.array_equal(contact[:-1], (trajectory["sensors"][:, column] > 0.5)[:-1])

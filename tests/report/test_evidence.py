@@ -52,7 +52,7 @@ def test_the_heat_map_has_a_row_for_each_sensor_and_encoder(subject: Subject):
     heat = residual(subject).items[-1]
     assert isinstance(heat, HeatMap)
 
-    names = subject.damaged[0].behaviour.names
+    names = subject.damaged[0].trajectory.names
     encoders = [f"encoder {one}" for one in names.hinges]
     assert [row.label for row in heat.rows] == [*names.sensors, *encoders]
     assert all(len(row.values) == len(heat.begin) == len(heat.end) for row in heat.rows)

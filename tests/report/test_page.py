@@ -114,7 +114,7 @@ def test_the_page_shows_the_numbers_of_the_json_and_the_angles_of_the_log(
     tables = {one["title"]: one["rows"] for one in shown["tables"] if one["title"] != "Trials"}
     numbers = {title: [_numbers(row) for row in rows] for title, rows in tables.items()}
     assert numbers == _expected(json.loads(as_json(report)))
-    measured = subject.damaged[0].behaviour
+    measured = subject.damaged[0].trajectory
     assert shown["trial"] == "01-after"
     for frame in FRAMES:
         angles = shown["angles"][str(frame)]

@@ -14,7 +14,7 @@ from selfmodel.logs.results import SEARCHES, read_searches, write_searches
 from selfmodel.recovery.result import SearchBegins
 from selfmodel.report.progress import Progress
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import random_controllers
@@ -55,7 +55,7 @@ def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trial
         raise kind("before the first trial")
     (gait,) = random_controllers(quadruped, 1)
     plan = TrialPlan("00-before", "before", gait, 1, 0)
-    progress(Trial(plan, "quadruped", Behaviour(quadruped.anatomy.names, np.zeros(1), {}), "log"))
+    progress(Trial(plan, "quadruped", Trajectory(quadruped.anatomy.names, np.zeros(1), {}), "log"))
     with pytest.raises(kind) as failure, progress.kept_on_failure():
         raise kind("the robot is gone")
 

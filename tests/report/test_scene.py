@@ -14,8 +14,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.report.scene import Motion, Shot, geometry_of, quantised, scene_of, simplified
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.robots.arms import quadruped_on_a_stand
@@ -39,25 +39,25 @@ def angle(hinge: dict[str, Any], parent: np.ndarray, body: np.ndarray) -> float:
     return hinge["reference"] + float(turned @ np.array(hinge["axis"]))
 
 
-def moved(robot: Robot) -> Behaviour:
+def moved(robot: Robot) -> Trajectory:
     (controller,) = random_controllers(robot, 1)
-    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, SIGNALS).behaviour
-    return Behaviour(batch.names, batch.time, {one: batch[one][0] for one in SIGNALS})
+    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, SIGNALS).trajectory
+    return Trajectory(batch.names, batch.time, {one: batch[one][0] for one in SIGNALS})
 
 
-def shot(robot: Robot, behaviour: Behaviour, hypothesis: Hypothesis = INTACT) -> Shot:
+def shot(robot: Robot, trajectory: Trajectory, hypothesis: Hypothesis = INTACT) -> Shot:
     """A trial whose only simulation diverged, so that the measured motion alone is drawn."""
     (controller,) = random_controllers(robot, 1)
-    trial = Trial(TrialPlan("a", "after", controller, STEPS, 0), robot.name, behaviour, "a.mcap")
-    return Shot("a", trial, (Motion("best", hypothesis, behaviour, diverged=True),))
+    trial = Trial(TrialPlan("a", "after", controller, STEPS, 0), robot.name, trajectory, "a.mcap")
+    return Shot("a", trial, (Motion("best", hypothesis, trajectory, diverged=True),))
 
 
 @pytest.mark.parametrize("place", ["free", "on a stand"])
 def test_the_angles_of_a_motion_are_those_of_the_log(place: str, robot: Robot):
     robot = robot if place == "free" else quadruped_on_a_stand()
-    behaviour = moved(robot)
+    trajectory = moved(robot)
 
-    scene = scene_of(robot, [shot(robot, behaviour)])
+    scene = scene_of(robot, [shot(robot, trajectory)])
 
     (drawn_shot,) = scene["shots"]
     (motion,) = drawn_shot["motions"]
@@ -68,13 +68,13 @@ def test_the_angles_of_a_motion_are_those_of_the_log(place: str, robot: Robot):
             for one in rotations
         ]
     )
-    logged = behaviour["joint_positions"]
+    logged = trajectory["joint_positions"]
     turned = [robot.anatomy.hinges.index(one["name"]) for one in scene["turned"]]
     assert turned
     assert np.abs(decoded(motion["angles"]) - logged).max() < 1e-4
     assert np.abs(drawn - logged[:, turned]).max() < 2e-4
-    assert drawn_shot["time"] == behaviour.time.tolist()
-    assert motion["travelled"] == behaviour["base_position"][:, 0].tolist()
+    assert drawn_shot["time"] == trajectory.time.tolist()
+    assert motion["travelled"] == trajectory["base_position"][:, 0].tolist()
 
 
 def test_detached_and_jammed_bodies_of_the_hypothesis_are_named(quadruped: Robot):
@@ -88,13 +88,13 @@ def test_detached_and_jammed_bodies_of_the_hypothesis_are_named(quadruped: Robot
 
 
 def test_a_long_trial_loses_steps_but_neither_its_first_nor_its_last(quadruped: Robot):
-    behaviour = moved(quadruped)
+    trajectory = moved(quadruped)
 
-    scene = scene_of(quadruped, [shot(quadruped, behaviour)], most_poses=STEPS * 9 // 4)
+    scene = scene_of(quadruped, [shot(quadruped, trajectory)], most_poses=STEPS * 9 // 4)
 
     time = scene["shots"][0]["time"]
     assert len(time) <= STEPS // 4 + 2
-    assert [time[0], time[-1]] == [behaviour.time[0], behaviour.time[-1]]
+    assert [time[0], time[-1]] == [trajectory.time[0], trajectory.time[-1]]
 
 
 def test_every_body_of_the_robot_has_its_shapes_and_the_world_has_none(robot: Robot):

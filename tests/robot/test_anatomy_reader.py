@@ -105,7 +105,7 @@ def test_a_controller_receives_the_reading_of_the_sensor_for_the_angle(name: str
     run = (
         Simulator(robot, 1)
         .run([(parse("intact", robot.anatomy), swung(robot, 5))], 5, SIGNALS)
-        .behaviour
+        .trajectory
     )
     for column, sensor in enumerate(robot.anatomy.sensors):
         if sensor.kind == "angle":

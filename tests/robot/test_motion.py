@@ -12,17 +12,17 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.drivers import random_controllers
 
 STEPS = 12
 
 
-def moved(robot: Robot) -> Behaviour:
+def moved(robot: Robot) -> Trajectory:
     (controller,) = random_controllers(robot, 1)
-    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).behaviour
-    return Behaviour(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
+    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).trajectory
+    return Trajectory(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
 
 
 def told(robot: Robot, poses: Poses, signal: Signal) -> np.ndarray:
@@ -35,21 +35,21 @@ MOVED = moved(ROBOTS["quadruped"].robot())
 HINGES = MOVED["joint_positions"].shape[1]
 
 
-def unseen(behaviour: Behaviour, **masks: np.ndarray) -> Behaviour:
+def unseen(trajectory: Trajectory, **masks: np.ndarray) -> Trajectory:
     """The same with NaN where a mask of a signal says so."""
-    signals = {signal: np.array(behaviour[signal]) for signal in POSE}
+    signals = {signal: np.array(trajectory[signal]) for signal in POSE}
     for signal, mask in masks.items():
         signals[signal][mask] = np.nan
-    return Behaviour(behaviour.names, behaviour.time, signals)
+    return Trajectory(trajectory.names, trajectory.time, signals)
 
 
 def test_where_all_was_observed_the_model_stands_as_it_did(robot: Robot):
-    behaviour = moved(robot)
-    poses = poses_of(robot, robot.model, behaviour)
+    trajectory = moved(robot)
+    poses = poses_of(robot, robot.model, trajectory)
 
     assert (poses.missing, poses.held.any()) == ((), False)
     for signal in POSE:
-        np.testing.assert_array_equal(told(robot, poses, signal), behaviour[signal])
+        np.testing.assert_array_equal(told(robot, poses, signal), trajectory[signal])
 
 
 @given(
@@ -92,11 +92,11 @@ def test_a_part_of_an_orientation_is_none():
 
 @pytest.mark.parametrize("signal", ["base_position", "base_orientation"])
 def test_without_a_base_the_robot_stays_where_it_starts(robot: Robot, signal: str):
-    behaviour = moved(robot)
-    poses = poses_of(robot, robot.model, unseen(behaviour, **{signal: np.array([True] * STEPS)}))
+    trajectory = moved(robot)
+    poses = poses_of(robot, robot.model, unseen(trajectory, **{signal: np.array([True] * STEPS)}))
     assert poses.missing == (signal,)
     assert not poses.held.any()
-    start = np.tile(behaviour[signal][0], (STEPS, 1))
+    start = np.tile(trajectory[signal][0], (STEPS, 1))
     np.testing.assert_array_equal(told(robot, poses, signal), start)
 
 

@@ -35,9 +35,9 @@ from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import STATE
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 from tests.helpers.robots.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
@@ -206,39 +206,39 @@ def test_a_physical_robot_without_a_gap_is_simulated_to_the_bit():
         driver = driver_of(robot)
         hidden = parse(f"motor:{robot.anatomy.joints[1].name}=0.4", robot.anatomy)
         logged = collect(robot.anatomy.names, SimulatedRobot(robot, hidden).run(driver, 60))
-        simulated = Simulator(robot, 1).run([(hidden, driver)], 60, SIGNALS).behaviour
+        simulated = Simulator(robot, 1).run([(hidden, driver)], 60, SIGNALS).trajectory
         for signal in SIGNALS:
             assert np.array_equal(logged[signal], simulated[signal][0]), signal
 
 
 def trial_of(robot: Robot, steps: int = 200) -> Trial:
     (driver,) = random_cpgs(robot, 1)
-    behaviour = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, steps))
+    trajectory = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, steps))
     plan = TrialPlan("one", "before", driver, steps, seed=0)
-    return Trial(plan, robot.name, behaviour, "one.mcap")
+    return Trial(plan, robot.name, trajectory, "one.mcap")
 
 
 def without_base(trial: Trial) -> Trial:
-    behaviour = trial.behaviour
-    unknown = {signal: np.full_like(behaviour[signal], np.nan) for signal in BASE_SIGNALS}
-    signals = {**behaviour.signals, **unknown}
-    blind = Behaviour(behaviour.names, behaviour.time, signals)
+    trajectory = trial.trajectory
+    unknown = {signal: np.full_like(trajectory[signal], np.nan) for signal in BASE_SIGNALS}
+    signals = {**trajectory.signals, **unknown}
+    blind = Trajectory(trajectory.names, trajectory.time, signals)
     return Trial(trial.plan, trial.robot, blind, "blind.mcap")
 
 
 def test_the_unobserved_base_of_an_arm_is_that_of_its_model():
     trial = trial_of(arm())
-    found = with_known_base(arm(), without_base(trial).behaviour)
+    found = with_known_base(arm(), without_base(trial).trajectory)
     for signal in BASE_SIGNALS:
-        assert np.array_equal(found[signal], trial.behaviour[signal]), signal
+        assert np.array_equal(found[signal], trial.trajectory[signal]), signal
 
 
 def test_an_observed_base_and_a_floating_base_are_unchanged():
-    behaviour = trial_of(arm()).behaviour
-    moved = {**behaviour.signals, "base_position": behaviour["base_position"] + 0.01}
-    seen = Behaviour(behaviour.names, behaviour.time, moved)
+    trajectory = trial_of(arm()).trajectory
+    moved = {**trajectory.signals, "base_position": trajectory["base_position"] + 0.01}
+    seen = Trajectory(trajectory.names, trajectory.time, moved)
     assert np.array_equal(with_known_base(arm(), seen)["base_position"], seen["base_position"])
-    floating = without_base(trial_of(ROBOTS["quadruped"].robot(), 20)).behaviour
+    floating = without_base(trial_of(ROBOTS["quadruped"].robot(), 20)).trajectory
     assert with_known_base(ROBOTS["quadruped"].robot(), floating) is floating
 
 
@@ -273,10 +273,10 @@ def test_a_part_of_a_step_is_exact_in_all_simulations(quadruped: Robot, delay: f
     late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
     (controller,) = random_controllers(late, 1)
     physical = collect(late.anatomy.names, SimulatedRobot(late).run(controller, 60))
-    simulated = Simulator(late, 1).run([(INTACT, controller)], 60, SIGNALS).behaviour
+    simulated = Simulator(late, 1).run([(INTACT, controller)], 60, SIGNALS).trajectory
     states = {signal: physical[signal] for signal in STATE}
     segments = cut_segments(physical, states, np.array([0, 20, 40]), 10, STATE)
-    predicted = Simulator(late, 1).predict([INTACT], segments).behaviour
+    predicted = Simulator(late, 1).predict([INTACT], segments).trajectory
 
     assert late.control_delay == delay
     assert all(physical[signal].tobytes() == simulated[signal][0].tobytes() for signal in SIGNALS)
@@ -291,7 +291,7 @@ def test_a_delay_of_half_a_step_is_between_its_neighbours(quadruped: Robot):
     def moved(delay: float) -> np.ndarray:
         late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
         run = Simulator(late, 1).run([(INTACT, controller)], 8, ["joint_positions"])
-        return run.behaviour["joint_positions"][0, 2]
+        return run.trajectory["joint_positions"][0, 2]
 
     assert not np.array_equal(moved(0.5), moved(0))
     assert not np.array_equal(moved(0.5), moved(1))

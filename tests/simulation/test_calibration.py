@@ -28,9 +28,9 @@ from selfmodel.simulation.model_factors import (
     with_parameters,
 )
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, unstable
@@ -56,9 +56,9 @@ PRIOR = prior_of(QUADRUPED)
 def trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = STEPS) -> Trial:
     """A trial in which every joint moves."""
     driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
-    behaviour = collect(robot.anatomy.names, physical.run(driver, steps))
+    trajectory = collect(robot.anatomy.names, physical.run(driver, steps))
     return Trial(
-        TrialPlan("made-up", "before", driver, steps, 0), robot.name, behaviour, f"{seed}.mcap"
+        TrialPlan("made-up", "before", driver, steps, 0), robot.name, trajectory, f"{seed}.mcap"
     )
 
 
@@ -221,10 +221,10 @@ def test_factors_that_predict_left_out_segments_no_better_stay_nominal_to_the_bi
     """A trial in the model's own physics, with noise: there is nothing to fit."""
     rng = np.random.default_rng(0)
     (exact,) = trials(QUADRUPED, 1, 200)
-    velocities = exact.behaviour["joint_velocities"]
+    velocities = exact.trajectory["joint_velocities"]
     velocities = velocities + 0.3 * rng.standard_normal(velocities.shape)
-    behaviour = exact.behaviour.with_signals({"joint_velocities": velocities})
-    found = calibrate(QUADRUPED, [dataclasses.replace(exact, behaviour=behaviour)], threads=1)
+    trajectory = exact.trajectory.with_signals({"joint_velocities": velocities})
+    found = calibrate(QUADRUPED, [dataclasses.replace(exact, trajectory=trajectory)], threads=1)
 
     assert found.error_before > EXACT_ERROR
     assert found.robot is QUADRUPED
@@ -316,8 +316,8 @@ def arm_trial(physical: Robot, noise: float) -> Trial:
     signals = {name: np.full_like(values, np.nan) for name, values in whole.signals.items()}
     signals["commands"] = whole["commands"]
     signals["joint_positions"] = whole["joint_positions"] + rng.normal(0, noise, (ARM_STEPS, 2))
-    behaviour = dataclasses.replace(whole, signals=signals)
-    return Trial(TrialPlan("arm", "before", driver, ARM_STEPS, 0), "arm", behaviour, "arm.mcap")
+    trajectory = dataclasses.replace(whole, signals=signals)
+    return Trial(TrialPlan("arm", "before", driver, ARM_STEPS, 0), "arm", trajectory, "arm.mcap")
 
 
 @search

@@ -58,7 +58,7 @@ def test_a_robot_without_uncertainty_is_the_self_model_to_the_bit(robot: Robot):
     for signal in RECORD:
         for column in range(2):
             np.testing.assert_array_equal(
-                outcome.behaviour[signal][:, column], expected.behaviour[signal]
+                outcome.trajectory[signal][:, column], expected.trajectory[signal]
             )
 
 
@@ -69,7 +69,7 @@ def test_a_rollout_has_the_same_bits_in_any_batch_and_at_any_number_of_threads(r
     alone = Simulator(robot, 1).run_under(drawn[2:3], unknown, drivers[1:2], STEPS, RECORD)
 
     for signal in RECORD:
-        np.testing.assert_array_equal(many.behaviour[signal][1, 2], alone.behaviour[signal][0, 0])
+        np.testing.assert_array_equal(many.trajectory[signal][1, 2], alone.trajectory[signal][0, 0])
 
 
 def test_conditions_are_common_to_all_controllers_and_differ_from_each_other(quadruped: Robot):
@@ -78,9 +78,9 @@ def test_conditions_are_common_to_all_controllers_and_differ_from_each_other(qua
     outcome = Simulator(quadruped, 1).run_under(drawn, unknown, [driver] * 2, STEPS, RECORD)
 
     for signal in RECORD:
-        first, second = outcome.behaviour[signal]
+        first, second = outcome.trajectory[signal]
         np.testing.assert_array_equal(first, second)
-    starts = outcome.behaviour["joint_positions"][0, :, 0]
+    starts = outcome.trajectory["joint_positions"][0, :, 0]
     assert len(np.unique(starts, axis=0)) == 3
 
 
@@ -94,8 +94,8 @@ def test_readings_have_the_noise_of_the_uncertainty(quadruped: Robot):
     still = Playback(quadruped.anatomy.names.motors, np.zeros((400, len(quadruped.anatomy.motors))))
     drawn = draw_samples((INTACT,), unknown, 8, np.random.default_rng(3))
     simulator = Simulator(quadruped, 1)
-    noisy = simulator.run_under(drawn, unknown, [still], 400, ("sensors",)).behaviour["sensors"][0]
-    clean = simulator.run([(INTACT, still)], 400, ("sensors",)).behaviour["sensors"][0]
+    noisy = simulator.run_under(drawn, unknown, [still], 400, ("sensors",)).trajectory["sensors"][0]
+    clean = simulator.run([(INTACT, still)], 400, ("sensors",)).trajectory["sensors"][0]
     error = noisy - clean
 
     np.testing.assert_allclose(error[..., ~touch].std(axis=(0, 1)), 0.1, rtol=0.1)
@@ -114,7 +114,7 @@ def test_a_dead_sensor_has_no_noise(quadruped: Robot):
         drawn, uncertain(quadruped), random_controllers(quadruped, 1), STEPS, ("sensors",)
     )
 
-    assert not outcome.behaviour["sensors"][..., columns].any()
+    assert not outcome.trajectory["sensors"][..., columns].any()
 
 
 def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robot):
@@ -125,7 +125,7 @@ def test_the_noise_of_a_faulty_sensor_differs_between_conditions(quadruped: Robo
     still = Playback(quadruped.anatomy.names.motors, np.zeros((5, len(quadruped.anatomy.motors))))
     outcome = Simulator(quadruped, 1).run_under(drawn, unknown, [still], 5, ("sensors",))
 
-    readings = outcome.behaviour["sensors"][0, :, 0, column]
+    readings = outcome.trajectory["sensors"][0, :, 0, column]
     assert len(set(readings.round(4).tolist())) == 3
 
 
@@ -145,13 +145,13 @@ def test_an_added_delay_makes_commands_arrive_later(quadruped: Robot, delay: int
     late = dataclasses.replace(certain(quadruped), delays=(delay,))
     (condition,) = draw_samples((INTACT,), late, 1, np.random.default_rng(6))
 
-    assert condition.embodiment(quadruped).added_delay.tolist() == [delay]
+    assert condition.variant(quadruped).added_delay.tolist() == [delay]
     slow = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
     (driver,) = random_controllers(quadruped, 1)
     outcome = Simulator(quadruped, 1).run_under([condition], late, [driver], STEPS, RECORD)
     expected = Simulator(slow, 1).run([(INTACT, driver)], STEPS, RECORD)
     np.testing.assert_allclose(
-        outcome.behaviour["joint_positions"][0], expected.behaviour["joint_positions"], atol=1e-3
+        outcome.trajectory["joint_positions"][0], expected.trajectory["joint_positions"], atol=1e-3
     )
 
 

@@ -27,9 +27,9 @@ from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator, ground_contact_points
 from selfmodel.tasks import suite_bodies
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
 STEPS = 1000
@@ -53,11 +53,11 @@ def walk(quadruped: Robot) -> Controller:
     cpg = cpg_for(quadruped)
     drivers = [Controller(cpg, genome) for genome in rng.uniform(-1, 1, (40, cpg.weights))]
     runs = [(Hypothesis(), driver) for driver in drivers]
-    way = Simulator(quadruped, 2).run(runs, 500, ["base_position"]).behaviour["base_position"]
+    way = Simulator(quadruped, 2).run(runs, 500, ["base_position"]).trajectory["base_position"]
     return drivers[int(np.argmax(np.linalg.norm(way[:, -1, :2], axis=1)))]
 
 
-Observed = Callable[[str], Behaviour]
+Observed = Callable[[str], Trajectory]
 
 
 @pytest.fixture(scope="module")
@@ -65,18 +65,18 @@ def observed(quadruped: Robot, walk: Controller) -> Observed:
     """The walk of a robot with something wrong."""
 
     @cache
-    def run(truth: str) -> Behaviour:
+    def run(truth: str) -> Trajectory:
         physical = SimulatedRobot(quadruped, parse(truth, quadruped.anatomy))
         return collect(quadruped.anatomy.names, physical.run(walk, STEPS))
 
     return run
 
 
-def logged(behaviour: Behaviour, walk: Controller, path: str) -> Trial:
-    return Trial(TrialPlan("00-after", "after", walk, STEPS, 0), "quadruped", behaviour, path)
+def logged(trajectory: Trajectory, walk: Controller, path: str) -> Trial:
+    return Trial(TrialPlan("00-after", "after", walk, STEPS, 0), "quadruped", trajectory, path)
 
 
-def changed(run: Behaviour, signal: Signal, place: object, value: float) -> Behaviour:
+def changed(run: Trajectory, signal: Signal, place: object, value: float) -> Trajectory:
     values = run[signal].copy()
     values[place] = value
     return run.with_signals({signal: values})
@@ -170,12 +170,12 @@ def test_a_robot_on_its_back_or_far_away_feels_nothing_and_is_diagnosed_all_the_
     whole = observed("intact")
     in_the_air = changed(whole, "base_position", np.s_[:, 2], 20)
     on_its_back = changed(whole, "sensors", np.s_[:, :4], 0)
-    for number, behaviour in enumerate((in_the_air, on_its_back)):
-        trial = logged(behaviour, walk, f"{number}.mcap")
+    for number, trajectory in enumerate((in_the_air, on_its_back)):
+        trial = logged(trajectory, walk, f"{number}.mcap")
         losses = LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
         rough = parse("roughness=0.02", quadruped.anatomy)
 
-        assert ground_contact_points(quadruped, behaviour).shape == (0, 3)
+        assert ground_contact_points(quadruped, trajectory).shape == (0, 3)
         assert np.isfinite(losses.distances([rough], [trial])).all()
 
 
@@ -199,6 +199,6 @@ def test_of_several_geoms_of_a_foot_the_lowest_counts(quadruped: Robot, observed
 
 def test_a_robot_without_touch_feels_nothing():
     swimmer = suite_bodies.robot("swimmer", "swimmer6")
-    behaviour = Behaviour(swimmer.anatomy.names, np.arange(2.0), {})
+    trajectory = Trajectory(swimmer.anatomy.names, np.arange(2.0), {})
 
-    assert ground_contact_points(swimmer, behaviour).shape == (0, 3)
+    assert ground_contact_points(swimmer, trajectory).shape == (0, 3)

@@ -29,7 +29,7 @@ def found(tried: Trial) -> Suspicion | None:
 
 def changed(**signals: np.ndarray) -> Trial:
     """The healthy trial with other columns."""
-    return replace(HEALTHY, behaviour=HEALTHY.behaviour.with_signals(signals))
+    return replace(HEALTHY, trajectory=HEALTHY.trajectory.with_signals(signals))
 
 
 def test_a_healthy_trial_is_not_suspicious():
@@ -40,9 +40,9 @@ def test_a_healthy_trial_is_not_suspicious():
 def test_a_joint_with_the_other_sign_exchanged_joints_and_an_offset_are_named():
     signs, order = np.ones(len(QUADRUPED.anatomy.hinges)), np.arange(len(QUADRUPED.anatomy.hinges))
     signs[KNEE], order[[KNEE, OTHER]] = -1.0, order[[OTHER, KNEE]]
-    flipped = found(changed(**{name: HEALTHY.behaviour[name] * signs for name in JOINTS}))
-    swapped = found(changed(**{name: HEALTHY.behaviour[name][:, order] for name in JOINTS}))
-    positions = HEALTHY.behaviour["joint_positions"].copy()
+    flipped = found(changed(**{name: HEALTHY.trajectory[name] * signs for name in JOINTS}))
+    swapped = found(changed(**{name: HEALTHY.trajectory[name][:, order] for name in JOINTS}))
+    positions = HEALTHY.trajectory["joint_positions"].copy()
     positions[:, KNEE] += 0.2
     shifted = found(changed(joint_positions=positions))
 

@@ -22,10 +22,10 @@ from selfmodel.simulation.prediction import activations, predict
 from selfmodel.simulation.requests import END, Segments, cut_segments
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import exploding
 
@@ -40,24 +40,24 @@ def moved(robot: Robot, steps: int = STEPS) -> CommandSource:
     return played_back(robot.anatomy.motors, random_motion(robot, steps))
 
 
-def trials(robot: Robot, *hypotheses: Hypothesis) -> list[Behaviour]:
+def trials(robot: Robot, *hypotheses: Hypothesis) -> list[Trajectory]:
     """One run without noise under each hypothesis."""
     runs = [(hypothesis, moved(robot)) for hypothesis in hypotheses]
-    batch = Simulator(robot, 1).run(runs, STEPS, SIGNALS).behaviour
+    batch = Simulator(robot, 1).run(runs, STEPS, SIGNALS).trajectory
     return [
-        Behaviour(batch.names, batch.time, {signal: batch[signal][row] for signal in SIGNALS})
+        Trajectory(batch.names, batch.time, {signal: batch[signal][row] for signal in SIGNALS})
         for row in range(len(runs))
     ]
 
 
 def cut(
-    run: Behaviour, starts: Sequence[int] = STARTS, signals: tuple[Signal, ...] = STATE
+    run: Trajectory, starts: Sequence[int] = STARTS, signals: tuple[Signal, ...] = STATE
 ) -> Segments:
     states = {signal: run[signal] for signal in signals}
     return cut_segments(run, states, np.array(starts), HORIZON, RECORD)
 
 
-def error(predicted: Behaviour, run: Behaviour, starts: Sequence[int] = STARTS) -> float:
+def error(predicted: Trajectory, run: Trajectory, starts: Sequence[int] = STARTS) -> float:
     """By how much the first of the models is wrong anywhere."""
     worst = 0.0
     for signal in STATE:
@@ -80,10 +80,10 @@ def test_every_single_fault_is_predicted_as_it_was(robot: Robot):
     assert {fault.kind.name for fault in faults} == {"break", "jam", "sensor"}
     for hypothesis, run in zip(hypotheses, trials(robot, *hypotheses), strict=True):
         outcome = simulator.predict([hypothesis], cut(run))
-        assert error(outcome.behaviour, run) < EXACT, str(hypothesis)
+        assert error(outcome.trajectory, run) < EXACT, str(hypothesis)
         assert not outcome.diverged.any()
         if hypothesis != INTACT and "sensor" not in str(hypothesis):
-            assert error(simulator.predict([INTACT], cut(run)).behaviour, run) > 0.01
+            assert error(simulator.predict([INTACT], cut(run)).trajectory, run) > 0.01
 
 
 def test_a_jammed_joint_begins_where_it_is_held(quadruped: Robot):
@@ -92,9 +92,9 @@ def test_a_jammed_joint_begins_where_it_is_held(quadruped: Robot):
     outcome = Simulator(quadruped, 1).predict([jammed], cut(run, [20, 40]))
     knee = quadruped.anatomy.hinges.index("front_left_knee")
 
-    np.testing.assert_allclose(outcome.behaviour["joint_positions"][..., knee], 0.3, atol=EXACT)
-    np.testing.assert_allclose(outcome.behaviour["joint_velocities"][..., knee], 0, atol=1e-4)
-    assert outcome.behaviour.hinge_mask("welded")[0].tolist() == [k == knee for k in range(8)]
+    np.testing.assert_allclose(outcome.trajectory["joint_positions"][..., knee], 0.3, atol=EXACT)
+    np.testing.assert_allclose(outcome.trajectory["joint_velocities"][..., knee], 0, atol=1e-4)
+    assert outcome.trajectory.hinge_mask("welded")[0].tolist() == [k == knee for k in range(8)]
 
 
 @pytest.mark.parametrize("signals", [STATE, ONBOARD], ids=["whole", "onboard"])
@@ -109,7 +109,7 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     shifted = segments.states["joint_positions"] + noise
     noisy = {**segments.states, "joint_positions": shifted, "joint_velocities": shifted}
     shaken = dataclasses.replace(segments, states=noisy)
-    predicted = Simulator(robot, 1).predict([INTACT, broken], shaken).behaviour
+    predicted = Simulator(robot, 1).predict([INTACT, broken], shaken).trajectory
     beyond = [joint, *(other for other in anatomy.joints if other.name in joint.descendants)]
     lost = [anatomy.hinges.index(hinge) for each in beyond for hinge in each.hinges]
     positions = predicted["joint_positions"][..., lost]
@@ -131,7 +131,7 @@ def test_a_lost_limb_rests_wherever_it_starts():
     knee = robot.anatomy.hinges.index("knee")
 
     assert run["joint_positions"][0, knee] < robot.anatomy.joint("knee").limits[0][0]
-    assert error(Simulator(robot, 1).predict([broken], cut(run)).behaviour, run) < EXACT
+    assert error(Simulator(robot, 1).predict([broken], cut(run)).trajectory, run) < EXACT
 
 
 @pytest.mark.parametrize("delay", [1, 5])
@@ -150,7 +150,7 @@ def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(
     def prediction_error(robot: Robot, steps: int | None) -> float:
         built, stats = [build(robot, INTACT)], SimulationStats()
         predicted = predict(robot, built, cut(run), threads=1, stats=stats, delay=steps)
-        return error(predicted.behaviour, run)
+        return error(predicted.trajectory, run)
 
     for signal in SIGNALS:
         assert exact[signal].tobytes() == run[signal].tobytes(), signal
@@ -164,11 +164,11 @@ def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(
 def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot: Robot):
     (run,) = trials(robot, INTACT)
     outcome = Simulator(robot, 1).predict([INTACT, INTACT], cut(run, CHAIN, ONBOARD))
-    base = outcome.behaviour["base_position"]
+    base = outcome.trajectory["base_position"]
 
     assert base[:, 1:, 0].tobytes() == base[:, :-1, -1].tobytes()
     # What was logged is what was predicted, so the whole chain is the trial.
-    assert error(outcome.behaviour, run, CHAIN) < 10 * EXACT
+    assert error(outcome.trajectory, run, CHAIN) < 10 * EXACT
 
 
 @pytest.mark.parametrize("signals", [STATE, ONBOARD], ids=["whole", "onboard"])
@@ -181,7 +181,7 @@ def test_a_prediction_has_the_same_bits_in_any_batch_and_number_of_threads(
     segments = cut(*trials(robot, INTACT), range(0, STEPS - HORIZON, 20), signals)
 
     def bits(chosen: Sequence[Hypothesis], threads: int) -> list[bytes]:
-        predicted = Simulator(robot, threads).predict(chosen, segments).behaviour
+        predicted = Simulator(robot, threads).predict(chosen, segments).trajectory
         return [b"".join(predicted[s][i].tobytes() for s in RECORD) for i in range(len(chosen))]
 
     expected = bits(hypotheses, 1)
@@ -196,16 +196,16 @@ def test_a_prediction_has_the_same_bits_in_any_batch_and_number_of_threads(
 
 def test_a_whole_state_is_predicted_alike_in_any_choice_of_segments(quadruped: Robot):
     (run,), simulator = trials(quadruped, INTACT), Simulator(quadruped, 2)
-    together = simulator.predict([INTACT], cut(run, [0, 30, 60])).behaviour
+    together = simulator.predict([INTACT], cut(run, [0, 30, 60])).trajectory
     for place, start in enumerate([0, 30, 60]):
-        alone = simulator.predict([INTACT], cut(run, [start])).behaviour
+        alone = simulator.predict([INTACT], cut(run, [start])).trajectory
         for signal in RECORD:
             assert alone[signal][0, 0].tobytes() == together[signal][0, place].tobytes()
 
 
 def test_a_prediction_that_diverges_is_flagged_counted_and_alone(quadruped: Robot):
     segments = cut(*trials(quadruped, INTACT), [0, 30, 60])
-    expected = Simulator(quadruped, 1).predict([INTACT], segments).behaviour
+    expected = Simulator(quadruped, 1).predict([INTACT], segments).trajectory
     simulator = Simulator(quadruped, 1)
     bad = exploding(simulator, "jam:front_left_knee=0.1")
     outcome = simulator.predict([bad, INTACT], segments)
@@ -214,7 +214,7 @@ def test_a_prediction_that_diverges_is_flagged_counted_and_alone(quadruped: Robo
     assert (simulator.stats.runs, simulator.stats.diverged) == (2, 1)
     assert simulator.stats.steps == 2 * 3 * HORIZON
     for signal in RECORD:
-        assert outcome.behaviour[signal][1].tobytes() == expected[signal][0].tobytes()
+        assert outcome.trajectory[signal][1].tobytes() == expected[signal][0].tobytes()
 
 
 def unknown(segments: Segments, column: int) -> Segments:
@@ -233,10 +233,10 @@ def test_an_unknown_hinge_continues_from_the_segment_before(quadruped: Robot, te
     predicted = Simulator(quadruped, 1).predict([hypothesis], unknown(cut(run, CHAIN), column))
 
     if hypothesis == INTACT:
-        assert error(predicted.behaviour, run, CHAIN) < EXACT
+        assert error(predicted.trajectory, run, CHAIN) < EXACT
         return
     # The hinge of a lost limb needs no known angle, and moves nothing else.
-    found, logged = (own["joint_positions"] for own in (predicted.behaviour, run))
+    found, logged = (own["joint_positions"] for own in (predicted.trajectory, run))
     assert np.all(found[0, :, 0, column] == 0)
     apart = found[0, :, -1] - logged[np.array(CHAIN) + HORIZON]
     assert np.abs(np.delete(apart, column, axis=1)).max() < EXACT

@@ -152,13 +152,13 @@ def test_perturbed_self_models_share_a_batch(robot: Robot):
     ends = []
     for seed in range(2):
         model = perturbed_model(robot.model, drawn(0.1, seed, robot))
-        simulator._embodiment = lambda hypothesis, model=model: apply_faults(
+        simulator._variant = lambda hypothesis, model=model: apply_faults(
             model, robot.anatomy, hypothesis
         )
         runs = [(parse(text, robot.anatomy), controller) for text in texts]
         outcome = simulator.run(runs, 60, ["base_position"])
         assert not outcome.diverged.any()
-        ends.append(outcome.behaviour["base_position"][:, -1])
+        ends.append(outcome.trajectory["base_position"][:, -1])
 
     assert not np.isclose(ends[0], ends[1], atol=1e-6, rtol=0).all(axis=1).any()
 

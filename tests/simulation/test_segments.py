@@ -17,9 +17,9 @@ from selfmodel.simulation.segments import (
     observed_segments,
 )
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import collect
 from selfmodel.trials.estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.signals import Signal
+from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import lacking, with_value, without_encoders
@@ -33,9 +33,9 @@ SEEN = pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 def trial(physical: SimulatedRobot, steps: int = STEPS) -> Trial:
     """A trial in which every joint moves."""
     driver = played_back(QUADRUPED.anatomy.motors, random_motion(QUADRUPED, steps, 3))
-    behaviour = collect(QUADRUPED.anatomy.names, physical.run(driver, steps))
+    trajectory = collect(QUADRUPED.anatomy.names, physical.run(driver, steps))
     return Trial(
-        TrialPlan("made-up", "before", driver, steps, 0), QUADRUPED.name, behaviour, "a.mcap"
+        TrialPlan("made-up", "before", driver, steps, 0), QUADRUPED.name, trajectory, "a.mcap"
     )
 
 
@@ -46,7 +46,7 @@ WHOLE = trial(SimulatedRobot(QUADRUPED))
 def lost_and_late(whole: Trial) -> Trial:
     """One joint's velocity was not observed at steps 60 to 79, and step 150 came late."""
     lost = with_value(whole, "joint_velocities", slice(60, 80), 0, np.nan)
-    return replace(lost, behaviour=replace(lost.behaviour, late=np.arange(STEPS) == 150))
+    return replace(lost, trajectory=replace(lost.trajectory, late=np.arange(STEPS) == 150))
 
 
 def starts(tried: Trial) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[S
 
 @SEEN
 def test_they_contain_what_was_logged_and_commanded(lost: tuple[Signal, ...]):
-    run, found = WHOLE.behaviour, observed_segments(QUADRUPED, lacking(WHOLE, lost))
+    run, found = WHOLE.trajectory, observed_segments(QUADRUPED, lacking(WHOLE, lost))
     segments = found.segments
 
     assert segments.horizon == HORIZON
@@ -88,11 +88,11 @@ def test_they_contain_what_was_logged_and_commanded(lost: tuple[Signal, ...]):
 def test_their_state_is_the_estimated_one(lost: tuple[Signal, ...]):
     run = lacking(trial(SimulatedRobot(QUADRUPED, gap=GAP)), lost)
     segments = observed_segments(QUADRUPED, run).segments
-    estimated = estimated_states(run.behaviour, tuple(segments.states))
+    estimated = estimated_states(run.trajectory, tuple(segments.states))
 
     for signal, values in segments.states.items():
         np.testing.assert_array_equal(values, estimated[signal][segments.starts])
-    logged = run.behaviour["joint_positions"][segments.starts]
+    logged = run.trajectory["joint_positions"][segments.starts]
     assert np.any(segments.states["joint_positions"] != logged)
 
 
@@ -130,9 +130,9 @@ def test_a_log_that_is_late_every_twentieth_step_serves(phase: int):
     noisy = lacking(WHOLE, BASE)
     late = np.arange(STEPS) % 20 == phase
     late[0] = False
-    run = replace(noisy.behaviour, late=late)
+    run = replace(noisy.trajectory, late=late)
 
-    valid = observed_segments(QUADRUPED, replace(noisy, behaviour=run)).valid
+    valid = observed_segments(QUADRUPED, replace(noisy, trajectory=run)).valid
     assert valid.sum() >= STEPS // 10
 
 
@@ -159,16 +159,16 @@ def test_a_short_trial_has_each_segment_once(steps: int):
 
 
 def test_a_trial_without_a_usable_segment_is_refused_by_what_it_lacks():
-    late = replace(WHOLE.behaviour, late=np.arange(STEPS) > 0)
+    late = replace(WHOLE.trajectory, late=np.arange(STEPS) > 0)
     # All of it is seen at some time, and together after five steps only.
     blinking = lacking(WHOLE, (*BASE, "base_orientation"), slice(6, None))
     numb = lacking(WHOLE, (*BASE, "base_angular_velocity"))
     mute = with_value(numb, "commands", slice(None), 3, np.nan)
     refused = {
         "16 steps or more.* and the trial has 15: leave": trial(SimulatedRobot(QUADRUPED), 15),
-        "without late steps, .* the log has no such segment": replace(WHOLE, behaviour=late),
+        "without late steps, .* the log has no such segment": replace(WHOLE, trajectory=late),
         r"a\.mcap: .* the log has no such segment: leave": blinking,
-        f"never has base_angular_velocity, commands of {WHOLE.behaviour.names.motors[3]}": mute,
+        f"never has base_angular_velocity, commands of {WHOLE.trajectory.names.motors[3]}": mute,
     }
     for message, tried in refused.items():
         with pytest.raises(InputError, match=message):

@@ -16,8 +16,8 @@ from selfmodel.robot.state import SensorNoise
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import batch_bytes, hypothesis_bytes, largest_batch
 from selfmodel.simulation.simulator import Cache, Run, Simulator
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import exploding
 
@@ -42,17 +42,17 @@ def some_runs(robot: Robot, count: int) -> list[Run]:
     ]
 
 
-def bits(behaviour: Behaviour) -> list[bytes]:
+def bits(trajectory: Trajectory) -> list[bytes]:
     """Every signal of every run, as bytes."""
-    runs = range(len(behaviour["sensors"]))
-    return [b"".join(behaviour[s][i].tobytes() for s in behaviour.signals) for i in runs]
+    runs = range(len(trajectory["sensors"]))
+    return [b"".join(trajectory[s][i].tobytes() for s in trajectory.signals) for i in runs]
 
 
 def test_a_run_has_the_same_bits_in_any_batch_order_and_number_of_threads(robot: Robot):
     runs = some_runs(robot, 12)
 
     def run(chosen: list[Run], threads: int) -> list[bytes]:
-        return bits(Simulator(robot, threads).run(chosen, STEPS, SIGNALS).behaviour)
+        return bits(Simulator(robot, threads).run(chosen, STEPS, SIGNALS).trajectory)
 
     expected = run(runs, 1)
     assert len(set(expected)) == len(runs)  # else equality would say nothing
@@ -65,9 +65,9 @@ def test_a_run_has_the_same_bits_in_any_batch_order_and_number_of_threads(robot:
 
 def test_a_run_does_not_depend_on_what_the_simulator_ran_before_and_is_counted(robot: Robot):
     runs, simulator = some_runs(robot, 6), Simulator(robot, 2)
-    first = simulator.run(runs, STEPS, SIGNALS).behaviour
+    first = simulator.run(runs, STEPS, SIGNALS).trajectory
     simulator.run(runs[::-1], 7, ["sensors"])
-    again = simulator.run(runs, STEPS, SIGNALS).behaviour
+    again = simulator.run(runs, STEPS, SIGNALS).trajectory
 
     assert bits(first) == bits(again)
     stats = simulator.stats
@@ -77,7 +77,7 @@ def test_a_run_does_not_depend_on_what_the_simulator_ran_before_and_is_counted(r
 
 def test_the_physical_robot_in_simulation_has_the_same_bits_but_for_what_is_random(robot: Robot):
     runs, steps = some_runs(robot, 9), 150
-    simulated = Simulator(robot, 2).run(runs, steps, SIGNALS).behaviour
+    simulated = Simulator(robot, 2).run(runs, steps, SIGNALS).trajectory
     for i, (hypothesis, controller) in enumerate(runs):
         samples = SimulatedRobot(robot, hypothesis).run(controller, steps)
         observed = collect(robot.anatomy.names, samples)
@@ -92,21 +92,21 @@ def test_the_physical_robot_in_simulation_has_the_same_bits_but_for_what_is_rand
 
 def test_readings_are_what_the_paper_says_and_only_what_is_asked_for_is_recorded(quadruped: Robot):
     record = ("sensors", "joint_positions", "commands")
-    behaviour = Simulator(quadruped, 1).run(some_runs(quadruped, 12), 150, record).behaviour
-    touch, angle = behaviour["sensors"][..., :4], behaviour["sensors"][..., 4:]
+    trajectory = Simulator(quadruped, 1).run(some_runs(quadruped, 12), 150, record).trajectory
+    touch, angle = trajectory["sensors"][..., :4], trajectory["sensors"][..., 4:]
     shoulders = [quadruped.anatomy.hinges.index(s.hinge) for s in quadruped.anatomy.sensors[4:]]
-    intact = behaviour["joint_positions"][0][:, shoulders] / np.deg2rad(30)
+    intact = trajectory["joint_positions"][0][:, shoulders] / np.deg2rad(30)
 
     assert set(np.unique(touch)) == {0.0, 1.0}
     np.testing.assert_allclose(angle[0], intact, rtol=1e-6)
-    assert np.abs(behaviour["commands"]).max() <= np.pi / 4
+    assert np.abs(trajectory["commands"]).max() <= np.pi / 4
     with pytest.raises(KeyError, match="base_position was not recorded; recorded: sensors, joint"):
-        behaviour["base_position"]
+        trajectory["base_position"]
 
 
 def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):
     runs = some_runs(robot, 6)
-    expected = Simulator(robot, 2).run(runs, 150, SIGNALS).behaviour
+    expected = Simulator(robot, 2).run(runs, 150, SIGNALS).trajectory
     simulator = Simulator(robot, 2)
     bad = exploding(simulator, f"jam:{robot.anatomy.joints[0].name}=0.1")
     outcome = simulator.run([*runs[:2], (bad, runs[0][1]), *runs[2:]], 150, SIGNALS)
@@ -114,7 +114,7 @@ def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):
     assert outcome.diverged.tolist() == [False, False, True, False, False, False, False]
     assert simulator.stats.diverged == 1
     for signal in SIGNALS:
-        others = np.delete(outcome.behaviour[signal], 2, axis=0)
+        others = np.delete(outcome.trajectory[signal], 2, axis=0)
         assert np.array_equal(others, expected[signal]), signal
 
 
@@ -122,12 +122,12 @@ def test_members_of_an_ensemble_without_a_gap_do_what_each_kind_of_fault_does(ro
     hypotheses = [INTACT, *(Hypothesis(k.candidates(robot.anatomy)[-1:]) for k in ALL_KINDS)]
     (controller,) = random_controllers(robot, 1)
     simulator = Simulator(robot, 1)
-    alone = simulator.run([(one, controller) for one in hypotheses], STEPS, RECORD).behaviour
+    alone = simulator.run([(one, controller) for one in hypotheses], STEPS, RECORD).trajectory
     found = simulator.run_ensemble(hypotheses, controller, STEPS, Ensemble(RECORD, 2, 0.0))
 
     for signal in RECORD:
         for member in range(2):
-            np.testing.assert_array_equal(found.behaviour[signal][:, member], alone[signal])
+            np.testing.assert_array_equal(found.trajectory[signal][:, member], alone[signal])
 
 
 def test_each_member_differs_and_rough_ground_is_rough_for_each(quadruped: Robot):
@@ -136,7 +136,7 @@ def test_each_member_differs_and_rough_ground_is_rough_for_each(quadruped: Robot
     rough = parse("roughness=0.04", quadruped.anatomy)
     ensemble = Ensemble(("base_position",), 3, 0.05)
     found = Simulator(quadruped, 1).run_ensemble([INTACT, rough], controller, 400, ensemble)
-    level, bumpy = found.behaviour["base_position"][:, :, -1]
+    level, bumpy = found.trajectory["base_position"][:, :, -1]
 
     assert (np.abs(level - bumpy).max(axis=1) > 1e-3).all()
     assert len(np.unique(level, axis=0)) == 3

@@ -87,9 +87,9 @@ def trial(quadruped: Robot, tmp_path_factory: pytest.TempPathFactory) -> Trial:
 
 def changed(trial: Trial, signal: Signal, place: object, value: float) -> Trial:
     """The trial with another value of a signal at some places."""
-    values = trial.behaviour[signal].copy()
+    values = trial.trajectory[signal].copy()
     values[place] = value
-    return dataclasses.replace(trial, behaviour=trial.behaviour.with_signals({signal: values}))
+    return dataclasses.replace(trial, trajectory=trial.trajectory.with_signals({signal: values}))
 
 
 def compared(robot: Robot, trial: Trial, truth: str = TRUTH, tolerance: float = 0.0) -> Replay:
@@ -104,7 +104,7 @@ def test_a_wrong_hypothesis_parts_from_the_trial_at_a_step(quadruped: Robot, tri
     assert step is not None
     assert all(np.all(found.errors[signal][:step] == 0) for signal in SIGNALS)
     assert any(found.errors[signal][step] > 0 for signal in SIGNALS)
-    difference = found.simulated["base_position"] - trial.behaviour["base_position"]
+    difference = found.simulated["base_position"] - trial.trajectory["base_position"]
     assert found.rms("base_position") == pytest.approx(np.sqrt(np.mean(difference**2)))
     assert found.rms("base_position", slice(step)) == 0
 
@@ -112,14 +112,14 @@ def test_a_wrong_hypothesis_parts_from_the_trial_at_a_step(quadruped: Robot, tri
 def test_the_last_bit_of_one_number_is_noticed_and_a_tolerance_forgives_it(
     quadruped: Robot, trial: Trial
 ):
-    number = trial.behaviour["joint_positions"][50, 3]
+    number = trial.trajectory["joint_positions"][50, 3]
     other = changed(trial, "joint_positions", (50, 3), np.nextafter(number, 1))
     strict, lenient = (compared(quadruped, other, tolerance=own) for own in (0.0, 1e-6))
 
     assert (strict.identical, strict.first_divergence_step) == (False, 50)
     assert (lenient.identical, lenient.first_divergence_step) == (False, None)
     # Minus zero is another number to the bit.
-    assert trial.behaviour["base_position"][0, 1] == 0
+    assert trial.trajectory["base_position"][0, 1] == 0
     signed = compared(quadruped, changed(trial, "base_position", (0, 1), -0.0))
     assert (signed.identical, signed.first_divergence_step) == (False, None)
 
@@ -136,12 +136,12 @@ def test_what_was_not_observed_is_not_compared(quadruped: Robot, trial: Trial):
 def test_recorded_commands_move_the_robot_as_its_controller_did(
     quadruped: Robot, trial: Trial, tmp_path: Path
 ):
-    driver = Playback(quadruped.anatomy.motors, trial.behaviour["commands"])
+    driver = Playback(quadruped.anatomy.motors, trial.trajectory["commands"])
     path = logged(tmp_path, quadruped, TRUTH, driver)
-    behaviour = read_log(path).trial.behaviour
+    trajectory = read_log(path).trial.trajectory
 
     for signal in set(SIGNALS) - {"sensors"}:
-        assert behaviour[signal].tobytes() == trial.behaviour[signal].tobytes()
+        assert trajectory[signal].tobytes() == trial.trajectory[signal].tobytes()
     assert replayed(path, TRUTH).identical
 
 

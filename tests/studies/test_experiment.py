@@ -44,7 +44,7 @@ def test_without_a_reference_the_first_controller_follows_itself(quadruped: Robo
     for robot in (arm(), quadruped):
         found = chosen("tracking", robot)
         run = Simulator(robot, 1).run([(INTACT, found.gait)], 30, found.score.record)
-        assert found.score.of(robot, INTACT, run.behaviour)[0] == 0
+        assert found.score.of(robot, INTACT, run.trajectory)[0] == 0
     assert chosen("tracking", arm(), seed=1).gait != chosen("tracking", arm(), seed=2).gait
 
 

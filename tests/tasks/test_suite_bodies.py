@@ -11,8 +11,8 @@ from selfmodel.physical.interface import TimedRobot
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import entry, suite_bodies
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_controllers
 
 STEPS = 60
@@ -32,7 +32,7 @@ def test_the_simulated_return_is_that_of_the_suites_own_environment(domain: str,
     robot, score = own.robot(), own.episode_return
     assert score is not None
     driver = random_controllers(robot, 1)[0]
-    simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, score.record).behaviour
+    simulated = Simulator(robot, 1).run([(INTACT, driver)], STEPS, score.record).trajectory
     # The suite's own model and task, with the model's initial pose instead of a random one.
     env = suite.load(domain, task, task_kwargs={"random": 0})
     targets = env.physics.model.geom_pos.copy()
@@ -69,7 +69,7 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
     assert got.late is not None
     assert not got.late.any()
     batch = {signal: got[signal][np.newaxis] for signal in score.record}
-    worth = score.of(robot, truth, Behaviour(got.names, got.time, batch))
+    worth = score.of(robot, truth, Trajectory(got.names, got.time, batch))
     assert physical.returns == pytest.approx([worth[0]] * 2, rel=1e-9)
 
 

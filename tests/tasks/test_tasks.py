@@ -20,7 +20,7 @@ from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.tasks import ALL_TASKS, ROBOTS
 
 FASTEST = 50.0
@@ -99,8 +99,8 @@ def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypo
 
 def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
     class Lighter(FaultKind):
-        def apply(self, embodiment: Embodiment, _anatomy: Anatomy, fault: Fault) -> None:
-            embodiment.model.body_mass[1] *= fault.severity
+        def apply(self, variant: ModelVariant, _anatomy: Anatomy, fault: Fault) -> None:
+            variant.model.body_mass[1] *= fault.severity
 
     kind = Lighter(name="lighter", bounds=(0.1, 0.9), levels=(0.5,))
     robot = ROBOTS["quadruped"].robot()

@@ -11,7 +11,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.behaviour import forward_displacement
+from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers
 
 OWN_TASKS = [(domain, task) for domain in ROBOTS for task in ROBOTS[domain].suite]
@@ -44,7 +44,7 @@ def test_told_to_stand_it_stands(robot: Robot):
     path = Simulator(robot, 1).run(
         [(parse("intact", robot.anatomy), still)], 1000, ["base_position"]
     )
-    position = path.behaviour["base_position"][0]
+    position = path.trajectory["base_position"][0]
     drift = np.linalg.norm(position[:, :2] - position[0, :2], axis=1)
 
     assert not path.diverged.any()
@@ -76,14 +76,14 @@ def test_an_environment_moves_like_the_simulator_to_the_bit(domain: str, task: s
     step, travelled = environment.reset(), 0.0
     for k in range(200):
         readings = step.observation["sensors"]
-        assert readings.tobytes() == truth.behaviour["sensors"][0, k].tobytes()
+        assert readings.tobytes() == truth.trajectory["sensors"][0, k].tobytes()
         brain.readings[:] = readings
         brain.step(action)
         if k < 199:
             step = environment.step(action[0])
             travelled += step.reward * environment.control_timestep()
 
-    assert travelled == pytest.approx(float(forward_displacement(truth.behaviour)[0]), abs=1e-12)
+    assert travelled == pytest.approx(float(forward_displacement(truth.trajectory)[0]), abs=1e-12)
 
 
 def test_an_unknown_robot_or_task_names_the_nearest():

@@ -13,7 +13,6 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, entry
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.estimation import (
     JOINTS,
     PLAY,
@@ -26,6 +25,7 @@ from selfmodel.trials.estimation import (
     with_joint_velocities,
 )
 from selfmodel.trials.signals import SIGNALS, Names, Signal
+from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.drivers import random_controllers, random_motion
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -35,12 +35,12 @@ REACH = {"joint_positions": 3, "base_position": 6}
 
 def runs(
     robot: Robot, text: str, drivers: Sequence[CommandSource], steps: int = 300
-) -> list[Behaviour]:
+) -> list[Trajectory]:
     hypothesis = parse(text, robot.anatomy)
     pairs = [(hypothesis, driver) for driver in drivers]
-    batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).behaviour
+    batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).trajectory
     return [
-        Behaviour(batch.names, batch.time, {signal: batch[signal][i] for signal in SIGNALS})
+        Trajectory(batch.names, batch.time, {signal: batch[signal][i] for signal in SIGNALS})
         for i in range(len(drivers))
     ]
 
@@ -51,8 +51,8 @@ def smooth(robot: Robot, count: int, steps: int = 300) -> list[CommandSource]:
     return [played_back(motors, random_motion(robot, steps, seed)) for seed in range(count)]
 
 
-def changed(run: Behaviour, **signals: np.ndarray) -> Behaviour:
-    return Behaviour(run.names, run.time, {**run.signals, **signals})
+def changed(run: Trajectory, **signals: np.ndarray) -> Trajectory:
+    return Trajectory(run.names, run.time, {**run.signals, **signals})
 
 
 (RUN,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
@@ -77,7 +77,7 @@ def test_without_noise_a_jerky_or_trembling_run_is_what_was_logged_too():
         assert is_as_logged(run)
 
 
-def is_as_logged(run: Behaviour) -> bool:
+def is_as_logged(run: Trajectory) -> bool:
     states = estimated_states(run)
     return all(states[signal].tobytes() == run[signal].tobytes() for signal in STATE)
 
@@ -173,7 +173,7 @@ def test_noise_is_smoothed_with_any_number_of_physics_steps_in_a_control_step(su
     logged = true + 0.004 * rng.standard_normal(true.shape)
     names = Names((), (), ("a", "b", "c"))
     signals = {"joint_positions": logged, "joint_velocities": velocity[substeps::substeps]}
-    run = Behaviour(names, 0.01 * np.arange(300), signals, substeps=substeps)
+    run = Trajectory(names, 0.01 * np.arange(300), signals, substeps=substeps)
 
     assert np.std(estimated_states(run, JOINTS)["joint_positions"] - true, axis=0).max() < 0.003
 
@@ -182,32 +182,32 @@ TIME = np.arange(200) * 0.005
 NAMES = Names((), ("motor",), ("hinge", "other"))
 
 
-def behaviour(**more: object) -> Behaviour:
+def trajectory(**more: object) -> Trajectory:
     positions = np.stack([1 + 2 * TIME - 3 * TIME**2 + TIME**3, np.cos(6 * TIME)], axis=1)
-    return Behaviour(NAMES, TIME, {"joint_positions": positions}, **more)
+    return Trajectory(NAMES, TIME, {"joint_positions": positions}, **more)
 
 
 def test_the_velocity_of_a_cubic_is_exact():
-    found = with_joint_velocities(behaviour())["joint_velocities"]
+    found = with_joint_velocities(trajectory())["joint_velocities"]
 
     np.testing.assert_allclose(found[:, 0], 2 - 6 * TIME + 3 * TIME**2, atol=1e-9)
     np.testing.assert_allclose(found[:, 1], -6 * np.sin(6 * TIME), atol=0.1)
 
 
 def test_logged_velocities_are_kept():
-    logged = {**behaviour().signals, "joint_velocities": np.full((200, 2), np.nan)}
+    logged = {**trajectory().signals, "joint_velocities": np.full((200, 2), np.nan)}
     logged["joint_velocities"][7, 1] = 3.0
-    known = dataclasses.replace(behaviour(), signals=logged)
+    known = dataclasses.replace(trajectory(), signals=logged)
 
     assert with_joint_velocities(known) is known
     assert not lacks_joint_velocities(known)
-    assert lacks_joint_velocities(behaviour())
+    assert lacks_joint_velocities(trajectory())
 
 
 def test_velocities_near_unknown_positions_and_late_steps_are_unknown():
     late = np.zeros(200, dtype=bool)
     late[150] = True
-    lost = behaviour(late=late)
+    lost = trajectory(late=late)
     lost.signals["joint_positions"][50, 0] = np.nan
     unknown = np.isnan(with_joint_velocities(lost)["joint_velocities"])
 

@@ -13,8 +13,8 @@ from selfmodel import Trial
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import columns_of
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import columns_of
 from selfmodel.trials.trial import (
     MAX_VALUE,
     TrialPart,
@@ -47,9 +47,9 @@ def test_signals_that_were_not_measured_are_nan_and_columns_may_be_in_another_or
     trial = Trial.from_arrays(biped, **given, stage="before", joint_names=order)
     reversed_angles = given["joint_positions"][:, ::-1]
 
-    np.testing.assert_array_equal(trial.behaviour["commands"], given["commands"])
-    np.testing.assert_array_equal(trial.behaviour["joint_positions"], reversed_angles)
-    assert np.isnan(trial.behaviour["base_position"]).all()
+    np.testing.assert_array_equal(trial.trajectory["commands"], given["commands"])
+    np.testing.assert_array_equal(trial.trajectory["joint_positions"], reversed_angles)
+    assert np.isnan(trial.trajectory["base_position"]).all()
     assert np.isnan(trial.displacement)
     assert trial.plan.stage == "before"
     assert isinstance(trial.plan.controller, Playback)
@@ -111,8 +111,8 @@ def test_times_may_begin_anywhere_and_jitter_and_orientations_be_rounded_or_miss
     given[2] = np.nan
     trial = Trial.from_arrays(biped, **arrays(biped), time=time, base_orientation=given)
 
-    np.testing.assert_allclose(trial.behaviour.time, 0.01 * np.arange(6))
-    np.testing.assert_array_equal(trial.behaviour["base_orientation"], given)
+    np.testing.assert_allclose(trial.trajectory.time, 0.01 * np.arange(6))
+    np.testing.assert_array_equal(trial.trajectory["base_orientation"], given)
 
 
 def test_a_trial_is_a_table_of_pandas(biped: Robot):  # noqa: F811
@@ -125,7 +125,7 @@ def test_a_trial_is_a_table_of_pandas(biped: Robot):  # noqa: F811
     table = trial.to_pandas()
 
     assert isinstance(table, pandas.DataFrame)
-    assert list(table) == list(columns_of(trial.behaviour))
+    assert list(table) == list(columns_of(trial.trajectory))
     assert {"time", "position.left_hip_x", "command.left_hip_x", "base_position.y"} <= set(table)
     assert "velocity.left_hip_x" not in table
 
@@ -135,7 +135,7 @@ def test_a_trial_of_the_arrays_of_a_log_is_that_of_the_log(quadruped: Robot, tmp
     damaged = selfmodel.simulated_robot(quadruped, "break:front_left_knee")
     path = tmp_path / "a.mcap"
     logged = selfmodel.run_trial(damaged, walk, path, robot=quadruped, steps=60)
-    trial = Trial.from_arrays(quadruped, **logged.behaviour.signals, controller=walk)
+    trial = Trial.from_arrays(quadruped, **logged.trajectory.signals, controller=walk)
     again = selfmodel.write_log(trial, tmp_path / "b.mcap", quadruped)
 
     assert trial.content == logged.content == selfmodel.read_log(again).trial.content
@@ -143,17 +143,17 @@ def test_a_trial_of_the_arrays_of_a_log_is_that_of_the_log(quadruped: Robot, tmp
 
 def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
     one = Trial.from_arrays(biped, **arrays(biped))
-    signals = dict(one.behaviour.signals)
+    signals = dict(one.trajectory.signals)
     signals["joint_positions"] = signals["joint_positions"] + 5.0
-    moved = dataclasses.replace(one.behaviour, signals=signals)
-    later = dataclasses.replace(one.behaviour, time=one.behaviour.time + 1)
+    moved = dataclasses.replace(one.trajectory, signals=signals)
+    later = dataclasses.replace(one.trajectory, time=one.trajectory.time + 1)
     silent = dataclasses.replace(
         one.plan,
         controller=Playback(biped.anatomy.motors, np.zeros((1, len(biped.anatomy.motors)))),
     )
 
     assert dataclasses.replace(one, path="elsewhere.mcap").content == one.content
-    for other in ({"behaviour": moved}, {"behaviour": later}, {"plan": silent}):
+    for other in ({"trajectory": moved}, {"trajectory": later}, {"plan": silent}):
         assert dataclasses.replace(one, **other).content != one.content
 
 
@@ -177,12 +177,12 @@ def test_a_trial_has_the_name_of_its_file_or_plan_or_where_it_is_ambiguous_its_p
 def test_a_part_has_the_rows_between_its_times_with_both_ends_and_their_late_steps():
     late = np.zeros(200, dtype=bool)
     late[60] = True
-    own = logged(dataclasses.replace(WALK.behaviour, late=late))
+    own = logged(dataclasses.replace(WALK.trajectory, late=late))
     rows = TrialPart(own, 0.5, 1.0).rows
 
-    for signal, values in WALK.behaviour.signals.items():
-        np.testing.assert_array_equal(rows.behaviour[signal], values[50:101])
-    assert np.flatnonzero(rows.behaviour.late).tolist() == [10]
+    for signal, values in WALK.trajectory.signals.items():
+        np.testing.assert_array_equal(rows.trajectory[signal], values[50:101])
+    assert np.flatnonzero(rows.trajectory.late).tolist() == [10]
     assert (rows.plan, rows.path) == (own.plan, own.path)
 
 
@@ -198,7 +198,7 @@ def test_a_part_is_whole_only_without_any_bound():
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 1e308, -1.001 * MAX_VALUE])
 def test_the_first_number_that_no_robot_has_is_named_with_its_column_and_step(value: float):
     wrong = with_value(WALK, "joint_velocities", 3, 2, value)
-    name = WALK.behaviour.names.hinges[2]
+    name = WALK.trajectory.names.hinges[2]
     with pytest.raises(
         InputError, match=re.escape(f"joint_velocities {name} is {value:g} at step 3, ")
     ):
@@ -213,13 +213,13 @@ def test_what_was_not_observed_and_coordinates_of_maps_are_no_absurd_numbers(val
 
 @pytest.mark.parametrize("lost", [[2], [1, 3]])
 def test_a_reference_lacks_what_one_of_the_others_lacks(lost: list[int]):
-    angles = WALK.behaviour["joint_positions"].copy()
+    angles = WALK.trajectory["joint_positions"].copy()
     angles[:, lost] = np.nan
-    signals = {**WALK.behaviour.signals, "joint_positions": angles}
-    damaged = logged(dataclasses.replace(WALK.behaviour, signals=signals))
+    signals = {**WALK.trajectory.signals, "joint_positions": angles}
+    damaged = logged(dataclasses.replace(WALK.trajectory, signals=signals))
     found = observed_as(WALK, [WALK, damaged])
 
-    known = np.isfinite(found.behaviour["joint_positions"]).all(axis=0)
+    known = np.isfinite(found.trajectory["joint_positions"]).all(axis=0)
     assert np.flatnonzero(~known).tolist() == lost
     assert observed_as(damaged, [damaged]) is damaged
     assert observed_as(WALK, []) is WALK

@@ -19,9 +19,9 @@ from selfmodel.robot.contacts import (
     static_geoms,
     touching_geoms,
 )
-from selfmodel.robot.embodiment import turned_by_hinge
 from selfmodel.robot.mjcf.settings import FORWARD_DIRECTIONS, NO_KEYFRAME
 from selfmodel.robot.mjcf.work import UniqueNames, Work, format_numbers
+from selfmodel.robot.model_variant import turned_by_hinge
 from selfmodel.robot.mujoco_errors import loading_a_model
 
 STANDING_KEYFRAMES = ("home", "stand", "standing")

@@ -30,10 +30,10 @@ from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
-from selfmodel.trials.behaviour import Behaviour, collect
 from selfmodel.trials.estimation import BASE, STATE
 from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.hostile import lacking
 from tests.helpers.robots.bodies import BODIES, EVERY_BODY, swinging, swung
@@ -63,7 +63,7 @@ def damages(robot: Robot) -> list[Hypothesis]:
     ]
 
 
-def happened(robot: Robot, hypothesis: Hypothesis) -> Behaviour:
+def happened(robot: Robot, hypothesis: Hypothesis) -> Trajectory:
     return collect(
         robot.anatomy.names, SimulatedRobot(robot, hypothesis).run(swung(robot, STEPS), STEPS)
     )
@@ -79,15 +79,15 @@ def test_the_physical_robot_moves_like_the_simulator_to_the_bit(body: Robot):
     for row, hypothesis in enumerate(hypotheses):
         run = happened(body, hypothesis)
         for signal in SIGNALS:
-            np.testing.assert_array_equal(outcome.behaviour[signal][row], run[signal], signal)
-    paths = outcome.behaviour["base_position"][:, -1]
+            np.testing.assert_array_equal(outcome.trajectory[signal][row], run[signal], signal)
+    paths = outcome.trajectory["base_position"][:, -1]
     assert len(np.unique(paths, axis=0)) == len(hypotheses)
 
 
 def test_it_walks_in_dm_control_s_world_like_in_the_simulator_to_the_bit(body: Robot):
     told = ("base_position", "base_orientation", "base_linear_velocity", "joint_positions")
     runs = [(INTACT, swung(body, 20))]
-    truth = Simulator(body, 1).run(runs, 20, told).behaviour
+    truth = Simulator(body, 1).run(runs, 20, told).trajectory
     environment = walking.environment(body, time_limit=9.0)
     rows = [environment.reset()]
     rows += [environment.step(commands) for commands in swinging(body, 20)[:-1]]
@@ -113,7 +113,7 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
             horizon=HORIZON,
             record=STATE,
         )
-        made = Simulator(body, 1).predict([hypothesis], segments).behaviour
+        made = Simulator(body, 1).predict([hypothesis], segments).trajectory
         for signal in STATE:
             logged = np.stack([run[signal][k : k + HORIZON + 1] for k in starts])
             of_orientation = signal == "base_orientation"
@@ -155,7 +155,7 @@ def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
 
     assert (again.anatomy, again.root) == (body.anatomy, body.root)
     for signal in SIGNALS:
-        np.testing.assert_array_equal(log.trial.behaviour[signal], logged[signal])
+        np.testing.assert_array_equal(log.trial.trajectory[signal], logged[signal])
 
 
 def test_the_frames_of_a_log_are_where_the_bodies_are(body: Robot):

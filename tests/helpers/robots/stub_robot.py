@@ -7,8 +7,8 @@ import numpy as np
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Sample
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Sample
 
 
 class StubRobot:

@@ -66,11 +66,11 @@ def mapping(robot: Robot, steps: int, controller: str | None) -> str:
 
 
 def _driven(robot: Robot, hidden: Hypothesis, controller: Controller, steps: int) -> Iterator[Item]:
-    embodiment = build(robot, hidden)
-    model, data = embodiment.model, mujoco.MjData(embodiment.model)
+    variant = build(robot, hidden)
+    model, data = variant.model, mujoco.MjData(variant.model)
     mujoco.mj_forward(model, data)
-    senses = SensorReader(model, robot.anatomy, [embodiment])
-    brain = make_batch([controller], [embodiment.silent_neurons], len(robot.anatomy.sensors))
+    senses = SensorReader(model, robot.anatomy, [variant])
+    brain = make_batch([controller], [variant.silent_neurons], len(robot.anatomy.sensors))
     where = signal_fields(robot)
     states: list[dict[str, FloatArray]] = []
 

@@ -38,8 +38,8 @@ GENUINE = Path(__file__).parents[4] / "shared" / "samples" / "rosbag2"
 
 
 def signals(path: Path, robot: Robot) -> dict[str, bytes]:
-    behaviour = imported(path, robot).behaviour
-    return {name: values.tobytes() for name, values in behaviour.signals.items()}
+    trajectory = imported(path, robot).trajectory
+    return {name: values.tobytes() for name, values in trajectory.signals.items()}
 
 
 @pytest.fixture
@@ -68,8 +68,8 @@ def test_a_ros_1_bag_is_the_same_trial(form: str, biped: Robot, bag: Path, tmp_p
         imported(bag, biped),
     )
 
-    for signal, values in ros2.behaviour.signals.items():
-        assert ros1.behaviour[signal].tobytes() == values.tobytes(), signal
+    for signal, values in ros2.trajectory.signals.items():
+        assert ros1.trajectory[signal].tobytes() == values.tobytes(), signal
     assert (ros1.qualities, ros1.notes, ros1.origin) == (ros2.qualities, ros2.notes, ros2.origin)
 
 

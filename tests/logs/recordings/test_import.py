@@ -35,47 +35,47 @@ def without(topic: str, items: list[Item]) -> list[Item]:
 
 def test_a_recording_is_told_in_the_model_s_terms(bag: Path, biped: Robot):
     recording = imported(bag, biped)
-    behaviour = recording.behaviour
-    seconds = behaviour.time
-    assert behaviour.steps == 99  # the odometry ends at 0.98 s
+    trajectory = recording.trajectory
+    seconds = trajectory.time
+    assert trajectory.steps == 99  # the odometry ends at 0.98 s
     truth = np.array([[angle(j, t) for j in range(4)] for t in seconds])
     truth[:, 1] = 0.1 - truth[:, 1]
-    assert np.allclose(behaviour["joint_positions"], truth, rtol=0, atol=1e-12)
-    assert np.allclose(behaviour["commands"], truth, rtol=0, atol=1e-12)
+    assert np.allclose(trajectory["joint_positions"], truth, rtol=0, atol=1e-12)
+    assert np.allclose(trajectory["commands"], truth, rtol=0, atol=1e-12)
     moving = np.array([[angle(j, t) for j in range(4)] for t in seconds]) * [1, -1, 1, 1]
-    assert np.allclose(behaviour["joint_velocities"], moving, rtol=0, atol=1e-12)
-    assert np.isnan(behaviour["joint_efforts"]).all()
+    assert np.allclose(trajectory["joint_velocities"], moving, rtol=0, atol=1e-12)
+    assert np.isnan(trajectory["joint_efforts"]).all()
     touch = [float(k % 20 >= 10) for k in range(99)]
-    sensors = behaviour["sensors"]
+    sensors = trajectory["sensors"]
     assert np.array_equal(sensors[:, 0], touch)
     assert np.isnan(sensors[:, 1]).all()  # nobody tells of the right foot
     assert np.allclose(sensors[:, 2], truth[:, 1] / np.deg2rad(30))
     # The base drove along +y of the odometry, heading 1 rad from its +x: seen from the start.
-    assert np.allclose(behaviour["base_position"][0], [0, 0, 0.5])
+    assert np.allclose(trajectory["base_position"][0], [0, 0, 0.5])
     travelled = seconds / 2
-    assert np.allclose(behaviour["base_position"][:, 0], travelled * np.sin(1))
-    assert np.allclose(behaviour["base_position"][:, 1], travelled * np.cos(1))
+    assert np.allclose(trajectory["base_position"][:, 0], travelled * np.sin(1))
+    assert np.allclose(trajectory["base_position"][:, 1], travelled * np.cos(1))
     half = seconds / 10
     turned = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
-    assert np.allclose(behaviour["base_orientation"], turned)
+    assert np.allclose(trajectory["base_orientation"], turned)
     heading = np.stack([np.cos(2 * half), np.sin(2 * half), 0 * half], axis=1)
-    assert np.allclose(behaviour["base_linear_velocity"], 0.5 * heading)
-    assert np.allclose(behaviour["base_angular_velocity"][:, 2], seconds)  # the imu's
+    assert np.allclose(trajectory["base_linear_velocity"], 0.5 * heading)
+    assert np.allclose(trajectory["base_angular_velocity"][:, 2], seconds)  # the imu's
     assert recording.valid["joint_efforts"] == 0
     assert recording.valid["joint_positions"] == 1
 
 
 def test_a_frame_as_recorded_stays(bag: Path, biped: Robot):
     text = MAPPING.replace('"/odom"', '"/odom"\nframe = "recorded"\nunit = "cm"')
-    behaviour = imported(bag, biped, text).behaviour
-    assert np.allclose(behaviour["base_position"][0], [0.02, 0.03, 0.005])
-    assert np.allclose(behaviour["base_orientation"][0], [np.cos(0.5), 0, 0, np.sin(0.5)])
-    assert np.allclose(np.linalg.norm(behaviour["base_linear_velocity"], axis=1), 0.005)
+    trajectory = imported(bag, biped, text).trajectory
+    assert np.allclose(trajectory["base_position"][0], [0.02, 0.03, 0.005])
+    assert np.allclose(trajectory["base_orientation"][0], [np.cos(0.5), 0, 0, np.sin(0.5)])
+    assert np.allclose(np.linalg.norm(trajectory["base_linear_velocity"], axis=1), 0.005)
 
 
 def test_start_and_duration_choose_a_part(bag: Path, biped: Robot):
-    whole = imported(bag, biped).behaviour
-    part = imported(bag, biped, "start = 0.2\nduration = 0.5\n" + MAPPING).behaviour
+    whole = imported(bag, biped).trajectory
+    part = imported(bag, biped, "start = 0.2\nduration = 0.5\n" + MAPPING).trajectory
     assert part.steps == 50
     assert part.time[0] == 0
     assert np.array_equal(part["commands"], whole["commands"][20:70])
@@ -95,11 +95,11 @@ def test_messages_may_be_partial_and_in_any_order(biped: Robot, tmp_path: Path):
             names, values = [JOINTS[j] for j in some], [at[j] for j in some]
             late = stamp + 3_000_000 * (1 + some[0])
             items.append(("/joint_states", late, joint_state(stamp, names, values)))
-    behaviour = imported(write_bag(tmp_path / "bag", items), biped).behaviour
-    truth = np.array([[angle(j, t) for j in range(4)] for t in behaviour.time])
+    trajectory = imported(write_bag(tmp_path / "bag", items), biped).trajectory
+    truth = np.array([[angle(j, t) for j in range(4)] for t in trajectory.time])
     truth[:, 1] = 0.1 - truth[:, 1]
-    assert np.allclose(behaviour["joint_positions"], truth, rtol=0, atol=1e-12)
-    assert np.isnan(behaviour["joint_velocities"]).all()
+    assert np.allclose(trajectory["joint_positions"], truth, rtol=0, atol=1e-12)
+    assert np.isnan(trajectory["joint_velocities"]).all()
 
 
 def test_messages_that_contradict_themselves_are_left_out_and_counted(biped: Robot, tmp_path: Path):
@@ -121,7 +121,7 @@ def test_messages_that_contradict_themselves_are_left_out_and_counted(biped: Rob
     assert "messages left out: 1 with more or fewer numbers than names, 1 with a name twice" in (
         " ".join(recording.notes)
     )
-    assert np.nanmax(np.abs(recording.behaviour["joint_positions"])) < 1
+    assert np.nanmax(np.abs(recording.trajectory["joint_positions"])) < 1
 
 
 @pytest.mark.parametrize("kind", ["JointState", "JointTrajectory"])
@@ -134,8 +134,8 @@ def test_commands_come_in_several_types(kind: str, biped: Robot, tmp_path: Path)
         items.append(("/commands", stamp, told))
     text = MAPPING.replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
     recording = imported(write_bag(tmp_path / "bag", items), biped, text)
-    truth = [[angle(j, t) for j in (0, 2, 3)] for t in recording.behaviour.time]
-    assert np.allclose(recording.behaviour["commands"][:, [0, 2, 3]], truth)
+    truth = [[angle(j, t) for j in (0, 2, 3)] for t in recording.trajectory.time]
+    assert np.allclose(recording.trajectory["commands"][:, [0, 2, 3]], truth)
     assert ("no time stamp" in " ".join(recording.notes)) == (kind == "JointTrajectory")
 
 
@@ -149,9 +149,9 @@ def test_without_odometry_the_imu_has_the_orientation_if_it_knows_it(
     items += [("/imu", int(t), imu(int(t), turned, (0, 0, 1), known=known)) for t in stamps]
     text = MAPPING.replace('[base]\ntopic = "/odom"\n', "")
     recording = imported(write_bag(tmp_path / "bag", items), biped, text)
-    orientation = recording.behaviour["base_orientation"]
+    orientation = recording.trajectory["base_orientation"]
     assert np.allclose(orientation, [1, 0, 0, 0]) if known else np.isnan(orientation).all()
-    assert np.allclose(recording.behaviour["base_angular_velocity"], [0, 0, 1])
+    assert np.allclose(recording.trajectory["base_angular_velocity"], [0, 0, 1])
     assert "where the base was is not known" in " ".join(recording.notes)
 
 
@@ -171,8 +171,8 @@ def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, 
     recording = import_recording(bag, mapping, biped)
     path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
     trial = read_log(path).trial
-    for signal, values in recording.behaviour.signals.items():
-        assert np.array_equal(trial.behaviour[signal], values, equal_nan=True)
+    for signal, values in recording.trajectory.signals.items():
+        assert np.array_equal(trial.trajectory[signal], values, equal_nan=True)
     assert isinstance(trial.plan.controller, Playback)
     assert trial.plan.stage == "before"
     with path.open("rb") as file:
@@ -228,7 +228,7 @@ def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(tmp_pat
         0.01,
     )
     recording = import_recording(bag, parse_mapping(text, "MAP.toml"), robot)
-    behaviour = recording.behaviour
+    trajectory = recording.trajectory
 
     stamps, positions = [], []
     with bag.open("rb") as file:
@@ -236,20 +236,20 @@ def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(tmp_pat
             told = ROS.deserialize_cdr(message.data, schema.name)
             stamps.append(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec)
             positions.append(told.position[[told.name.index(name) for name in SIX]])
-    at = recording.origin + np.arange(behaviour.steps) * 10_000_000
+    at = recording.origin + np.arange(trajectory.steps) * 10_000_000
     before = np.searchsorted(stamps, at, side="right") - 1
     periods = np.diff(stamps)
     unknown = (periods[before] > 1.5 * np.median(periods)) & (np.array(stamps)[before] != at)
     assert unknown.sum() == 5
-    assert np.array_equal(np.isnan(behaviour["joint_positions"]).all(axis=1), unknown)
-    assert np.array_equal(np.isnan(behaviour["joint_positions"]).any(axis=1), unknown)
+    assert np.array_equal(np.isnan(trajectory["joint_positions"]).all(axis=1), unknown)
+    assert np.array_equal(np.isnan(trajectory["joint_positions"]).any(axis=1), unknown)
     seconds = (np.array(stamps) - recording.origin) / 1e9
     for column in range(6):
-        expected = np.interp(behaviour.time, seconds, np.array(positions)[:, column])
-        found = behaviour["joint_positions"][:, column]
+        expected = np.interp(trajectory.time, seconds, np.array(positions)[:, column])
+        found = trajectory["joint_positions"][:, column]
         assert np.allclose(found[~unknown], expected[~unknown], rtol=0, atol=1e-12)
-    assert np.isnan(behaviour["joint_velocities"]).any()
-    assert np.isfinite(behaviour["base_position"]).all()
+    assert np.isnan(trajectory["joint_velocities"]).any()
+    assert np.isfinite(trajectory["base_position"]).all()
     silent = f"/joint_states: silent for {periods.max() / 1e6:.0f} ms"
     assert any(note.startswith(silent) for note in recording.notes)
 
@@ -263,9 +263,9 @@ def test_only_a_hinge_without_limits_goes_round(*, limited: bool, tmp_path: Path
     hinge = 'name="left_hip_x" axis="1 0 0"'
     mjcf = MJCF if limited else MJCF.replace(f'{hinge} range="-30 30"', hinge)
     robot = Robot("biped", mjcf, 0.01)
-    behaviour = imported(write_bag(tmp_path / "bag", items), robot).behaviour
-    angles = behaviour["joint_positions"][:, 0]
-    assert angles.max() < np.pi if limited else np.allclose(angles, behaviour.time * 5)
+    trajectory = imported(write_bag(tmp_path / "bag", items), robot).trajectory
+    angles = trajectory["joint_positions"][:, 0]
+    assert angles.max() < np.pi if limited else np.allclose(angles, trajectory.time * 5)
 
 
 # ---------------------------------------------------------------- lost encoders
@@ -279,13 +279,13 @@ def test_a_hinge_without_an_encoder_is_not_observed_and_the_rest_is_as_ever(
 ):
     whole, found = imported(bag, biped), imported(bag, biped, LOST)
 
-    assert found.behaviour.time.tobytes() == whole.behaviour.time.tobytes()
+    assert found.trajectory.time.tobytes() == whole.trajectory.time.tobytes()
     for signal in ("joint_positions", "joint_velocities", "joint_efforts"):
-        assert np.isnan(found.behaviour[signal][:, 0]).all()
+        assert np.isnan(found.trajectory[signal][:, 0]).all()
         np.testing.assert_array_equal(
-            found.behaviour[signal][:, 1:], whole.behaviour[signal][:, 1:]
+            found.trajectory[signal][:, 1:], whole.trajectory[signal][:, 1:]
         )
-    np.testing.assert_array_equal(found.behaviour["commands"], whole.behaviour["commands"])
+    np.testing.assert_array_equal(found.trajectory["commands"], whole.trajectory["commands"])
     assert "no angle of left_hip_x was observed, as 'none' says" in found.notes
 
 
@@ -305,11 +305,11 @@ def lost_from(second: float, *, named: bool) -> list[Item]:
 def test_an_encoder_that_is_lost_midway_does_not_end_the_trial(
     *, named: bool, bag: Path, biped: Robot, tmp_path: Path
 ):
-    whole = imported(bag, biped).behaviour
+    whole = imported(bag, biped).trajectory
     found = imported(write_bag(tmp_path / "lost", lost_from(0.5, named=named)), biped)
-    angles = found.behaviour["joint_positions"]
+    angles = found.trajectory["joint_positions"]
 
-    assert found.behaviour.steps == whole.steps
+    assert found.trajectory.steps == whole.steps
     np.testing.assert_array_equal(angles[:, 1:], whole["joint_positions"][:, 1:])
     np.testing.assert_array_equal(angles[:50, 0], whole["joint_positions"][:50, 0])
     assert np.isnan(angles[50:, 0]).all()

@@ -22,7 +22,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.behaviour import Behaviour, collect
+from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_controllers
 from tests.logs.recordings.driver import mapping, record
 
@@ -41,7 +41,7 @@ def truth(quadruped: Robot) -> Hypothesis:
 
 
 @pytest.fixture(scope="module")
-def simulated(quadruped: Robot, truth: Hypothesis, gait: Controller) -> Behaviour:
+def simulated(quadruped: Robot, truth: Hypothesis, gait: Controller) -> Trajectory:
     """The trial as it was."""
     samples = SimulatedRobot(quadruped, truth).run(gait, STEPS)
     return collect(quadruped.anatomy.names, samples)
@@ -63,10 +63,10 @@ def selfmodel(*arguments: str | Path) -> Result:
 
 
 def test_what_is_imported_is_what_was_simulated(
-    quadruped: Robot, driven: Path, simulated: Behaviour
+    quadruped: Robot, driven: Path, simulated: Trajectory
 ):
     text = mapping(quadruped, STEPS, None)
-    found = import_recording(driven, parse_mapping(text, "map.toml"), quadruped).behaviour
+    found = import_recording(driven, parse_mapping(text, "map.toml"), quadruped).trajectory
     assert found.steps == STEPS
     for signal, tolerance in (
         ("commands", 0),
@@ -118,7 +118,7 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
         for found in (mapped, right)
     ]
     assert places[0] == places[1]
-    assert import_recording(driven, mapped, quadruped).behaviour.steps > STEPS
+    assert import_recording(driven, mapped, quadruped).trajectory.steps > STEPS
 
 
 def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):

@@ -48,7 +48,7 @@ def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
     assert "control_timestep = 0.01" in text
     assert "# No topic is similar to right_touch" in text
     assert 'left_hip_x = "LHX"\n' in text
-    assert imported(bag, biped, text).behaviour.steps == 99
+    assert imported(bag, biped, text).trajectory.steps == 99
 
 
 def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):

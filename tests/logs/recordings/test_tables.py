@@ -17,8 +17,8 @@ from selfmodel.logs.recordings.recording import TABLE, Series
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.logs.recordings.tables import export, read_table
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.behaviour import Behaviour
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from tests.logs.recordings.table_files import MAPPING, WRITERS, columns, write_csv, write_npz
 
 START = 1_700_000_000_123_456_789
@@ -133,7 +133,7 @@ def test_columns_become_signals_in_the_models_units_and_signs(
 ):
     found = columns()
     recording = imported(WRITERS[form](tmp_path / f"t.{form}", found), biped)
-    signals = recording.behaviour
+    signals = recording.trajectory
 
     assert (signals.steps, recording.clock) == (20, "column")
     np.testing.assert_array_equal(signals["joint_positions"][:, 1], 0.1 - found["q_1"][::2])
@@ -159,7 +159,7 @@ def test_times_may_be_absolute_or_relative_in_any_unit(
     path = write_csv(tmp_path / "t.csv", {**columns(), "time": times})
     recording = imported(path, biped, MAPPING.replace('unit = "s"', f'unit = "{unit}"'))
 
-    assert recording.behaviour.steps == 20
+    assert recording.trajectory.steps == 20
     assert unit != "ns" or recording.origin == START
 
 
@@ -176,8 +176,8 @@ def test_degrees_and_velocities_in_the_world_are_converted(biped: Robot, tmp_pat
     )
     text = text.replace("[commands]\n", '[joints.efforts]\nleft_hip_y = "cmd_1"\n\n[commands]\n')
     path = write_npz(tmp_path / "t.npz", found)
-    signals = imported(path, biped, text).behaviour
-    of_base = imported(path, biped, text.replace('velocity_frame = "world"', "")).behaviour
+    signals = imported(path, biped, text).trajectory
+    of_base = imported(path, biped, text.replace('velocity_frame = "world"', "")).trajectory
 
     assert np.allclose(signals["joint_positions"][:, 0], np.deg2rad(found["q_0"][::2]))
     # The heading at the start, +y, is turned to +x: so is the velocity.
@@ -198,7 +198,7 @@ def test_rows_are_sorted_and_those_without_a_time_or_number_are_left_out(
     twice["time"][27] = np.nan
     twice["q_2"][:4] = np.nan, np.inf, 1e300, np.nan
     recording = imported(write_csv(tmp_path / "t.csv", twice), biped)
-    positions = recording.behaviour["joint_positions"]
+    positions = recording.trajectory["joint_positions"]
 
     np.testing.assert_array_equal(positions[:, 0], found["q_0"][::2])
     assert np.flatnonzero(np.isnan(positions[:, 2])).tolist() == [10, 11]
@@ -235,7 +235,7 @@ def test_an_error_of_the_mapping_is_named(
 # ---------------------------------------------------------------- export
 
 
-def behaviour(robot: Robot, steps: int, share: float) -> Behaviour:
+def trajectory(robot: Robot, steps: int, share: float) -> Trajectory:
     """Random signals, of which a share of the base, the velocities and the readings is missing."""
     rng = np.random.default_rng(steps)
     names = robot.anatomy.names
@@ -248,24 +248,24 @@ def behaviour(robot: Robot, steps: int, share: float) -> Behaviour:
         found[signal][missing] = np.nan
     found["joint_efforts"][:, 1] = np.nan
     time = np.arange(steps) * robot.control_timestep
-    return Behaviour(names, frozen(time), {s: frozen(found[s]) for s in SIGNALS})
+    return Trajectory(names, frozen(time), {s: frozen(found[s]) for s in SIGNALS})
 
 
 @pytest.mark.parametrize("lost", ["no encoder", "never", "midway"])
 @pytest.mark.parametrize("form", WRITERS)
 def test_an_export_is_imported_to_the_bit(form: str, lost: str, biped: Robot, tmp_path: Path):
-    original = behaviour(biped, {"never": 30, "midway": 40, "no encoder": 5}[lost], 0.2)
+    original = trajectory(biped, {"never": 30, "midway": 40, "no encoder": 5}[lost], 0.2)
     if lost != "no encoder":
         for signal in ("joint_positions", "joint_velocities"):
             values = original[signal].copy()
             values[{"never": 0, "midway": 12}[lost] :, 2] = np.nan
-            original = Behaviour(
+            original = Trajectory(
                 original.names, original.time, {**original.signals, signal: values}
             )
     path = tmp_path / f"t.{form}"
     names = export(path, original)
     text = suggest(path, biped, "biped.xml", with_timestep=True)
-    again = imported(path, biped, text).behaviour
+    again = imported(path, biped, text).trajectory
 
     assert names == table(path).names
     assert "effort.left_hip_y" not in names  # never observed

@@ -49,7 +49,7 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
     assert found.prediction <= ROUNDING
     assert found.displacement == 0.0
     assert not outcome.diverged.any()
-    assert np.isfinite(outcome.behaviour["base_position"]).all()
+    assert np.isfinite(outcome.trajectory["base_position"]).all()
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
@@ -81,7 +81,7 @@ def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path
         SimulatedRobot(robot).run(driver, 20),
         TrialHeader(Settings()),
     )
-    read = read_log(path).trial.behaviour
+    read = read_log(path).trial.trajectory
 
     assert read["sensors"].shape == (20, 0)
     assert read["joint_positions"].shape == (20, robot.model.nu)
@@ -142,7 +142,7 @@ def path_of(robot: Robot, stride: float) -> np.ndarray:
     runs = [(INTACT, trot(robot, 300, stride))]
     simulated = Simulator(robot, 1).run(runs, 300, ("base_position",))
     assert not simulated.diverged.any()
-    return np.asarray(simulated.behaviour["base_position"][0])
+    return np.asarray(simulated.trajectory["base_position"][0])
 
 
 @pytest.mark.parametrize("stride", [0.0, 0.12], ids=["stands", "walks"])

@@ -118,7 +118,7 @@ def motion(robot: Robot, steps: int = 100) -> np.ndarray:
     """Returns the base's path under a random controller, ``(steps, 3)``, m."""
     (controller,) = random_controllers(robot, 1, seed=2)
     found = Simulator(robot, 1).run([(INTACT, controller)], steps, SIGNALS)
-    return found.behaviour["base_position"][0]
+    return found.trajectory["base_position"][0]
 
 
 @pytest.mark.parametrize("flat", [(1, 1, 0), (1, 0, 0)])

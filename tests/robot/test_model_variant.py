@@ -7,7 +7,7 @@ import pytest
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.robot.embodiment import Embodiment
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 
 MJCF = """
@@ -215,9 +215,9 @@ def force(model: mujoco.MjModel, hip: float, knee: float, command: float = 0.1) 
 
 
 def shifted(model: mujoco.MjModel, hinge: str) -> mujoco.MjModel:
-    embodiment = Embodiment.of(model, Anatomy((), (), (), (), ""))
-    embodiment.shift_feedback(hinge, OFFSET)
-    return embodiment.model
+    variant = ModelVariant.of(model, Anatomy((), (), (), (), ""))
+    variant.shift_feedback(hinge, OFFSET)
+    return variant.model
 
 
 @pytest.mark.parametrize("hinge", ["hip", "knee"])

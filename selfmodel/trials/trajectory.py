@@ -1,4 +1,4 @@
-"""Behaviour: the recorded signals of one run or a batch of runs (in the field: a trajectory)."""
+"""Trajectory: the recorded signals of one run, or of a batch of runs."""
 
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -54,7 +54,7 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Behaviour:
+class Trajectory:
     """The signals of one run or of a batch of runs.
 
     Row k is the state in which command k was computed, so the last command has no consequence in
@@ -62,8 +62,8 @@ class Behaviour:
 
     Example:
         >>> import selfmodel
-        >>> behaviour = selfmodel.read_log("before.mcap").trial.behaviour
-        >>> behaviour["base_position"].shape
+        >>> trajectory = selfmodel.read_log("before.mcap").trial.trajectory
+        >>> trajectory["base_position"].shape
         (60, 3)
 
     Attributes:
@@ -75,7 +75,7 @@ class Behaviour:
         substeps: Physics steps of the robot's model per control step, by which positions are
             integrated; the default is that of the paper's robots.
         welded: Mask of the hinges that the hypothesis of each run welds, ``(runs, hinges)``; None
-            for none, and for behaviour that is no prediction of segments.
+            for none, and for a trajectory that is no prediction of segments.
         detached: Mask of the hinges of detached limbs, likewise.
 
     Raises:
@@ -145,7 +145,7 @@ class Behaviour:
         late = "" if self.late is None else f"\n  late steps: {int(self.late.sum())}"
         end = float(self.time[-1]) if self.steps else 0.0
         return (
-            f"<Behaviour: {batch}{self.steps} steps to {end:g} s"
+            f"<Trajectory: {batch}{self.steps} steps to {end:g} s"
             f"\n  signals (width): {widths or 'none'}{late}>"
         )
 
@@ -154,16 +154,16 @@ class Behaviour:
         """Number of recorded control steps."""
         return len(self.time)
 
-    def with_signals(self, signals: Mapping[Signal, FloatArray]) -> "Behaviour":
-        """Returns the behaviour with other, or further, signals."""
+    def with_signals(self, signals: Mapping[Signal, FloatArray]) -> "Trajectory":
+        """Returns the trajectory with other, or further, signals."""
         return dataclasses.replace(self, signals={**self.signals, **signals})
 
-    def first(self, steps: int) -> "Behaviour":
-        """Returns the behaviour of the first ``steps`` steps, at most all."""
+    def first(self, steps: int) -> "Trajectory":
+        """Returns the trajectory of the first ``steps`` steps, at most all."""
         return self.rows(slice(steps))
 
-    def rows(self, chosen: slice | BoolArray) -> "Behaviour":
-        """Returns the behaviour of some steps, given by a slice or a mask, ``(steps,)``."""
+    def rows(self, chosen: slice | BoolArray) -> "Trajectory":
+        """Returns the trajectory of some steps, given by a slice or a mask, ``(steps,)``."""
         return dataclasses.replace(
             self,
             time=self.time[chosen],
@@ -172,22 +172,22 @@ class Behaviour:
         )
 
 
-def samples_of(behaviour: Behaviour) -> Iterator[Sample]:
-    """Yields the samples of the behaviour of one run, without its step timing."""
-    for k, time in enumerate(behaviour.time.tolist()):
-        yield Sample(time, {signal: values[k] for signal, values in behaviour.signals.items()})
+def samples_of(trajectory: Trajectory) -> Iterator[Sample]:
+    """Yields the samples of the trajectory of one run, without its step timing."""
+    for k, time in enumerate(trajectory.time.tolist()):
+        yield Sample(time, {signal: values[k] for signal, values in trajectory.signals.items()})
 
 
-def collect(names: Names, samples: Iterable[Sample]) -> Behaviour:
-    """Returns the behaviour of a sequence of samples.
+def collect(names: Names, samples: Iterable[Sample]) -> Trajectory:
+    """Returns the trajectory of a sequence of samples.
 
     Raises:
         ValueError: There are no samples, or a row is inconsistent with ``names``.
     """
     rows = list(samples)
     if not rows:
-        raise ValueError("a behaviour needs at least one sample, got none")
-    return Behaviour(
+        raise ValueError("a trajectory needs at least one sample, got none")
+    return Trajectory(
         names=names,
         time=frozen(np.array([row.time for row in rows])),
         signals={
@@ -204,7 +204,7 @@ def late_steps(moments: Sequence[StepTiming | None]) -> BoolArray | None:
     return np.array([moment.late for moment in known]) if known else None
 
 
-def forward_displacement(behaviour: Behaviour) -> FloatArray:
+def forward_displacement(trajectory: Trajectory) -> FloatArray:
     """Returns the forward displacement d(T) - d(1) of the root body along the world's x axis.
 
     Source: the paper, section III (fitness of the repair EA).
@@ -212,7 +212,7 @@ def forward_displacement(behaviour: Behaviour) -> FloatArray:
     Returns:
         Displacement of each run, m, ``(...)``; ``()`` for a single run.
     """
-    x = behaviour["base_position"][..., 0]
+    x = trajectory["base_position"][..., 0]
     with np.errstate(invalid="ignore"):  # a log may contain infinity: the displacement is NaN
         return np.asarray(x[..., -1] - x[..., 0])
 
@@ -233,13 +233,13 @@ class Described(Protocol):
         """Parts of the robot, whose ``names`` are those of the columns."""
 
 
-def behaviour_of_arrays(
+def trajectory_of_arrays(
     robot: Described,
     arrays: Mapping[Signal, ArrayLike | None],
     time: ArrayLike | None,
     orders: Mapping[Signal, Sequence[str] | None],
-) -> Behaviour:
-    """Returns the behaviour of measured arrays; missing signals are NaN.
+) -> Trajectory:
+    """Returns the trajectory of measured arrays; missing signals are NaN.
 
     Without times, ``(steps,)`` s, the rows are at every control step. The orders are the names of
     the columns of an array, where they are not in the robot's order.
@@ -275,7 +275,7 @@ def behaviour_of_arrays(
     scheduled = np.arange(steps, dtype=np.float64) * robot.control_timestep
     if time is not None:
         _check_time(_numbers("time", time), scheduled, robot.control_timestep)
-    return Behaviour(names, frozen(scheduled), found)
+    return Trajectory(names, frozen(scheduled), found)
 
 
 def _numbers(signal: str, values: ArrayLike) -> FloatArray:
@@ -354,14 +354,14 @@ def column_names(names: Names, signal: Signal) -> tuple[str, ...]:
     return tuple(f"{PREFIXES[signal]}.{name}" for name in names.columns(signal))
 
 
-def columns_of(behaviour: Behaviour) -> dict[str, FloatArray]:
-    """Returns the columns of a behaviour by name, time first.
+def columns_of(trajectory: Trajectory) -> dict[str, FloatArray]:
+    """Returns the columns of a trajectory by name, time first.
 
     A joint, motor or sensor without any number has no column, and so the base's vectors.
     """
-    found: dict[str, FloatArray] = {TIME: behaviour.time}
-    for signal in (name for name in PREFIXES if name in behaviour.signals):
-        values, names = behaviour[signal], column_names(behaviour.names, signal)
+    found: dict[str, FloatArray] = {TIME: trajectory.time}
+    for signal in (name for name in PREFIXES if name in trajectory.signals):
+        values, names = trajectory[signal], column_names(trajectory.names, signal)
         known = np.asarray(~np.isnan(values).all(axis=0))
         if signal.startswith("base_"):
             known[:] = known.any()

@@ -46,7 +46,7 @@ _SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 
 
 @dataclass(frozen=True, eq=False)
-class Embodiment:
+class ModelVariant:
     """Copy of a robot's model and sensor parameters, edited by fault kinds.
 
     A run starts in the model's reference configuration, ``model.qpos0``.
@@ -81,8 +81,8 @@ class Embodiment:
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, anatomy: Anatomy, seed: int = 0) -> "Embodiment":
-        """Returns the embodiment of a nominal model: a copy, with unmodified readings.
+    def of(cls, model: mujoco.MjModel, anatomy: Anatomy, seed: int = 0) -> "ModelVariant":
+        """Returns the variant of a nominal model: a copy, with unmodified readings.
 
         Args:
             model: A compiled model of the robot.
