@@ -70,9 +70,55 @@ def parse_mapping(text: str, name: str) -> RecordingMapping:
         mapping = RecordingMapping(name, text, msgspec.convert(tables, Trial))
     except msgspec.ValidationError as failure:
         raise _error(name, text, *_explained(str(failure), tables)) from failure
+    _check_keys(mapping, tables)
     _check_names(mapping, "joints", mapping.trial.joints)
     _check_names(mapping, "commands", mapping.trial.commands)
     return mapping
+
+
+_BAG_KEYS: Mapping[str, Keys] = {
+    "": ("clock",),
+    "joints": ("topic",),
+    "commands": ("topic", "order"),
+    "base": ("topic",),
+    "imu": ("topic",),
+    "touch": ("topic", "index"),
+}
+"""Keys of each table of the mapping of a bag, which that of a table does not have."""
+
+_TABLE_KEYS: Mapping[str, Keys] = {
+    "": ("sensors",),
+    "joints": ("velocities", "efforts"),
+    "base": (
+        *("position", "orientation", "linear_velocity", "angular_velocity"),
+        "velocity_frame",
+    ),
+    "imu": ("orientation", "angular_velocity"),
+    "touch": ("column",),
+}
+"""Keys of each table of the mapping of a table, which that of a bag does not have."""
+
+
+def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
+    """Checks that the keys are those of a table, whose mapping has ``[time]``, or of a bag."""
+    trial, is_table = mapping.trial, mapping.trial.time is not None
+    use = "a bag: remove it" if is_table else "a table: remove it, or add [time]"
+    for role, keys in (_BAG_KEYS if is_table else _TABLE_KEYS).items():
+        sections: dict[Keys, Any] = {(role,): tables.get(role, {})} if role else {(): tables}
+        if role == "touch":
+            sections = {("touch", name): section for name, section in sections["touch",].items()}
+        for path, section in sections.items():
+            for key in keys:
+                if key in section:
+                    raise mapping.error((*path, key), f"{key} is a key of the mapping of {use}")
+    base = trial.base
+    if is_table and base is not None and base.position is None and base.orientation is None:
+        raise mapping.error(
+            ("base",), "[base] needs position or orientation, and has neither: add one"
+        )
+    for name, touch in trial.touch.items() if is_table else ():
+        if not touch.column:
+            raise mapping.error(("touch", name), f"[touch.{name}] needs column: add it")
 
 
 def _check_names(mapping: RecordingMapping, role: str, angles: Angles) -> None:

@@ -76,7 +76,7 @@ def read_in_child(request: Message) -> Message:
     form = FORMATS[path.suffix.lower()]
     check_regular(path, "a table")
     try:
-        names, found = form.read(path, frozenset(request.header["wanted"]) | {time}, time)
+        names, found = form.read(path, frozenset(request.header["wanted"]) | {time} - {""}, time)
         digest = file_digest(path)
     except InputError:
         raise
@@ -90,9 +90,9 @@ def read_in_child(request: Message) -> Message:
             raise InputError(f"{path}: {count} columns are called {name!r}: rename all but one")
     columns = {name: _numbers(values) for name, values in found.items()}
     rows, times = np.arange(max(map(len, columns.values()), default=0)), np.zeros(0, dtype=np.int64)
-    if time in found:
+    if time and time in found:
         rows, times = _times(path, time, _exact(found[time]), request.header["unit"])
-    count = len(found[time]) if time in found else len(rows)
+    count = len(found[time]) if time and time in found else len(rows)
     for name, column in columns.items():
         if len(column) != count:
             raise InputError(

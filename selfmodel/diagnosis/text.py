@@ -118,7 +118,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
 def _missing(diagnosis: Diagnosis) -> str:
     """Returns what is known of the fault that is missing in an unexplained diagnosis."""
     best, unsearched, fit = diagnosis.best, diagnosis.unsearched, diagnosis.fit
-    if fit is None:
+    if diagnosis.reason:
         return f"{diagnosis.reason}."
     if unsearched is not None:
         also = f" ({', '.join(map(str, unsearched.others))} would do so too)"
@@ -126,9 +126,11 @@ def _missing(diagnosis: Diagnosis) -> str:
             f"{unsearched.hypothesis} predicts the trials significantly better than "
             f"{best}{also if unsearched.others else ''}; add {unsearched.kind} to --kinds."
         )
-    listed = ", ".join(f"{name} ({_excess(excess)})" for name, excess in fit.joints.items())
+    listed = ", ".join(
+        f"{name} ({_excess(excess)})" for name, excess in (fit.joints if fit else {}).items()
+    )
     joints = f" Joints that the healthy trials predict better: {listed}." if listed else ""
-    if joints and not is_too_high(fit):
+    if joints and fit and not is_too_high(fit):
         return (
             f"{best} predicts the trials as a whole, and not all joints.{joints} There is a fault "
             f"of a kind that was not searched (--kinds), or a combination of faults."
@@ -136,7 +138,7 @@ def _missing(diagnosis: Diagnosis) -> str:
     return (
         f"even {best} predicts the trials significantly worse than the self-model predicts the "
         f"healthy robot; there is another fault, or one of a kind that was not searched "
-        f"(--kinds).{_residual(diagnosis, fit)}{joints}"
+        f"(--kinds).{_residual(diagnosis, fit) if fit else ''}{joints}"
     )
 
 

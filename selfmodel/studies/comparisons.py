@@ -133,7 +133,10 @@ def balance_warnings(outcomes: pd.DataFrame) -> tuple[str, ...]:
     for table, _, runs in _tables(outcomes):
         counts = runs.notna().groupby(level="cell").sum()
         if runs.isna().any(axis=None) or (counts != counts.iloc[0]).any(axis=None):
-            numbers = ", ".join(f"{method} {number}" for method, number in counts.sum().items())
+            totals = counts.sum()
+            numbers = ", ".join(f"{method} {number}" for method, number in totals.items())
+            if (totals == totals.iloc[0]).all():
+                numbers += ", not the same ones"
             tables.setdefault(numbers, []).append(", ".join(table))
     return tuple(
         f"{'; '.join(names)}: the cells are unbalanced (runs: {numbers}): compare paired "

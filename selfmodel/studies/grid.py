@@ -131,6 +131,8 @@ def _unfinished(folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]) 
     made = [made_with(function) for function in {cell.function for cell in every.values()}]
     known: dict[str, FinishedCell] = {}
     for path in sorted(folder.glob(f"*/*/{CELL}")):
+        if path.parts[-3] == UNFINISHED:  # what a killed worker left
+            continue
         cell = read_cell(path)
         if made and cell.made_with not in made:
             raise InputError(

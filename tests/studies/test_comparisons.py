@@ -153,6 +153,6 @@ def test_unbalanced_tables_are_named_with_their_numbers_of_runs():
     both = joined(outcomes("a", "11110000"), outcomes("b", "01010101"))
     assert balance_warnings(both) == ()
     (warning,) = balance_warnings(both[(both["cell"] != ("case 1",)) | (both["seed"] < 2)])
-    assert "(runs: a 6, b 6)" in warning
+    assert "(runs: a 6, b 6, not the same ones)" in warning
     apart = outcomes("b", "1111").assign(seed=lambda rows: rows["seed"] + 4)
     assert len(balance_warnings(joined(outcomes("a", "1111"), apart))) == 1

@@ -169,6 +169,16 @@ def test_a_cell_whose_result_was_deleted_is_computed_again(study: Study, left: s
     assert study.names() == named(2)
 
 
+def test_what_a_killed_worker_left_is_no_cell(study: Study):
+    wanted = cells(study.notes, 2)
+    study.run(wanted[:1])
+    place = study.folder / wanted[0].place
+    shutil.copytree(place, study.folder / "unfinished" / f"{place.name}.0123456789abcdef")
+
+    assert study.run(wanted) == ()
+    assert study.names() == named(2)
+
+
 def test_other_inputs_and_other_code_are_other_cells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

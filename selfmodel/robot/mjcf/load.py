@@ -33,7 +33,12 @@ from selfmodel.robot.mjcf.pose import (
     free_base,
     turn_forward,
 )
-from selfmodel.robot.mjcf.settings import MAX_CONTROL_TIMESTEP, MjcfSettings, read_settings
+from selfmodel.robot.mjcf.settings import (
+    MAX_CONTROL_TIMESTEP,
+    MjcfSettings,
+    checked_settings,
+    read_settings,
+)
 from selfmodel.robot.mjcf.structure import (
     drop_large_reservations,
     expand,
@@ -92,7 +97,9 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
         InputError: The file cannot be a robot; the message has the reason and the remedy.
     """
     file = Path(path)
-    adapted = adapt(file, read_settings(file) if settings is None else settings)
+    # Settings made in Python have not been validated.
+    checked = read_settings(file) if settings is None else checked_settings(asdict(settings))
+    adapted = adapt(file, checked)
     return robot_from(adapted, str(file))
 
 

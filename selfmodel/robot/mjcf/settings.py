@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
 from selfmodel.errors import InputError, unknown_name
@@ -207,8 +208,9 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
         one = key in _BY_JOINT and not isinstance(value, Mapping)
         try:
             if value is not None:
-                values[key] = msgspec.convert({"*": value} if one else value, types[key])
-        except (msgspec.ValidationError, OverflowError) as error:
+                plain = msgspec.to_builtins({"*": value} if one else value, enc_hook=_builtin)
+                values[key] = msgspec.convert(plain, types[key])
+        except (msgspec.ValidationError, OverflowError, NotImplementedError) as error:
             raise _invalid(key, value) from error
     low, high = values.get("ctrlrange", (0, 1))
     if not low < high:
@@ -218,6 +220,13 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     for key in {"touch", "angle"}.intersection(values):
         values[key] = tuple(dict.fromkeys(values[key]))
     return MjcfSettings(**values)
+
+
+def _builtin(value: object) -> object:
+    """Number of numpy as Python's; msgspec knows the other types."""
+    if not isinstance(value, np.generic):
+        raise NotImplementedError
+    return value.item()
 
 
 def _invalid(key: str, value: object) -> InputError:

@@ -53,6 +53,7 @@ def line_of(text: str, mapping: str = MAPPING) -> int:
         ('"LHY", "LHX"]', '"LHY", "RHX"]', "RHX is listed twice in order"),
         ('"LHY", "LHX"]', '"LHY", "LHX", "X"]', "must name the 4 numbers .* got 5 names"),
         ('topic = "/odom"', "topic = /odom", "expected TOML"),
+        ("threshold = 5.0", 'column = "c"', "column is a key of the mapping of a table"),
     ],
 )
 def test_a_mistake_has_its_line(right: str, wrong: str, named: str, biped: Robot, bag: Path):
