@@ -46,6 +46,12 @@ def test_the_alternatives_are_named_with_the_test():
     )
 
 
+def test_an_unexplained_diagnosis_of_0_1_says_so_without_the_numbers_that_it_lacks():
+    sentence = verdict_sentences(diagnosis(verdict="unexplained"))
+
+    assert sentence.startswith("Unexplained: even jam:front_left_knee predicts the trials")
+
+
 def test_the_change_and_the_undetectable_faults_follow_the_verdict():
     more = parse("jam:front_left_knee+jam:back_left_knee", ANATOMY)
     alone = verdict_sentences(diagnosis(change=CHANGE))
