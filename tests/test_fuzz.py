@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.isolation import Message
@@ -122,6 +122,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(
 
     @settings(max_examples=EXAMPLES, deadline=None)
     @given(st.integers(0, 2**63))
+    @example(2860)  # in mcap-chunks, a chunk of 24 TB
     def is_read_or_refused(seed: int) -> None:
         path.write_bytes(spoilt(target.data, random.Random(seed)))  # noqa: S311 - no secret
         sentence = ""

@@ -5,6 +5,8 @@ a ROS 1 bag. Checksums and counts of messages are verified where a file has some
 reads the files, whose content may be hostile.
 """
 
+import io
+import os
 import re
 import shlex
 import sqlite3
@@ -149,12 +151,20 @@ def _stored(file: Path) -> Iterator[_Stored]:
     raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
 
 
+class _WholeReader(io.BufferedReader):
+    """File that is read whole, where a damaged length is more than any memory."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Reads that many bytes, or the rest."""
+        return super().read(-1 if size is None or size > os.fstat(self.fileno()).st_size else size)
+
+
 def _mcap(file: Path) -> Iterator[_Stored]:
     types, topics = {0: ""}, {}
     count, claimed = 0, None
-    with file.open("rb") as opened:
+    size = file.stat().st_size
+    with _WholeReader(io.FileIO(file)) as opened:
         # No record is larger than its file; a damaged length would take the memory.
-        size = file.stat().st_size
         for record in StreamReader(opened, validate_crcs=True, record_size_limit=size).records:
             match record:
                 case Schema():
