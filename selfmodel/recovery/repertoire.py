@@ -18,7 +18,10 @@ from selfmodel.arrays import FloatArray, IndexArray, frozen
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import forward_displacement
 from selfmodel.version import __version__
@@ -26,9 +29,6 @@ from selfmodel.version import __version__
 if TYPE_CHECKING:
     from ribs.archives import GridArchive
     from ribs.emitters import IsoLineEmitter
-
-    from selfmodel.robot.robot import Robot
-    from selfmodel.simulation.simulator import Simulator
 
 BATCH = 200
 """Gaits in a batch: more take memory and no less time."""
@@ -139,7 +139,7 @@ class Filling:
 
 
 def make_repertoire(
-    robot: "Robot",
+    robot: Robot,
     design: Design,
     evaluate: Evaluate,
     *,
@@ -260,7 +260,7 @@ def duty_factors(anatomy: Anatomy, readings: FloatArray) -> FloatArray:
     return np.asarray(readings[..., touch].mean(axis=-2))
 
 
-def simulated_evaluation(simulator: "Simulator", hypothesis: Hypothesis, steps: int) -> Evaluate:
+def simulated_evaluation(simulator: Simulator, hypothesis: Hypothesis, steps: int) -> Evaluate:
     """Returns the evaluation of gaits by their forward displacement in simulation, m.
 
     The score is negative infinity for a gait that falls, diverges, or does not move forward.
@@ -273,10 +273,8 @@ def simulated_evaluation(simulator: "Simulator", hypothesis: Hypothesis, steps: 
 
 
 def _evaluate(
-    simulator: "Simulator", hypothesis: Hypothesis, steps: int, controllers: Sequence[Controller]
+    simulator: Simulator, hypothesis: Hypothesis, steps: int, controllers: Sequence[Controller]
 ) -> tuple[FloatArray, FloatArray]:
-    from selfmodel.recovery.scores import falls_of  # noqa: PLC0415  # files are read without MuJoCo
-
     robot, scores, duty = simulator.robot, [], []
     for start in range(0, len(controllers), BATCH):
         runs = [(hypothesis, one) for one in controllers[start : start + BATCH]]
@@ -305,12 +303,12 @@ def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, 
     return tuple(gaits[i] for i in best_first if scores[i] > -np.inf)
 
 
-def model_digest(robot: "Robot") -> str:
+def model_digest(robot: Robot) -> str:
     """Returns the SHA-256 of all that defines a robot: MJCF, control time step, assets."""
     return _digest(robot.mjcf, robot)
 
 
-def self_model_digest(robot: "Robot") -> str:
+def self_model_digest(robot: Robot) -> str:
     """Returns the SHA-256 of a robot that is the same for the model in its logs.
 
     The MJCF of a log is serialised anew when it is read: this is the digest of its canonical form,
@@ -319,7 +317,7 @@ def self_model_digest(robot: "Robot") -> str:
     return _digest(ET.canonicalize(robot.mjcf, strip_text=True), robot)
 
 
-def _digest(mjcf: str, robot: "Robot") -> str:
+def _digest(mjcf: str, robot: Robot) -> str:
     digest = hashlib.sha256()
     parts = [mjcf.encode(), repr(robot.control_timestep).encode()]
     for name, content in sorted(robot.assets.items()):
