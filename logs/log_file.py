@@ -1,14 +1,16 @@
 """MCAP file of a log: a writer that survives a kill, and a strict reader.
 
 The reader makes one pass with mcap's ``StreamReader`` and its checksums of chunks and of the data,
-and adds what that leaves out: the checksums of the summary and of attachments, and the digests of
-selfmodel's records. All 2,000 of 2,000 random bit flips and cuts are noticed.
+and adds what that leaves out: the checksums of the summary and of attachments, the counts of the
+statistics, and the digests of selfmodel's records. All 2,000 of 2,000 random bit flips and cuts are
+noticed.
 """
 
 import contextlib
 import io
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -28,6 +30,7 @@ from mcap.records import (
     Message,
     Metadata,
     Schema,
+    Statistics,
 )
 from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 from mcap.writer import CompressionType, Writer
@@ -267,30 +270,48 @@ def verified_records(data: bytes) -> Iterator[McapRecord]:
 
     The file is intact if the iteration ends without an exception.
     """
-    stream, ended = io.BytesIO(data), False
+    stream, counts = io.BytesIO(data), Counter[type[McapRecord]]()
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(data))
     for record in reader.records:
-        match record:
-            case Chunk():
-                yield from _chunk_records(record)
-                continue
-            case Attachment():
-                texts = len(record.name.encode()) + len(record.media_type.encode())
-                size = 8 + 8 + 4 + 4 + texts + 8 + len(record.data) + 4
-                _check_sum(data, stream.tell() - size, stream.tell(), f"attachment {record.name!r}")
-            case DataEnd():
-                ended = True
-                if not record.data_section_crc:
-                    raise UncheckedError("it has no checksum over its data")
-            case Footer():
-                # The checksum covers the footer except its own bytes.
-                start = record.summary_start or stream.tell() - (1 + 8 + 8 + 8 + 4)
-                _check_sum(data, start, stream.tell(), "summary")
-        yield record
-    if not ended:
+        counts[type(record)] += 1
+        if isinstance(record, Chunk):
+            for part in _chunk_records(record):
+                counts[type(part)] += 1
+                yield part
+        else:
+            _check(record, data, stream.tell(), counts)
+            yield record
+    if not counts[DataEnd]:
         raise ValueError("the end of its data is not marked")
     if rest := stream.read(len(MAGIC)):
         raise InvalidMagic(rest)
+
+
+def _check(
+    record: McapRecord, data: bytes, end: int, counts: Mapping[type[McapRecord], int]
+) -> None:
+    """Checks what mcap does not, of a record that ends at an offset of the file."""
+    match record:
+        case Attachment(name=name):
+            texts = len(name.encode()) + len(record.media_type.encode())
+            size = 8 + 8 + 4 + 4 + texts + 8 + len(record.data) + 4
+            _check_sum(data, end - size, end, f"attachment {name!r}")
+        case DataEnd(data_section_crc=0):
+            raise UncheckedError("it has no checksum over its data")
+        case Statistics():
+            for claimed, kind in (
+                (record.message_count, Message),
+                (record.chunk_count, Chunk),
+                (record.attachment_count, Attachment),
+                (record.metadata_count, Metadata),
+            ):
+                if claimed != counts[kind]:
+                    counted = f"{claimed} of {kind.__name__}, its records {counts[kind]}"
+                    raise ValueError(f"its statistics have {counted}")
+        case Footer():
+            # The checksum covers the footer except its own bytes.
+            start = record.summary_start or end - (1 + 8 + 8 + 8 + 4)
+            _check_sum(data, start, end, "summary")
 
 
 def _check_sum(data: bytes, start: int, end: int, what: str) -> None:

@@ -12,7 +12,7 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -29,7 +29,9 @@ from selfmodel.logs.controllers import (
 )
 from selfmodel.logs.files import replace_file
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
-from selfmodel.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import selfmodel.robot.robot
 
 MAX_BYTES = 2**28
 """Largest size of a repertoire file and of its arrays, bytes; 20,000 gaits of the hexapod have
@@ -72,7 +74,7 @@ def save_repertoire(path: Path, repertoire: Repertoire) -> None:
     replace_file(path, repertoire_bytes(repertoire))
 
 
-def load_repertoire(path: Path, robot: Robot | None = None) -> Repertoire:
+def load_repertoire(path: Path, robot: "selfmodel.robot.robot.Robot | None" = None) -> Repertoire:
     """Returns the verified repertoire in a file.
 
     Args:
@@ -88,7 +90,7 @@ def load_repertoire(path: Path, robot: Robot | None = None) -> Repertoire:
     return repertoire
 
 
-def check_model(repertoire: Repertoire, robot: Robot, source: str) -> None:
+def check_model(repertoire: Repertoire, robot: "selfmodel.robot.robot.Robot", source: str) -> None:
     """Checks that a repertoire, of a file ``source``, is of the model of a robot."""
     if repertoire.origin.model != model_digest(robot):
         raise InputError(

@@ -13,12 +13,8 @@ from selfmodel.cli.inputs import check_new_file
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
-from selfmodel.recovery.repertoire import (
-    Filling,
-    Repertoire,
-    make_repertoire,
-    simulated_evaluation,
-)
+from selfmodel.recovery.map_elites import Filling, make_repertoire, simulated_evaluation
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.simulation.simulator import Simulator
 
 NOTES = 10

@@ -1,3 +1,9 @@
+from .map_elites import (
+    Evaluate as Evaluate,
+    make_repertoire as make_repertoire,
+    reevaluate as reevaluate,
+    simulated_evaluation as simulated_evaluation,
+)
 from .next_trial import by_disagreement as by_disagreement
 from .recover import (
     Journal as Journal,
@@ -6,13 +12,7 @@ from .recover import (
     by_repair as by_repair,
 )
 from .repair import RepairSearch as RepairSearch
-from .repertoire import (
-    Evaluate as Evaluate,
-    Repertoire as Repertoire,
-    make_repertoire as make_repertoire,
-    reevaluate as reevaluate,
-    simulated_evaluation as simulated_evaluation,
-)
+from .repertoire import Repertoire as Repertoire
 from .result import Database as Database, Event as Event, Recovery as Recovery
 from .scores import (
     DISPLACEMENT as DISPLACEMENT,

@@ -11,7 +11,7 @@ from selfmodel import api, plugins
 from selfmodel.cli import commands, inputs
 from selfmodel.cli.options import OPTIONS, signature_of
 from selfmodel.cli.view import PORT
-from selfmodel.recovery.repertoire import make_repertoire
+from selfmodel.recovery.map_elites import make_repertoire
 from selfmodel.settings import Settings
 from selfmodel.studies import plans
 

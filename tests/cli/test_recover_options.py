@@ -8,7 +8,7 @@ import pytest
 from selfmodel.arguments import load_robot
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.repertoires import save_repertoire
-from selfmodel.recovery.repertoire import make_repertoire, simulated_evaluation
+from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
 from selfmodel.robot.designs import network_for
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.command import SMALL, selfmodel

@@ -1,6 +1,7 @@
 """Damaged bytes: a log is read as it was written, or refused; a salvage has its first steps."""
 
 import io
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -120,4 +121,20 @@ def test_a_file_without_checksums_is_refused(
     writer.finish()
     log.write_bytes(output.getvalue())
     with pytest.raises(UnsupportedError, match=r"no checksum.* logs import"):
+        read_log(log)
+
+
+STATISTICS = 1 + 8  # opcode and length of the record
+COUNTS = {"Message": 0, "Attachment": 8 + 2 + 4, "Metadata": 8 + 2 + 8, "Chunk": 8 + 2 + 12}
+
+
+@pytest.mark.parametrize("kind", COUNTS)
+def test_counts_that_do_not_agree_are_refused(log: Path, kind: str):
+    data = bytearray(log.read_bytes())
+    start = int.from_bytes(data[-28:-20], "little")  # of the summary
+    opcode = b"\x0b" + (8 + 2 + 4 * 4 + 8 + 8 + 4 + 7 * 10).to_bytes(8, "little")
+    data[data.rindex(opcode) + STATISTICS + COUNTS[kind]] -= 1
+    data[-12:-8] = zlib.crc32(data[start:-12]).to_bytes(4, "little")
+    log.write_bytes(data)
+    with pytest.raises(CorruptError, match=f"statistics have .* {kind}, its records"):
         read_log(log)

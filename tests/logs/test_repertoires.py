@@ -85,10 +85,10 @@ def test_damaged_bytes_are_an_error_with_the_remedy_or_change_nothing(
     assert "repertoire make`" in sentence
 
 
-def test_a_repertoire_is_read_without_pyribs(repertoire: Repertoire, tmp_path: Path):
+def test_a_repertoire_is_read_without_mujoco_and_pyribs(repertoire: Repertoire, tmp_path: Path):
     save_repertoire(tmp_path / "gaits.npz", repertoire)
     code = (
-        "import sys; sys.modules['ribs'] = None\n"
+        "import sys; sys.modules['mujoco'] = sys.modules['ribs'] = None\n"
         "from pathlib import Path; from selfmodel.logs.repertoires import load_repertoire\n"
         "print(len(load_repertoire(Path(sys.argv[1]))))"
     )

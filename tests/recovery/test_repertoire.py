@@ -12,17 +12,14 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery import repertoire as module
-from selfmodel.recovery.repertoire import (
-    Origin,
-    Repertoire,
+from selfmodel.recovery import map_elites as module
+from selfmodel.recovery.map_elites import (
     feet_of,
     make_repertoire,
-    model_digest,
     reevaluate,
-    self_model_digest,
     simulated_evaluation,
 )
+from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest, self_model_digest
 from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
