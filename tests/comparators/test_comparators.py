@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.losses import simulate
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
@@ -14,6 +14,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import ROBOTS
 from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
@@ -31,7 +32,11 @@ def hypotheses_about(robot: Robot) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def logged_and_simulated(robot: Robot) -> Both:
+def logged_and_simulated(quadruped: Robot) -> Both:
+    return both_of(quadruped)
+
+
+def both_of(robot: Robot) -> Both:
     """A trial of a damaged robot, and runs of its controller: with the same damage, and others."""
     # No joint oscillates at every step: such joints are taken for noisy, and averaged.
     controller = random_controllers(robot, 5)[4]
@@ -62,8 +67,17 @@ def with_none_fixed(outcome: Trajectory) -> dict[str, np.ndarray | None]:
 
 
 @pytest.mark.parametrize("name", COMPARATORS)
-def test_a_comparator_keeps_its_contract(name: str, robot: Robot, logged_and_simulated: Both):
-    trial, _ = logged_and_simulated
+def test_a_comparator_keeps_its_contract(name: str, quadruped: Robot, logged_and_simulated: Both):
+    keeps_its_contract(name, quadruped, logged_and_simulated[0])
+
+
+def test_the_contract_is_kept_for_joints_of_several_hinges():
+    robot = ROBOTS["hexapod"].robot()
+    keeps_its_contract(SEGMENT_PREDICTION.name, robot, both_of(robot)[0])
+
+
+def keeps_its_contract(name: str, robot: Robot, trial: Trial) -> None:
+    """Raises an error for a comparator that breaks its contract on a trial of a robot."""
     comparator = COMPARATORS[name]
     prepared = comparator.prepare(trial)
     request = prepared.request

@@ -14,7 +14,7 @@ from tests.helpers.gaits import TROT, WALK, batch, changed, gait, logged
 GROUP = list(LARGE_DIFFERENCES)
 
 
-@settings(deadline=None)
+@settings(max_examples=8)
 @given(
     frequency=st.floats(1.2, 2.5),
     late=st.floats(0.0, 1.0),

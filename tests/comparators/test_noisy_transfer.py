@@ -37,7 +37,7 @@ def distances(*groups: list[Trajectory]) -> np.ndarray:
     return distances_of(NOISY_TRANSFER.prepare(logged(gait())), ensembles(*groups))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=6)
 @given(
     swing=st.floats(0.01, 2), late=st.floats(0, 1), steps=st.integers(1, 260), seed=st.integers(0)
 )
@@ -53,7 +53,7 @@ def test_an_ensemble_that_all_did_what_the_trial_shows_is_at_exactly_zero(
     assert np.array_equal(losses, np.zeros((1, -(-steps // WINDOW))))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=6)
 @given(error=st.floats(0.5, 5), spread=st.floats(0.2, 1))
 def test_members_that_disagree_forgive_more_than_members_that_agree(error: float, spread: float):
     agreed, disagreed = distances(around(error, 0), around(error, spread * error))
@@ -61,7 +61,7 @@ def test_members_that_disagree_forgive_more_than_members_that_agree(error: float
     assert disagreed < agreed
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=6)
 @given(spread=st.floats(0.01, 5))
 def test_an_ensemble_that_would_fit_anything_pays_for_it(spread: float):
     narrow, wide = distances(around(0, spread), around(0, 2 * spread))

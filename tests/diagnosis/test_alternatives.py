@@ -227,7 +227,7 @@ def test_the_largest_torque_that_shows_is_named_and_a_part_that_never_shows_has_
     assert len(rows) == 8
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(limit=st.floats(0.01, 1.2))
 def test_the_bisection_finds_the_same_severity_as_a_scan_of_the_levels(limit: float):
     levels = sorted(WEAK_MOTOR.levels_at(ANATOMY, KNEE), reverse=True)

@@ -48,7 +48,7 @@ def split_of(losses: Losses) -> Split | None:
     return best_split([INTACT], [JAM, BREAK], losses, losses)
 
 
-@settings(max_examples=100)
+@settings(max_examples=30)
 @given(
     change=st.integers(MIN_PIECES, PIECES - MIN_PIECES),
     noise=st.floats(0, 0.5),
@@ -80,7 +80,7 @@ def test_the_interval_contains_the_true_time_where_the_found_one_is_wrong():
     assert covered >= 0.95 * 60
 
 
-@settings(max_examples=200)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), pieces=st.integers(1, 80))
 def test_there_is_no_change_in_noise(seed: int, pieces: int):
     rng = np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_a_difference_after_the_time_has_to_be_clear(z: float, *, expected: bool
     assert is_change(Split(INTACT, JAM, 30), BREAK, of(rows)) == expected
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(
     change=st.integers(MIN_PIECES, 47),
     first=st.integers(1, 49),

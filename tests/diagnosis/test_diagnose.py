@@ -30,10 +30,10 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import unstable, with_value
 from tests.helpers.memory import in_memory
 
-SMALL = dataclasses.replace(Settings().scaled(20), generations=5, steps=200)
+SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=200)
 
 
-def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -> Trial:
+def logged(robot: Robot, truth: str, controller: Controller, steps: int = 100) -> Trial:
     """A trial of a damaged robot."""
     physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
     return in_memory(robot)(physical, TrialPlan(truth, "after", controller, steps, 0))
@@ -43,7 +43,6 @@ def logged(robot: Robot, truth: str, controller: Controller, steps: int = 300) -
     "truth",
     [
         "break:front_left_knee",
-        pytest.param("jam:back_right_shoulder", marks=pytest.mark.search),
         pytest.param("intact", marks=pytest.mark.search),
     ],
 )
@@ -93,7 +92,7 @@ def test_what_no_simulation_survives_is_unexplained_and_says_why(
     quadruped: Robot, comparator: Comparator, *, healthy: bool
 ):
     (controller,) = random_controllers(quadruped, 1)
-    trial = logged(quadruped, "intact", controller, steps=100)
+    trial = logged(quadruped, "intact", controller)
     simulator = Simulator(unstable(quadruped), 2)
     few = dataclasses.replace(Settings().scaled(4), generations=1)
     diagnose = DiagnosticSearch(
@@ -116,7 +115,7 @@ def test_what_no_simulation_survives_is_unexplained_and_says_why(
 @pytest.mark.parametrize("name", sorted(COMPARATORS))
 def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot, name: str):
     (controller,) = random_controllers(quadruped, 1)
-    trial = logged(quadruped, "intact", controller, steps=100)
+    trial = logged(quadruped, "intact", controller)
     for signal in ("base_position", "joint_positions", "sensors"):
         trial = with_value(trial, signal, 7, 1, 1e300)
     evidence = LossTable(Simulator(quadruped, 1), COMPARATORS[name])

@@ -227,7 +227,7 @@ def test_all_trials_that_are_refused_are_named_at_once(quadruped: Robot, trials:
         table.check([first, trials[0], second])
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(times=st.tuples(st.floats(-1, 3), st.floats(-1, 3)))
 def test_losses_of_a_part_are_the_columns_of_the_whole_within_its_bounds(
     table: LossTable, long: list[Trial], three: list[Hypothesis], times: tuple[float, float]

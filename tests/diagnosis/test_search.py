@@ -209,7 +209,7 @@ known_ones = st.lists(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=10)
 @given(worlds(CLEAR), known_ones)
 def test_where_a_test_tells_any_two_apart_no_start_is_better_than_what_is_found(
     losses: Losses, known: list[Hypothesis]
@@ -221,7 +221,7 @@ def test_where_a_test_tells_any_two_apart_no_start_is_better_than_what_is_found(
         assert not is_better(*losses([start, found]))
 
 
-@settings(max_examples=25)
+@settings(max_examples=8)
 @given(worlds(NOISY), known_ones, st.permutations(SMALL_WORLD))
 def test_the_order_of_the_faults_and_of_what_is_known_does_not_matter(
     losses: Losses, known: list[Hypothesis], order: list[Fault]
@@ -231,7 +231,7 @@ def test_the_order_of_the_faults_and_of_what_is_known_does_not_matter(
     assert find(losses, *reversed(known), faults=order, most=2) == straight
 
 
-@settings(max_examples=25)
+@settings(max_examples=8)
 @given(st.lists(st.sampled_from(FAULTS), max_size=3), st.integers(0, 1000))
 def test_every_truth_of_effects_that_add_up_is_found(faults: list[Fault], seed: int):
     truth = canonical(faults, ANATOMY)

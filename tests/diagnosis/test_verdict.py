@@ -98,9 +98,8 @@ def test_a_fault_without_a_degree_is_explained_though_its_degree_is_considered(
     assert (found.verdict, found.indistinguishable) == ("explained", ())
 
 
-@pytest.mark.parametrize(
-    "case", [1, *(pytest.param(case, marks=pytest.mark.search) for case in (2, 3, 6, 9))]
-)
+@pytest.mark.search
+@pytest.mark.parametrize("case", [3, 9])
 def test_a_failure_of_table_one_is_found_and_explained(
     quadruped: Robot, gait: Controller, before: list[Trial], case: int
 ):
@@ -122,7 +121,7 @@ def test_the_seed_of_the_search_does_not_change_the_verdict(
         Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, PAPER_KINDS, healthy_trials=before
     )
     trials = [trial(quadruped, CASES[8], gait)]
-    seeds = map(np.random.default_rng, range(10))
+    seeds = map(np.random.default_rng, range(4))
     first, *others = (search(trials, [], rng, lambda _: None) for rng in seeds)
 
     for one in others:
@@ -266,6 +265,12 @@ def problem_of(robot: Robot, *trials: Trial) -> Problem:
     )
 
 
+@pytest.fixture(scope="module")
+def lame(quadruped: Robot) -> Problem:
+    """The problem of one trial with a weak motor; its losses are kept from test to test."""
+    return problem_of(quadruped, logged(quadruped, LAME, "lame.mcap"))
+
+
 def parsed(robot: Robot) -> list[list[Hypothesis]]:
     return [[parse(one, robot.anatomy) for one in some] for some in OF_ONE_SET]
 
@@ -278,10 +283,9 @@ def nearest(sets: Iterable[list[Hypothesis]], problem: Problem) -> set[Hypothesi
 
 @pytest.mark.parametrize("best", [None, LAME])
 def test_the_ranking_has_each_set_of_faults_once_with_its_best_severities(
-    quadruped: Robot, best: str | None
+    quadruped: Robot, lame: Problem, best: str | None
 ):
-    problem = problem_of(quadruped, logged(quadruped, LAME, "lame.mcap"))
-    sets = parsed(quadruped)
+    problem, sets = lame, parsed(quadruped)
     compared = [one for some in sets for one in some]
     found = diagnosis_of(problem, compared, best and parse(best, quadruped.anatomy))
     ranked = [candidate.hypothesis for candidate in found.ranked]
@@ -293,12 +297,11 @@ def test_the_ranking_has_each_set_of_faults_once_with_its_best_severities(
     assert distances == sorted(distances)
 
 
-def test_the_verdict_does_not_depend_on_what_the_search_compared(quadruped: Robot):
-    problem = problem_of(quadruped, logged(quadruped, LAME, "lame.mcap"))
+def test_the_verdict_does_not_depend_on_what_the_search_compared(quadruped: Robot, lame: Problem):
     best = parse(LAME, quadruped.anatomy)
     compared = ([best, INTACT], [INTACT, *(one for some in parsed(quadruped) for one in some)])
 
-    first, second = (diagnosis_of(problem, some, best) for some in compared)
+    first, second = (diagnosis_of(lame, some, best) for some in compared)
 
     assert first.ranked != second.ranked
     alike = dataclasses.replace(second, ranked=first.ranked)
@@ -308,8 +311,10 @@ def test_the_verdict_does_not_depend_on_what_the_search_compared(quadruped: Robo
 def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
     quadruped: Robot, monkeypatch: pytest.MonkeyPatch
 ):
-    # Unsearched kinds cost most of the time.
+    # The alternatives to the best hypothesis cost most of the time.
     monkeypatch.setattr("selfmodel.diagnosis.verdict.unsearched_fault", lambda *_: None)
+    for alternatives in ("indistinguishable", "undetectable", "detectable_severities"):
+        monkeypatch.setattr(f"selfmodel.diagnosis.verdict.{alternatives}", lambda *_: [])
     names = {"monday.mcap": "intact", "tuesday.mcap": LAME}
     trials = [logged(quadruped, truth, path) for path, truth in names.items()]
     found = diagnosis_of(problem_of(quadruped, *trials), [INTACT], INTACT)

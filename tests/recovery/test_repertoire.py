@@ -28,7 +28,7 @@ from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers
 from tests.helpers.robots.arms import arm
 
-STEPS = 60
+STEPS = 40
 ORIGIN = Origin("quadruped", "0" * 64, 10, 2, 20, 0, "0.1")
 
 
@@ -130,7 +130,7 @@ def test_without_pyribs_or_feet_the_remedy_is_named(
 def test_gaits_that_fall_or_go_backwards_have_no_score(
     quadruped: Robot, monkeypatch: pytest.MonkeyPatch
 ):
-    controllers = random_controllers(quadruped, 40, seed=1)
+    controllers = random_controllers(quadruped, 20, seed=1)
     simulator = Simulator(quadruped, 2)
     damaged = parse("break:front_left_shoulder+break:front_right_shoulder", quadruped.anatomy)
     scores, descriptors = simulated_evaluation(simulator, damaged, 150)(controllers)

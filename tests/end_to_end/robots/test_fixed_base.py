@@ -14,7 +14,7 @@ from tests.helpers.robots.arms import arm_mjcf
 pytestmark = [pytest.mark.process, pytest.mark.search]
 
 KINDS = ("--kinds", "break,jam,motor,sensor")
-SEARCH = ("--population", "20", "--generations", "6", *KINDS)
+SEARCH = ("--population", "12", "--generations", "3", *KINDS)
 
 
 def run(folder: Path, *arguments: str) -> dict:
@@ -60,9 +60,9 @@ def test_an_arm_with_a_weak_motor_follows_its_trajectory_better_than_before(fold
     found = run(
         folder,
         *("recover", "arm.xml", "--damage", "motor:joint2=0.4", "--score", "tracking"),
-        *("--controller", "cpg", "--steps", "300", "--trials", "2", *KINDS, "--out", "recovery"),
+        *("--controller", "cpg", "--steps", "150", "--trials", "1", *KINDS, "--out", "recovery"),
         # The motion of seed 0 hardly needs the weak motor.
-        *("--seed", "1", "--population", "60", "--generations", "15"),
+        *("--seed", "1", "--population", "30", "--generations", "8"),
     )
     assert found["correct"]
     score = found["score"]
