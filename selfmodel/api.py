@@ -335,7 +335,9 @@ def recover(
         >>> healthy = selfmodel.simulated_robot("quadruped")
         >>> damaged = selfmodel.simulated_robot("quadruped", "break:front_left_knee")
         >>> settings = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
-        >>> recovery = selfmodel.recover(healthy, damaged, "quadruped", "run", settings=settings)
+        >>> recovery = selfmodel.recover(
+        ...     healthy, damaged, "quadruped", "run", settings=settings, kinds="paper"
+        ... )
         >>> print(recovery.diagnosis.best, recovery.diagnosis.verdict)
         break:front_left_knee explained
 

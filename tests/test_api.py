@@ -11,7 +11,8 @@ import pytest
 
 import selfmodel
 from selfmodel import api
-from selfmodel.comparators import DEFAULT, FORWARD_DISPLACEMENT
+from selfmodel.arguments import kinds_of
+from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.errors import InputError
 from selfmodel.faults import BROKEN, JAMMED
@@ -44,22 +45,24 @@ def reference() -> selfmodel.Diagnosis:
 def recovery(tmp_path: Path) -> selfmodel.Recovery:
     healthy = selfmodel.simulated_robot("quadruped")
     damaged = selfmodel.simulated_robot("quadruped", KNEE)
-    return selfmodel.recover(healthy, damaged, "quadruped", tmp_path / "run", settings=SMALL)
+    return selfmodel.recover(
+        *(healthy, damaged, "quadruped", tmp_path / "run"),
+        settings=SMALL,
+        calibrate=False,
+        comparator=FORWARD_DISPLACEMENT,
+        repair="paper",
+    )
 
 
 @pytest.mark.parametrize(
     ("after", "before"),
-    [(str(AFTER), str(BEFORE)), ([AFTER], (BEFORE,)), ([str(AFTER)], [BEFORE])],
-    ids=["texts", "sequences", "sequences of both"],
+    [(str(AFTER), (BEFORE,)), ([AFTER, BEFORE], ())],
+    ids=["a text and a sequence", "the stage decides"],
 )
-def test_one_log_is_a_path_a_text_or_a_sequence(
+def test_a_log_is_a_path_a_text_or_in_a_sequence(
     after: object, before: object, reference: selfmodel.Diagnosis
 ):
     assert diagnosis(after, before) == reference
-
-
-def test_without_healthy_trials_the_stage_decides(reference: selfmodel.Diagnosis):
-    assert diagnosis([BEFORE, AFTER], ()) == reference
 
 
 def test_trials_are_diagnosed_as_their_logs_are():
@@ -72,25 +75,20 @@ def test_trials_are_diagnosed_as_their_logs_are():
     assert diagnosis([after], BEFORE, robot="quadruped", seed=after.plan.seed) == from_logs
 
 
-@pytest.mark.parametrize(
-    "kinds", ["break, jam", ["break", "jam"], ["break", JAMMED], [BROKEN, JAMMED]]
-)
-def test_kinds_are_names_or_objects(kinds: object):
-    assert diagnosis(kinds=kinds) == diagnosis(kinds=(BROKEN, JAMMED))
+def test_kinds_are_names_or_objects():
+    for kinds in ("break, jam", ["break", JAMMED], [BROKEN, JAMMED]):
+        assert kinds_of(kinds) == (BROKEN, JAMMED)
 
 
-def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path):
+def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path, reference: selfmodel.Diagnosis):
     done = command(
         *("diagnose", str(BEFORE), str(AFTER), "--no-calibrate", "--json"),
-        *("--population", "8", "--generations", "1"),
+        *("--population", "4", "--generations", "1", "--comparator", "forward-displacement"),
         cwd=tmp_path,
     )
-    settings = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(8)
 
-    found = diagnosis(comparator=DEFAULT, settings=settings)
-
-    assert json.loads(done.stdout)["diagnosis"] == found.to_dict()["ranked"]
-    assert json.loads(done.stdout)["verdict"] == found.verdict
+    assert json.loads(done.stdout)["diagnosis"] == reference.to_dict()["ranked"]
+    assert json.loads(done.stdout)["verdict"] == reference.verdict
 
 
 def test_a_recovery_is_readable_serialisable_and_a_table(

@@ -7,16 +7,16 @@ import tempfile
 import time
 from pathlib import Path
 
-from selfmodel.errors import InputError
 from selfmodel.isolation import Message
-from selfmodel.logs import CorruptError
 
 
 def echo(request: Message) -> Message:
-    """Prints, which must not reach the answer."""
+    """Prints, which must not reach the answer, and adds the temporary folder."""
     sys.stdout.write("noise\n")
     os.write(1, b"more noise")
-    return request
+    folder = tempfile.gettempdir()
+    Path(folder, "left.over").touch()
+    return Message({**request.header, "folder": folder}, request.buffers)
 
 
 def crash(_: Message) -> Message:
@@ -24,8 +24,8 @@ def crash(_: Message) -> Message:
     return Message({})
 
 
-def allocate(request: Message) -> Message:
-    return Message({"bytes": len(bytearray(request.header["bytes"]))})
+def allocate(_: Message) -> Message:
+    return Message({"bytes": len(bytearray(10**15))})
 
 
 def loop(_: Message) -> Message:
@@ -42,19 +42,11 @@ def nest(request: Message) -> Message:
     return nest(request)
 
 
-def refuse(_: Message) -> Message:
-    raise InputError("no robot")
-
-
 def refuse_log(_: Message) -> Message:
+    from selfmodel.logs import CorruptError  # noqa: PLC0415  # half a second, for this task only
+
     raise CorruptError("walk.bag", "it is damaged", advice="record it again")
 
 
 def fail(_: Message) -> Message:
     raise KeyError("a defect")
-
-
-def scratch(_: Message) -> Message:
-    folder = tempfile.gettempdir()
-    Path(folder, "left.over").touch()
-    return Message({"folder": folder})

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import LogError, read_gap, read_log, read_truth
 from selfmodel.logs.records import TrialHeader
@@ -41,12 +42,7 @@ def drawn(robot: Robot, level: float, seed: int = 0) -> RealityGap:
 
 
 LEVEL = 0.05
-JOINTS = [
-    (name, joint.name)
-    for name, entry in ROBOTS.items()
-    for joint in entry.robot().anatomy.joints
-    if joint.name.startswith("front_left")
-]
+JOINTS = [("quadruped", "front_left_shoulder"), ("hexapod", "front_left_knee")]
 
 
 def ran(physical: SimulatedRobot, robot: Robot, steps: int = STEPS) -> Trajectory:
@@ -58,9 +54,8 @@ def same(one: Trajectory, other: Trajectory) -> bool:
     return all(one[signal].tobytes() == other[signal].tobytes() for signal in SIGNALS)
 
 
-@pytest.mark.parametrize("text", ["intact", "break:{joint}"])
-def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot, text: str):
-    truth = parse(text.format(joint=robot.anatomy.joints[0].name), robot.anatomy)
+def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot):
+    truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
     (controller,) = random_controllers(robot, 1)
     simulated = Simulator(robot, 1).run([(truth, controller)], STEPS, SIGNALS).trajectory
     for gap in (None, drawn(robot, 0.0)):
@@ -69,7 +64,8 @@ def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot, text: str):
         assert all(found[s].tobytes() == simulated[s][0].tobytes() for s in SIGNALS)
 
 
-def test_the_same_seed_gives_the_same_trials_and_no_two_of_one_robot(robot: Robot):
+def test_the_same_seed_gives_the_same_trials_and_no_two_of_one_robot(quadruped: Robot):
+    robot = quadruped
     truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
     gap = drawn(robot, 0.1)
     first, again = (SimulatedRobot(robot, truth, gap) for _ in range(2))
@@ -102,14 +98,13 @@ def test_a_command_reaches_the_motors_so_many_steps_later(quadruped: Robot, dela
     assert (apart > 0.01) == (delay > 0)
 
 
+def noise_of(robot: Robot, level: float) -> NoisyMeasurement:
+    return NoisyMeasurement(level, robot, build(robot, INTACT), np.random.default_rng(0))
+
+
 def test_readings_have_the_noise_of_the_level(quadruped: Robot):
     level, steps = 0.1, 4000
-    noise = NoisyMeasurement(
-        level,
-        quadruped,
-        build(quadruped, parse("intact", quadruped.anatomy)),
-        np.random.default_rng(0),
-    )
+    noise = noise_of(quadruped, level)
     rows = np.tile([1.0, 0, 1, 0, 0.3, -0.3, 0, 0], (steps, 1))
     clean = rows.copy()
     for row in rows:
@@ -128,9 +123,7 @@ def test_the_encoder_of_a_hinge_without_limits_has_the_noise_of_a_full_turn(quad
     spec.joint("front_left_knee").limited = mujoco.mjtLimited.mjLIMITED_FALSE
     spec.joint("front_left_knee").range = [-60.0, 60.0]
     free = dataclasses.replace(quadruped, mjcf=spec.to_xml())
-    noise = NoisyMeasurement(
-        0.1, free, build(free, parse("intact", free.anatomy)), np.random.default_rng(0)
-    )
+    noise = noise_of(free, 0.1)
     rows = [noise.measure("joint_positions", np.zeros(8)) for _ in range(4000)]
     scales = np.std(rows, axis=0)[free.anatomy.hinges.index("front_left_knee")]
 
@@ -139,13 +132,8 @@ def test_the_encoder_of_a_hinge_without_limits_has_the_noise_of_a_full_turn(quad
 
 
 def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
-    level, draws = 0.1, 4000
-    noise = NoisyMeasurement(
-        level,
-        quadruped,
-        build(quadruped, parse("intact", quadruped.anatomy)),
-        np.random.default_rng(0),
-    )
+    level, draws = 0.1, 2000
+    noise = noise_of(quadruped, level)
     half = quadruped.anatomy.sensors[-1].half_range
     for signal in SIGNALS:
         clean = np.zeros(quadruped.anatomy.names.width(signal))
@@ -170,13 +158,13 @@ def test_logged_signals_have_noise_of_their_full_scale(quadruped: Robot):
 def test_a_noisy_sensor_has_another_noise_in_every_trial(quadruped: Robot):
     """Three trials are to show what it does three times, not one draw three times."""
     truth = parse("sensor:back_left_angle=noise0.3", quadruped.anatomy)
-    driver = played_back(quadruped.anatomy.motors, np.zeros((400, len(quadruped.anatomy.motors))))
+    driver = played_back(quadruped.anatomy.motors, np.zeros((250, len(quadruped.anatomy.motors))))
     column = quadruped.anatomy.names.sensors.index("back_left_angle")
 
     def heard(level: float) -> list[np.ndarray]:
         physical = SimulatedRobot(quadruped, truth, drawn(quadruped, level))
-        runs = [collect(quadruped.anatomy.names, physical.run(driver, 400)) for _ in range(2)]
-        return [run["sensors"][200:, column] for run in runs]
+        runs = [collect(quadruped.anatomy.names, physical.run(driver, 250)) for _ in range(2)]
+        return [run["sensors"][50:, column] for run in runs]
 
     assert abs(np.corrcoef(heard(0.05))[0, 1]) < 0.3
     assert np.array_equal(*heard(0.0))
@@ -185,10 +173,8 @@ def test_a_noisy_sensor_has_another_noise_in_every_trial(quadruped: Robot):
 @pytest.mark.parametrize(
     ("text", "dead"),
     [
-        ("sensor:back_left_angle", {"back_left_angle"}),
-        ("sensor:back_left_touch", {"back_left_touch"}),
+        ("sensor:back_left_angle+sensor:back_left_touch", {"back_left_angle", "back_left_touch"}),
         ("break:front_left_shoulder", {"front_left_touch", "front_left_angle"}),
-        ("jam:front_left_shoulder", set()),
         ("jam:front_left_shoulder=0.2", set()),
     ],
 )
@@ -349,7 +335,7 @@ def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
 @pytest.mark.search
 def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
     done = selfmodel(
-        "recover", "quadruped", "--damage", "intact", *SMALL, "--steps", "100", "--trials", "1",
+        "recover", "quadruped", "--damage", "intact", *SMALL, "--steps", "40", "--trials", "1",
         "--no-calibrate", "--comparator", "forward-displacement", "--kinds", "paper",
         "--gap", "0.1", "--out", "run", "--json", cwd=tmp_path,
     )  # fmt: skip

@@ -24,10 +24,7 @@ RANDOM = {"hypothesis": "break:front_left_knee+roughness=0.03", "gap": 0.05}
 CHECKED = {
     "quadruped": (ID, {}),
     "random": (ID, RANDOM),
-    "hexapod": ("selfmodel/Hexapod-walk-v0", {"hypothesis": "jam:front_left_hip"}),
     "walker": ("selfmodel/suite-walker-walk-v0", {"hypothesis": "break:left_ankle"}),
-    "cartpole": ("selfmodel/suite-cartpole-swingup-v0", {"gap": 0.05}),
-    "reacher": ("selfmodel/suite-reacher-easy-v0", {}),
     "file": (FILE_ID, {"robot": str(ANT), "start_noise": 0.05}),
 }
 every = pytest.mark.parametrize(

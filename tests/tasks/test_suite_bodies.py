@@ -17,9 +17,7 @@ from tests.helpers.drivers import random_controllers
 
 STEPS = 60
 FIRST = [
-    pytest.param(
-        *(domain, tasks[0]), marks=() if domain in ("walker", "hopper") else pytest.mark.bodies
-    )
+    pytest.param(*(domain, tasks[0]), marks=() if domain == "walker" else pytest.mark.bodies)
     for domain, tasks in suite_bodies.DOMAINS.items()
 ]
 TOUCHING = ("dog",)
@@ -49,8 +47,10 @@ def test_the_simulated_return_is_that_of_the_suites_own_environment(domain: str,
     assert turned.tolist() == ([2] if domain == "swimmer" else [])
 
 
-@pytest.mark.parametrize("name", ["suite-walker-walk", "suite-quadruped-walk", "suite-hopper-hop"])
-@pytest.mark.parametrize("case", [1, 3, 6, 10])
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [("suite-walker-walk", 1), ("suite-quadruped-walk", 3), ("suite-hopper-hop", 10)],
+)
 def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: str, case: int):
     own = entry(name)
     robot, score = own.robot(), own.episode_return

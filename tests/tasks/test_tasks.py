@@ -44,7 +44,7 @@ EVERY = [
     (domain, task, text)
     for first, (domain, task) in enumerate(OWN_TASKS)
     for number, text in enumerate(damages(domain))
-    if (first + number) % 2 == 0
+    if number % len(OWN_TASKS) == first
 ]
 """Each damage on one of the robots."""
 
@@ -73,11 +73,17 @@ def episodes(
 
 
 @every_body
-def test_every_time_step_is_finite_and_in_its_specs(domain: str, task: str, hypothesis: str):
-    environment = load(domain, task, hypothesis)
+def test_every_time_step_is_in_its_specs_and_the_same_to_the_bit_again(
+    domain: str, task: str, hypothesis: str
+):
+    environment, again = (load(domain, task, hypothesis) for _ in range(2))
     expected = environment.observation_spec()
     steps = list(episodes(environment, 2))
 
+    for step, other in zip(steps, episodes(again, 2), strict=True):
+        assert (step.reward, step.discount) == (other.reward, other.discount)
+        for name, values in step.observation.items():
+            assert values.tobytes() == other.observation[name].tobytes(), name
     assert [step.step_type.name for step in steps] == 2 * ["FIRST", *["MID"] * 9, "LAST"]
     for step in steps:
         assert list(step.observation) == list(expected)
@@ -114,16 +120,6 @@ def test_a_robot_may_have_a_fault_of_a_kind_of_ones_own():
     assert light[1] == 0.5 * whole[1]
 
 
-@every_body
-def test_the_same_seed_and_actions_give_the_same_bits(domain: str, task: str, hypothesis: str):
-    one, other = (episodes(load(domain, task, hypothesis), 2, seed=7) for _ in range(2))
-    for first, second in zip(one, other, strict=True):
-        assert first.step_type is second.step_type
-        assert (first.reward, first.discount) == (second.reward, second.discount)
-        for name, values in first.observation.items():
-            assert values.tobytes() == second.observation[name].tobytes(), name
-
-
 @every_task
 def test_actions_are_the_motors_targets_in_their_range(domain: str, task: str):
     robot = ROBOTS[domain].robot()
@@ -153,7 +149,8 @@ def test_the_time_limit_ends_an_episode_and_none_never_does(domain: str, task: s
     endless = load(domain, task, limit=float("inf"))
     endless.reset()
     action = np.zeros(endless.action_spec().shape)
-    assert not any(endless.step(action).last() for _ in range(1010))
+    assert endless._step_limit == float("inf")
+    assert not endless.step(action).last()
 
 
 @every_task
@@ -167,7 +164,7 @@ def test_the_suites_own_arguments_are_taken_by_place_and_by_name(domain: str, ta
         tasks.load(domain, task, visualize_reward=True)
 
 
-@every_body
+@pytest.mark.parametrize(("domain", "task", "hypothesis"), EVERY[:1])
 def test_the_viewers_runtime_runs_episodes(domain: str, task: str, hypothesis: str):
     """Runs the steps of ``dm_control.viewer.launch`` without a window."""
     environment = partial(load, domain, task, hypothesis, limit=0.06)()

@@ -61,25 +61,26 @@ def test_every_case_of_table_one_is_a_hypothesis_about_it(robot: Robot):
     assert [len(parsed[number]) for number in sorted(parsed)] == [1, 1, 1, 2, 1, 1, 2, 3, 0, 1]
 
 
-@pytest.mark.parametrize(("domain", "task"), OWN_TASKS)
-@pytest.mark.parametrize("case", [2, 5, 7, 9])
+@pytest.mark.parametrize(
+    ("domain", "task", "case"), [(*OWN_TASKS[0], 2), (*OWN_TASKS[1], 5), (*OWN_TASKS[0], 7)]
+)
 def test_an_environment_moves_like_the_simulator_to_the_bit(domain: str, task: str, case: int):
     robot = ROBOTS[domain].robot()
     hypothesis = ROBOTS[domain].cases[case]
     (controller,) = random_controllers(robot, 1, seed=case)
     truth = Simulator(robot, 1).run(
-        [(parse(hypothesis, robot.anatomy), controller)], 200, ["sensors", "base_position"]
+        [(parse(hypothesis, robot.anatomy), controller)], 100, ["sensors", "base_position"]
     )
     environment = tasks.load(domain, task, task_kwargs={"hypothesis": hypothesis})
     brain = make_batch([controller], [frozenset()], len(robot.anatomy.sensors))
     action = np.empty((1, robot.model.nu))
     step, travelled = environment.reset(), 0.0
-    for k in range(200):
+    for k in range(100):
         readings = step.observation["sensors"]
         assert readings.tobytes() == truth.trajectory["sensors"][0, k].tobytes()
         brain.readings[:] = readings
         brain.step(action)
-        if k < 199:
+        if k < 99:
             step = environment.step(action[0])
             travelled += step.reward * environment.control_timestep()
 
