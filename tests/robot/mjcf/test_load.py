@@ -10,12 +10,14 @@ import pytest
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.isolation import Message
 from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
-from selfmodel.robot.mjcf.load import AdaptedMjcf, adapt, load_mjcf, robot_from
+from selfmodel.robot.mjcf import load
+from selfmodel.robot.mjcf.load import AdaptedMjcf, adapt, adapt_message, load_mjcf, robot_from
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.structure import MIN_ITERATIONS, expand
 from selfmodel.robot.mjcf.work import Work
@@ -68,6 +70,21 @@ def test_an_invalid_file_is_refused_in_one_sentence(what: str, tmp_path: Path):
     assert AWKWARD[what].sentence in said
     assert "\n" not in said
     assert len(said) < 500
+
+
+@pytest.mark.usefixtures("isolated")
+def test_a_child_process_reads_a_file_and_gives_the_robot_or_the_refusal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path = AWKWARD["UTF-16"].write(tmp_path)
+    here = adapt_message(Message({"path": str(path), "settings": {}}, {"file": path.read_bytes()}))
+
+    monkeypatch.delattr(load, "parse_xml")  # of this process
+    robot = load_mjcf(path)
+
+    assert robot.mjcf == here.header["mjcf"]
+    with pytest.raises(InputError, match=r"robot\.xml: .*no actuators"):
+        load_mjcf(AWKWARD["no actuator"].write(tmp_path))
 
 
 def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path):
