@@ -1,5 +1,6 @@
 """What the tests of the log share: a small robot, made-up trials of it, and one log."""
 
+import importlib
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,9 +9,12 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller, draw_genomes
+from selfmodel.isolation import Message
+from selfmodel.logs.recordings import bags, tables
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.designs import network_for
+from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
@@ -74,12 +78,37 @@ def plan(biped: Robot) -> TrialPlan:
     return plan_of(biped, STEPS)
 
 
-@pytest.fixture
-def log(biped: Robot, plan: TrialPlan, tmp_path: Path) -> Path:
-    """A finished log of a made-up trial."""
-    path = tmp_path / "trial.mcap"
+@pytest.fixture(scope="session")
+def sound(biped: Robot, plan: TrialPlan, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished log of a made-up trial, which no test changes."""
+    path = tmp_path_factory.mktemp("sound") / "trial.mcap"
     samples = made_up(biped, STEPS)
     return write_trial(path, biped, plan, samples, TrialHeader(Settings(), hidden="intact"))
+
+
+@pytest.fixture
+def log(sound: Path, tmp_path: Path) -> Path:
+    """A copy of the finished log."""
+    path = tmp_path / "trial.mcap"
+    path.write_bytes(sound.read_bytes())
+    return path
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Opens models and recordings without a child process, which takes a second each.
+
+    A test with the mark ``process`` has one.
+    """
+
+    def run(task: str, message: Message, **_: object) -> Message:
+        module, _, name = task.partition(":")
+        answer: Message = getattr(importlib.import_module(module), name)(message)
+        return answer
+
+    if request.node.get_closest_marker("process") is None:
+        for module in (load, bags, tables):
+            monkeypatch.setattr(module, "run_isolated", run)
 
 
 def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:

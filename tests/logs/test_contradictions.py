@@ -122,12 +122,16 @@ def redefined(record: McapRecord) -> McapRecord:
 def test_a_log_that_contradicts_itself_is_refused_by_name(
     log: Path, change: Change, error: type[LogError], match: str
 ):
-    rewritten(log, lambda record: record)
-    read_log(log)  # rewriting alone harms nothing
     rewritten(log, change)
     with pytest.raises(error, match=match) as refusal:
         read_log(log)
     assert len(str(refusal.value)) < 4000
+
+
+def test_a_log_that_is_only_written_again_is_read(log: Path):
+    rewritten(log, lambda record: record)
+
+    assert read_log(log).trial.plan.name == "00-before"
 
 
 @pytest.mark.parametrize(

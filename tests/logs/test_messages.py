@@ -65,7 +65,7 @@ def numbers(value: object) -> Iterator[float]:
                 yield from numbers(getattr(value, field.name))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(data=st.data(), names=st.builds(Names, SOME, SOME, SOME), frames=SOME)
 def test_messages_are_rosbags_messages_to_the_byte(
     store: Typestore, data: st.DataObject, names: Names, frames: tuple[str, ...]

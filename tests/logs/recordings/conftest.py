@@ -5,8 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.isolation import Message
-from selfmodel.logs.recordings import bags, tables
 from selfmodel.logs.recordings.importer import ImportedTrial, import_recording
 from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
@@ -91,25 +89,12 @@ def recorded(seconds: float = 1.0) -> list[Item]:
     return items
 
 
-@pytest.fixture
-def bag(tmp_path: Path) -> Path:
-    """A whole bag."""
-    return write_bag(tmp_path / "bag", recorded())
+@pytest.fixture(scope="session")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole bag, which no test changes."""
+    return write_bag(tmp_path_factory.mktemp("recorded") / "bag", recorded())
 
 
 def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> ImportedTrial:
     """Imports a bag of the biped."""
     return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reads recordings without a child process, which takes a second each; ``process`` has one."""
-
-    def run(task: str, message: Message, **_: object) -> Message:
-        module = {"bags": bags, "tables": tables}[task.partition(":")[0].rpartition(".")[2]]
-        return module.read_in_child(message)
-
-    if request.node.get_closest_marker("process") is None:
-        monkeypatch.setattr(bags, "run_isolated", run)
-        monkeypatch.setattr(tables, "run_isolated", run)

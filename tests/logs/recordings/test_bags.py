@@ -42,7 +42,7 @@ def signals(path: Path, robot: Robot) -> dict[str, bytes]:
     return {name: values.tobytes() for name, values in trajectory.signals.items()}
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def expected(bag: Path, biped: Robot) -> dict[str, bytes]:
     """The made-up recording in its plainest form."""
     return signals(bag, biped)
@@ -54,6 +54,8 @@ def test_every_form_of_rosbag2_is_the_same_trial(
 ):
     folder = write_bag(tmp_path / "walk", recorded(), form)
     assert signals(folder, biped) == expected
+    if form not in ("mcap-file", "sqlite"):
+        return
     bare = tmp_path / f"no 1 of #2?{storage(folder).name}"  # signs that an address would escape
     shutil.copy(storage(folder), bare)
     assert signals(bare, biped) == expected
@@ -96,17 +98,15 @@ def test_other_writers_of_mcap_are_read(
     assert signals(path, biped) == expected
 
 
-@pytest.mark.parametrize(("form", "listed"), [("mcap", True), ("sqlite-file", False)])
-def test_split_files_are_one_bag(
-    form: str, *, listed: bool, biped: Robot, expected: dict, tmp_path: Path
-):
+@pytest.mark.parametrize("listed", [True, False])
+def test_split_files_are_one_bag(*, listed: bool, biped: Robot, expected: dict, tmp_path: Path):
     items = sorted(recorded(), key=lambda item: item[1])
     whole = tmp_path / "whole"
     whole.mkdir()
     names = []
     for k in range(11):  # in the order of numbers, part_2 is before part_10
         part = [item for n, item in enumerate(items) if n * 11 // len(items) == k]
-        source = storage(write_bag(tmp_path / f"part_{k}", part, form))
+        source = storage(write_bag(tmp_path / f"part_{k}", part))
         names.append(source.name)
         shutil.move(source, whole / source.name)
     if listed:
@@ -138,7 +138,7 @@ def test_genuine_recordings_are_read(path: Path, biped: Robot):
 # ---------------------------------------------------------------- damage
 
 
-@pytest.mark.parametrize("form", ["sqlite", "sqlite-message", "ros1-none", "ros1-bz2", "ros1-lz4"])
+@pytest.mark.parametrize("form", ["sqlite-message", "ros1-none", "ros1-lz4"])
 def test_no_damage_crashes(form: str, tmp_path: Path):
     path = (
         write_ros1(tmp_path / "a.bag", recorded(0.1), form[5:])
@@ -147,13 +147,14 @@ def test_no_damage_crashes(form: str, tmp_path: Path):
     )
     data = path.read_bytes()
     rng = np.random.default_rng(0)
-    for k in range(15):
+    for k in range(9):
         path.write_bytes(spoilt(data, ("flip", "cut", "garbage")[k % 3], rng))
         with suppress(InputError):
             read_bag(path)
 
 
-def test_a_bag_that_is_not_there_is_named(bag: Path, tmp_path: Path):
+def test_a_bag_that_is_not_there_is_named(tmp_path: Path):
+    bag = write_bag(tmp_path / "bag", recorded(0.1))
     path = storage(bag)
     path.unlink()
     with pytest.raises(InputError, match=r"bag\.mcap"):
