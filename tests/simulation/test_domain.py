@@ -166,7 +166,7 @@ def started(
 
 
 def test_starts_spread_around_the_reference_pose(quadruped: Robot):
-    level, draws = 0.1, 200
+    level, draws = 0.1, 100
     fields = signal_fields(quadruped)
     poses = np.array([started(quadruped, level, seed)[1].qpos for seed in range(draws)])
     angles = poses[:, fields["joint_positions"].columns]

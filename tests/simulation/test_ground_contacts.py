@@ -51,9 +51,9 @@ def walk(quadruped: Robot) -> Controller:
     """A gait that leaves the flat ground around the start, made without a search."""
     rng = np.random.default_rng(0)
     cpg = cpg_for(quadruped)
-    drivers = [Controller(cpg, genome) for genome in rng.uniform(-1, 1, (40, cpg.weights))]
+    drivers = [Controller(cpg, genome) for genome in rng.uniform(-1, 1, (20, cpg.weights))]
     runs = [(Hypothesis(), driver) for driver in drivers]
-    way = Simulator(quadruped, 2).run(runs, 500, ["base_position"]).trajectory["base_position"]
+    way = Simulator(quadruped, 2).run(runs, 300, ["base_position"]).trajectory["base_position"]
     return drivers[int(np.argmax(np.linalg.norm(way[:, -1, :2], axis=1)))]
 
 
@@ -82,7 +82,7 @@ def changed(run: Trajectory, signal: Signal, place: object, value: float) -> Tra
     return run.with_signals({signal: values})
 
 
-@pytest.mark.parametrize("roughness", [0.0, 0.02, 0.04])
+@pytest.mark.parametrize("roughness", [0.0, 0.04])
 def test_feet_feel_the_ground_where_they_are(
     quadruped: Robot, observed: Observed, roughness: float
 ):
@@ -97,7 +97,7 @@ def test_feet_feel_the_ground_where_they_are(
 
 
 @pytest.mark.parametrize(
-    ("truth", "slope"), [("intact", ""), ("roughness=0.01", "+slope=0.1"), ("roughness=0.04", "")]
+    ("truth", "slope"), [("roughness=0.01", "+slope=0.1"), ("roughness=0.04", "")]
 )
 def test_the_right_roughness_predicts_best_though_its_bumps_are_unknown(
     quadruped: Robot, walk: Controller, observed: Observed, truth: str, slope: str

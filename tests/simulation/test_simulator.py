@@ -21,7 +21,7 @@ from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import exploding
 
-STEPS = 60
+STEPS = 40
 RECORD = ("sensors", "joint_positions", "base_position")
 
 
@@ -49,7 +49,7 @@ def bits(trajectory: Trajectory) -> list[bytes]:
 
 
 def test_a_run_has_the_same_bits_in_any_batch_order_and_number_of_threads(robot: Robot):
-    runs = some_runs(robot, 12)
+    runs = some_runs(robot, 9)
 
     def run(chosen: list[Run], threads: int) -> list[bytes]:
         return bits(Simulator(robot, threads).run(chosen, STEPS, SIGNALS).trajectory)
@@ -58,13 +58,12 @@ def test_a_run_has_the_same_bits_in_any_batch_order_and_number_of_threads(robot:
     assert len(set(expected)) == len(runs)  # else equality would say nothing
     assert run(runs, 3) == expected
     assert run(runs[::-1], 2) == expected[::-1]
-    for size in (1, 5):
-        parts = [run(runs[i : i + size], 2) for i in range(0, len(runs), size)]
-        assert [own for part in parts for own in part] == expected
+    parts = [run(runs[i : i + 4], 2) for i in range(0, len(runs), 4)]
+    assert [own for part in parts for own in part] == expected
 
 
-def test_a_run_does_not_depend_on_what_the_simulator_ran_before_and_is_counted(robot: Robot):
-    runs, simulator = some_runs(robot, 6), Simulator(robot, 2)
+def test_a_run_does_not_depend_on_what_the_simulator_ran_before_and_is_counted(quadruped: Robot):
+    runs, simulator = some_runs(quadruped, 6), Simulator(quadruped, 2)
     first = simulator.run(runs, STEPS, SIGNALS).trajectory
     simulator.run(runs[::-1], 7, ["sensors"])
     again = simulator.run(runs, STEPS, SIGNALS).trajectory
@@ -76,7 +75,7 @@ def test_a_run_does_not_depend_on_what_the_simulator_ran_before_and_is_counted(r
 
 
 def test_the_physical_robot_in_simulation_has_the_same_bits_but_for_what_is_random(robot: Robot):
-    runs, steps = some_runs(robot, 9), 150
+    runs, steps = some_runs(robot, 9), 60
     simulated = Simulator(robot, 2).run(runs, steps, SIGNALS).trajectory
     for i, (hypothesis, controller) in enumerate(runs):
         samples = SimulatedRobot(robot, hypothesis).run(controller, steps)
@@ -104,12 +103,12 @@ def test_readings_are_what_the_paper_says_and_only_what_is_asked_for_is_recorded
         trajectory["base_position"]
 
 
-def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):
-    runs = some_runs(robot, 6)
-    expected = Simulator(robot, 2).run(runs, 150, SIGNALS).trajectory
-    simulator = Simulator(robot, 2)
-    bad = exploding(simulator, f"jam:{robot.anatomy.joints[0].name}=0.1")
-    outcome = simulator.run([*runs[:2], (bad, runs[0][1]), *runs[2:]], 150, SIGNALS)
+def test_a_diverging_simulation_is_flagged_counted_and_alone(quadruped: Robot):
+    runs = some_runs(quadruped, 6)
+    expected = Simulator(quadruped, 2).run(runs, 60, SIGNALS).trajectory
+    simulator = Simulator(quadruped, 2)
+    bad = exploding(simulator, "jam:front_left_knee=0.1")
+    outcome = simulator.run([*runs[:2], (bad, runs[0][1]), *runs[2:]], 60, SIGNALS)
 
     assert outcome.diverged.tolist() == [False, False, True, False, False, False, False]
     assert simulator.stats.diverged == 1
@@ -118,7 +117,8 @@ def test_a_diverging_simulation_is_flagged_counted_and_alone(robot: Robot):
         assert np.array_equal(others, expected[signal]), signal
 
 
-def test_members_of_an_ensemble_without_a_gap_do_what_each_kind_of_fault_does(robot: Robot):
+def test_members_of_an_ensemble_without_a_gap_do_what_each_kind_of_fault_does(quadruped: Robot):
+    robot = quadruped
     hypotheses = [INTACT, *(Hypothesis(k.candidates(robot.anatomy)[-1:]) for k in ALL_KINDS)]
     (controller,) = random_controllers(robot, 1)
     simulator = Simulator(robot, 1)

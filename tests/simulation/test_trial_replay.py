@@ -43,12 +43,14 @@ def replayed(path: Path, truth: str, threads: int = 1) -> Replay:
     return replay(log.trial, parse(truth, robot.anatomy), Simulator(robot, threads))
 
 
-@pytest.mark.parametrize("name", sorted(ROBOTS))
-def test_every_case_replays_to_the_bit_from_its_log_alone(name: str, tmp_path: Path):
+@pytest.mark.parametrize(("name", "first"), [("quadruped", 0), ("hexapod", 1)])
+def test_every_second_case_replays_to_the_bit_from_its_log_alone(
+    name: str, first: int, tmp_path: Path
+):
     entry = ROBOTS[name]
     robot = entry.robot()
-    for case, truth in entry.cases.items():
-        steps = 1000 if case == 1 else 60
+    for case, truth in list(entry.cases.items())[first::2]:
+        steps = 200 if case == 1 else 30
         (controller,) = random_controllers(robot, 1, seed=case)
         found = replayed(logged(tmp_path, robot, truth, controller, steps), truth, 1 + case % 2)
 
@@ -58,12 +60,10 @@ def test_every_case_replays_to_the_bit_from_its_log_alone(name: str, tmp_path: P
         (tmp_path / "trial.mcap").unlink()
 
 
-@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee+sensor:back_right_touch"])
-def test_a_trial_that_oscillators_drove_replays_to_the_bit(
-    robot: Robot, truth: str, tmp_path: Path
-):
-    (driver,) = random_cpgs(robot, 1)
-    path = logged(tmp_path, robot, truth, driver)
+def test_a_trial_that_oscillators_drove_replays_to_the_bit(quadruped: Robot, tmp_path: Path):
+    truth = "break:front_left_knee+sensor:back_right_touch"
+    (driver,) = random_cpgs(quadruped, 1)
+    path = logged(tmp_path, quadruped, truth, driver)
 
     assert read_log(path).trial.plan.controller == driver
     assert replayed(path, truth, 2).identical

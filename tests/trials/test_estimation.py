@@ -58,16 +58,15 @@ def changed(run: Trajectory, **signals: np.ndarray) -> Trajectory:
 (RUN,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
 
 
-@pytest.mark.parametrize("text", ["intact", "break:{joint}", "jam:{joint}=0.2"])
-def test_without_noise_the_state_is_what_was_logged_to_the_bit(robot: Robot, text: str):
-    joint = robot.anatomy.joints[0].name
-    for run in runs(robot, text.format(joint=joint), smooth(robot, 4, 200), 200):
+@pytest.mark.parametrize("text", ["intact", "break:front_left_knee"])
+def test_without_noise_the_state_is_what_was_logged_to_the_bit(text: str):
+    for run in runs(QUADRUPED, text, smooth(QUADRUPED, 2, 200), 200):
         assert set(estimated_states(run)) == set(STATE)
         assert is_as_logged(run)
 
 
 def test_without_noise_a_jerky_or_trembling_run_is_what_was_logged_too():
-    drivers = random_controllers(QUADRUPED, 12)
+    drivers = random_controllers(QUADRUPED, 4)
     assert all(is_as_logged(run) for run in runs(QUADRUPED, "intact", drivers))
     for name in ("suite-cheetah-run", "suite-swimmer-swimmer6"):
         robot = entry(name).robot()
