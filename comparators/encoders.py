@@ -14,7 +14,7 @@ for a reality gap, and is larger than the motion of many a joint.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,8 +45,7 @@ MIN_KNOWN, MIN_VARIANCE = 20, 1e-6
 """Known rows that a fit needs, and their variance, rad^2: that of a milliradian."""
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedMotion:
+class LoggedMotion(NamedTuple):
     """Motion of the encoders in the segments of a trial.
 
     The motion is a mean square deviation, rad^2; NaN without enough known angles.
@@ -113,12 +112,7 @@ def encoder_motion_loss(simulated: Trajectory, logged: LoggedMotion) -> FloatArr
 
 
 def _motion(angles: FloatArray, known: BoolArray) -> FloatArray:
-    """Returns the mean square deviation from the mean over the rows, ``(..., segments, hinges)``.
-
-    Args:
-        angles: ``(..., segments, rows, hinges)``.
-        known: Mask of the rows that count, ``(segments, rows, hinges)``.
-    """
+    """Returns the mean square deviation from the mean over the known rows."""
     mean = _mean(angles, known)[..., np.newaxis, :]
     return _mean(np.square(angles - mean), known)
 
@@ -157,8 +151,7 @@ def hinge_losses(
     return np.where(simulated.hinge_mask("detached")[:, np.newaxis], np.nan, total)
 
 
-@dataclass(frozen=True, eq=False)
-class LooseEncoders:
+class LooseEncoders(NamedTuple):
     """Angles of encoders that follow commands, and the readings that are derived from them.
 
     Attributes:
@@ -184,7 +177,7 @@ def loose_encoders(
     """Returns the encoders of a trial that follow commands; None if there are none.
 
     Encoders of intact joints may be among them: they are used only for hypotheses that detach the
-    joint. The arguments are those of ``logged_motion``.
+    joint.
     """
     commands, logged = trajectory["commands"], trajectory["joint_positions"]
     filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
@@ -221,24 +214,18 @@ def with_loose_encoders(simulated: Trajectory, loose: LooseEncoders) -> Mapping[
         "joint_velocities": (loose.hinges, loose.velocities, loose.hinges),
         "sensors": (loose.sensors, loose.readings, loose.hinges[loose.source]),
     }
-    signals = dict(simulated.signals)
-    for signal in followed.keys() & signals.keys():
-        signals[signal] = changed = signals[signal].copy()
-        for k, (column, hinge) in enumerate(zip(*followed[signal][::2], strict=True)):
-            changed[detached[:, hinge], :, :, column] = followed[signal][1][:, :, k]
-    return signals
+    changed = {signal: simulated[signal].copy() for signal in followed}
+    for signal, (columns, values, hinges) in followed.items():
+        for k, (column, hinge) in enumerate(zip(columns, hinges, strict=True)):
+            changed[signal][detached[:, hinge], :, :, column] = values[:, :, k]
+    return {**simulated.signals, **changed}
 
 
 def _following(angles: FloatArray, filtered: FloatArray, first: int) -> FloatArray | None:
     """Returns the linear function of one motor's commands that an encoder follows, ``(steps,)``.
 
-    Args:
-        angles: Logged angles, ``(steps,)`` rad.
-        filtered: Commands after each low-pass filter, ``(steps, filters * motors)``.
-        first: First row of the fit: the limb may be lost during the trial.
-
-    Returns:
-        None if the encoder is not such a function, or stands.
+    It is fitted from a first row on, because the limb may be lost during the trial. None if the
+    encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
     for column in filtered.T:

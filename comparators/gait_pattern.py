@@ -1,6 +1,6 @@
 """Difference of gait patterns: rhythm, phase and footfall sequence, whatever the time shift."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.sensor_series import geman_mcclure, observed_signals
+from selfmodel.diagnosis.comparator import Prepared
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Trajectory
@@ -19,7 +20,6 @@ MAX_WINDOWS = 4
 """Windows of a trial, at most."""
 MIN_WINDOW = 100
 """Control steps of a window, at least, unless the trial is shorter."""
-
 
 LARGE_DIFFERENCES: Mapping[str, float] = {
     "duty": 0.1,
@@ -33,6 +33,9 @@ LARGE_DIFFERENCES: Mapping[str, float] = {
 
 The units are a part of the time, a part of the transitions, coherency, Hz, and for the last two the
 unit of the column (radians, or readings)."""
+
+Gait = dict[str, FloatArray]
+"""Features of gaits by their group; those of phase are complex."""
 
 MAX_FREQUENCY = 8.0
 """Upper frequency of a gait, Hz; faster motion is contact noise."""
@@ -76,7 +79,7 @@ class GaitPattern:
 
     name: str = "gait-pattern"
 
-    def prepare(self, trial: Trial) -> "PreparedGait":
+    def prepare(self, trial: Trial) -> Prepared:
         """Returns the gait of the trial, from its observed readings and joint positions."""
         signals = observed_signals(trial, SIGNALS, self.name)
         logged = np.concatenate([trial.trajectory[signal] for signal in signals], axis=-1)
@@ -89,14 +92,27 @@ class GaitPattern:
         known = _observed_features(in_windows, readings)
         share = np.stack([known[group].any(axis=-1) for group in LARGE_DIFFERENCES], axis=-1).mean()
         gait_of = partial(
-            Gait, observed=observed, readings=readings, timestep=timestep, windows=windows
+            _gait, observed=observed, readings=readings, timestep=timestep, windows=windows
         )
         gait = gait_of(logged[np.newaxis])
-        return PreparedGait(ClosedLoop(record=signals), gait_of, gait, known, float(share))
+
+        def losses(simulated: Trajectory) -> FloatArray:
+            """Returns the loss of each group of features in each window, ``(n, pieces)``."""
+            values = np.concatenate([simulated[signal] for signal in signals], axis=-1)
+            differences = _differences(gait_of(values), gait, 1 / (length * timestep))
+            by_group = [
+                _masked_mean(geman_mcclure(differences[group] / large), known[group])
+                for group, large in LARGE_DIFFERENCES.items()
+            ]
+            return np.asarray((np.stack(by_group, axis=-1) / float(share)).reshape(len(values), -1))
+
+        return Prepared(ClosedLoop(record=signals), losses)
 
 
-class Gait:
-    """Gait features of many runs, by windows of equal length.
+def _gait(
+    values: FloatArray, observed: BoolArray, readings: int, timestep: float, windows: int
+) -> Gait:
+    """Returns the gait features of many runs, by windows of equal length.
 
     Source: Hildebrand (1965) for duty factor, phase and footfall sequence; see ``GaitPattern``.
 
@@ -107,88 +123,48 @@ class Gait:
         timestep: Control time step, s.
         windows: Number of windows; steps that are left over at the end are ignored.
 
-    Attributes:
-        duty: Part of the time that each reading is on, ``(n, windows, readings)``.
-        sequence: Frequency of each transition from an onset to the next, as a part of all,
-            ``(n, windows, readings²)``.
-        phase: Complex coherency of every two columns, ``(n, windows, pairs)``.
-        rhythm: Part of all power up to each frequency, ``(n, windows, frequencies)``.
-        posture: Mean of each column, ``(n, windows, columns)``.
-        excursion: Standard deviation of each column, ``(n, windows, columns)``.
-        resolution: Difference of neighbouring frequencies, Hz.
+    Returns:
+        By group, ``(n, windows, features)`` each: the part of the time that each reading is on; the
+        frequency of each transition from an onset to the next, as a part of all; the complex
+        coherency of every two columns; the part of all power up to each frequency; mean and
+        standard deviation of each column.
     """
-
-    def __init__(
-        self, values: FloatArray, observed: BoolArray, readings: int, timestep: float, windows: int
-    ) -> None:
-        runs, steps, columns = values.shape
-        length = steps // windows
-        whole = windows * length
-        seen = observed[:whole].reshape(windows, length, columns)
-        kept = np.zeros((runs, windows, length, columns))
-        np.copyto(kept, values[:, :whole].reshape(kept.shape), where=seen)
-        # Without a taper, the parts of strides at both ends would depend on the time shift.
-        taper = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-        share = np.where(seen.any(axis=1), taper @ seen, 1)
-        self.posture = taper @ kept / share
-        on = kept[..., :readings] > ON_LEVEL
-        self.duty = taper @ on / share[:, :readings]
-        self.sequence = _sequence(on, taper)
-        kept -= self.posture[:, :, np.newaxis]
-        if not seen.all():
-            kept *= seen
-        self.excursion = np.sqrt(taper @ np.square(kept) / share)
-        self.resolution = 1 / (length * timestep)
-        self.phase, self.rhythm = _spectral(
-            kept, taper, max(1, int(MAX_FREQUENCY / self.resolution))
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedGait:
-    """A trial prepared for ``GaitPattern``.
-
-    Attributes:
-        request: A closed-loop rollout that records the observed signals.
-        gait_of: Gait of the values of many runs, as ``Gait`` takes them.
-        gait: The gait of the trial.
-        known: Mask of the features with an observation, by group, ``(windows, features)`` each.
-        share: Share of the groups and windows with an observation.
-    """
-
-    request: ClosedLoop
-    gait_of: Callable[[FloatArray], Gait]
-    gait: Gait
-    known: Mapping[str, BoolArray]
-    share: float
-
-    def losses(self, simulated: Trajectory) -> FloatArray:
-        """Returns the loss of each group of features in each window, ``(n, windows * groups)``."""
-        values = np.concatenate([simulated[signal] for signal in self.request.record], axis=-1)
-        differences = _differences(self.gait_of(values), self.gait)
-        losses = [
-            _masked_mean(geman_mcclure(differences[group] / large), self.known[group])
-            for group, large in LARGE_DIFFERENCES.items()
-        ]
-        return np.asarray((np.stack(losses, axis=-1) / self.share).reshape(len(values), -1))
+    runs, steps, columns = values.shape
+    length = steps // windows
+    whole = windows * length
+    seen = observed[:whole].reshape(windows, length, columns)
+    kept = np.zeros((runs, windows, length, columns))
+    np.copyto(kept, values[:, :whole].reshape(kept.shape), where=seen)
+    # Without a taper, the parts of strides at both ends would depend on the time shift.
+    taper = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+    share = np.where(seen.any(axis=1), taper @ seen, 1)
+    posture = taper @ kept / share
+    on = kept[..., :readings] > ON_LEVEL
+    kept -= posture[:, :, np.newaxis]
+    if not seen.all():
+        kept *= seen
+    resolution = 1 / (length * timestep)  # difference of neighbouring frequencies, Hz
+    phase, rhythm = _spectral(kept, taper, max(1, int(MAX_FREQUENCY / resolution)))
+    return {
+        "duty": taper @ on / share[:, :readings],
+        "sequence": _sequence(on, taper),
+        "phase": phase,
+        "rhythm": rhythm,
+        "posture": posture,
+        "excursion": np.sqrt(taper @ np.square(kept) / share),
+    }
 
 
-def _differences(one: Gait, other: Gait) -> dict[str, FloatArray]:
+def _differences(one: Gait, other: Gait, resolution: float) -> Gait:
     """Returns the differences of two sets of gaits, by group, ``(n, windows, features)`` each.
 
     A sequence and a rhythm are one feature each: the part of the transitions that differ, and the
     earth mover's distance of the power spectra, Hz.
     """
-    sequence = np.abs(one.sequence - other.sequence).sum(axis=-1, keepdims=True) / 2
-    rhythm = np.abs(one.rhythm - other.rhythm).sum(axis=-1, keepdims=True) * one.resolution
-    return {
-        "duty": np.abs(one.duty - other.duty),
-        "sequence": sequence,
-        "phase": np.abs(one.phase - other.phase),
-        "rhythm": rhythm,
-        "posture": np.abs(one.posture - other.posture),
-        "excursion": np.abs(one.excursion - other.excursion),
-    }
+    differences = {group: np.abs(one[group] - other[group]) for group in LARGE_DIFFERENCES}
+    for group, unit in (("sequence", 0.5), ("rhythm", resolution)):
+        differences[group] = differences[group].sum(axis=-1, keepdims=True) * unit
+    return differences
 
 
 def _observed_features(observed: BoolArray, readings: int) -> dict[str, BoolArray]:

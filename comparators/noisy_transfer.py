@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.comparators.sensor_series import observed_signals, padded_windows
+from selfmodel.diagnosis.comparator import Prepared
 from selfmodel.simulation.requests import Ensemble
 from selfmodel.trials.signals import ENSEMBLE_DEVIATION_FLOORS, Signal, comparable
 from selfmodel.trials.trajectory import Trajectory
@@ -51,18 +54,18 @@ class NoisyTransfer:
     members: int = 6
     level: float = 0.05
 
-    def prepare(self, trial: Trial) -> "PreparedFeatures":
+    def prepare(self, trial: Trial) -> Prepared:
         """Returns the features of the trial, of the signals that were observed."""
         signals = observed_signals(trial, ENSEMBLE_DEVIATION_FLOORS, self.name)
         features = {signal: _trial_features(signal, trial.trajectory[signal]) for signal in signals}
         weight = np.zeros(-(-trial.trajectory.steps // WINDOW))
         for each in features.values():
             weight += each.weight.sum(axis=1)
-        return PreparedFeatures(Ensemble(signals, self.members, self.level), features, weight)
+        request = Ensemble(signals, self.members, self.level)
+        return Prepared(request, partial(_losses, features, weight))
 
 
-@dataclass(frozen=True, eq=False)
-class TrialFeatures:
+class TrialFeatures(NamedTuple):
     """The features of one signal of a trial.
 
     Attributes:
@@ -78,46 +81,33 @@ class TrialFeatures:
     floor: float
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedFeatures:
-    """A trial prepared for ``NoisyTransfer``.
+def _losses(
+    features: Mapping[Signal, TrialFeatures], weight: FloatArray, simulated: Trajectory
+) -> FloatArray:
+    """Returns the loss of each window with an observation, ``(n, windows)``.
 
-    Attributes:
-        request: An ensemble that records the observed signals.
-        features: Features of each observed signal.
-        weight: Sum of the weights in each window, ``(windows,)``; 0 if nothing was observed.
+    ``weight`` is the sum of the weights in each window, 0 if nothing was observed.
     """
-
-    request: Ensemble
-    features: Mapping[Signal, TrialFeatures]
-    weight: FloatArray
-
-    def losses(self, simulated: Trajectory) -> FloatArray:
-        """Returns the loss of each window with an observation, ``(n, windows)``."""
-        total = np.zeros((len(simulated[self.request.record[0]]), len(self.weight)))
-        for signal, features in self.features.items():
-            # One hypothesis at a time: its members fit in the CPU cache, and no result depends on
-            # the other hypotheses.
-            for hypothesis, members in enumerate(simulated[signal]):
-                difference = _features(comparable(signal, members), features.observed)
-                difference -= features.values
-                shortfall = _likelihood_shortfall(difference, features.floor)
-                total[hypothesis] += (shortfall * features.weight).sum(axis=1)
-        some = self.weight > 0
-        # In C order: the order in memory is the order in which a mean adds.
-        return np.ascontiguousarray(total[:, some] / self.weight[some])
+    total = np.zeros((len(simulated[next(iter(features))]), len(weight)))
+    for signal, logged in features.items():
+        # One hypothesis at a time: its members fit in the CPU cache, and no result depends on the
+        # other hypotheses.
+        for hypothesis, members in enumerate(simulated[signal]):
+            difference = _features(comparable(signal, members), logged.observed)
+            difference -= logged.values
+            shortfall = _likelihood_shortfall(difference, logged.floor)
+            total[hypothesis] += (shortfall * logged.weight).sum(axis=1)
+    # In C order: the order in memory is the order in which a mean adds.
+    return np.ascontiguousarray(total[:, weight > 0] / weight[weight > 0])
 
 
 def _trial_features(signal: Signal, values: FloatArray) -> TrialFeatures:
     logged = comparable(signal, values)
     observed = np.isfinite(logged)
     windows = padded_windows(observed, WINDOW).any(axis=1)
-    return TrialFeatures(
-        observed=observed,
-        values=_features(logged[np.newaxis], observed),
-        weight=np.tile(windows, 2) / (2 * observed.shape[1]),
-        floor=ENSEMBLE_DEVIATION_FLOORS[signal],
-    )
+    weight = np.tile(windows, 2) / (2 * observed.shape[1])
+    values = _features(logged[np.newaxis], observed)
+    return TrialFeatures(observed, values, weight, ENSEMBLE_DEVIATION_FLOORS[signal])
 
 
 def _features(values: FloatArray, observed: BoolArray) -> FloatArray:
@@ -143,10 +133,8 @@ def _features(values: FloatArray, observed: BoolArray) -> FloatArray:
 def _likelihood_shortfall(difference: FloatArray, floor: float) -> FloatArray:
     """Returns the highest possible log likelihood of each feature less that of the trial.
 
-    Args:
-        difference: Features of the members less those of the trial,
-            ``(members, windows, features)``.
-        floor: Deviation that is added to that of the members.
+    ``difference`` are the features of the members less those of the trial,
+    ``(members, windows, features)``.
     """
     members = len(difference)
     freedom = max(members - 1, 1)

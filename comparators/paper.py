@@ -1,22 +1,22 @@
 """The paper's comparator, and one of all that the paper's robots measure."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparators.sensor_series import PreparedSeries, SensorSeries, geman_mcclure
-from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.comparators.sensor_series import SensorSeries, geman_mcclure
+from selfmodel.diagnosis.comparator import Prepared, TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 DISPLACEMENT_SHARE = 0.2
 """Share of the displacement in the distance."""
-RELATIVE_ERROR = 0.25
-"""Difference of displacements that counts as large, as a part of the trial's displacement."""
-MIN_ERROR = 0.1
-"""Lower bound of the difference that counts as large, m."""
+RELATIVE_ERROR, MIN_ERROR = 0.25, 0.1
+"""Difference of displacements that counts as large: as a part of the trial's displacement, and its
+lower bound, m."""
 
 REQUEST = ClosedLoop(record=("base_position",))
 READINGS = SensorSeries("paper-sensors", ("sensors",))
@@ -37,11 +37,7 @@ class ForwardDisplacement:
     name: str = "forward-displacement"
 
     def prepare(self, trial: Trial) -> "PreparedDisplacement":
-        """Returns the displacement of the trial.
-
-        Raises:
-            TrialRefusedError: The base's position is unknown at the first or the last step.
-        """
+        """Returns the displacement of the trial; refuses one whose way is unknown."""
         if not np.isfinite(trial.displacement):
             raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs base_position at the first and the last step, "
@@ -75,43 +71,28 @@ class PaperSensors:
     """
 
     name: str = "paper-sensors"
-    series: SensorSeries = READINGS
 
-    def prepare(self, trial: Trial) -> "PreparedPaperSensors":
+    def prepare(self, trial: Trial) -> Prepared:
         """Returns the readings and the displacement of the trial; a trial needs readings."""
-        series = self.series.prepare(trial)
+        series = READINGS.prepare(trial)
         record = (*series.request.record, "base_position")
-        return PreparedPaperSensors(series, trial.displacement, ClosedLoop(record))
+        return Prepared(ClosedLoop(record), partial(_losses, series, trial.displacement))
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedPaperSensors:
-    """A trial prepared for ``PaperSensors``.
+def _losses(series: Prepared, displacement: float, simulated: Trajectory) -> FloatArray:
+    """Returns the loss of each window, and of the displacement if the trial has one.
 
-    Attributes:
-        series: The trial prepared for the comparison of the readings.
-        displacement: Forward displacement of the trial, m; NaN if unknown.
-        request: A closed-loop rollout that records the readings and ``base_position``.
+    The losses, ``(n, windows)`` or ``(n, windows + 1)``, are weighted so that their mean is the
+    distance.
     """
-
-    series: PreparedSeries
-    displacement: float
-    request: ClosedLoop
-
-    def losses(self, simulated: Trajectory) -> FloatArray:
-        """Returns the loss of each window, and of the displacement if the trial has one.
-
-        Returns:
-            ``(n, windows)`` or ``(n, windows + 1)``, weighted so that their mean is the distance.
-        """
-        windows = self.series.losses(simulated)
-        if not np.isfinite(self.displacement):
-            return windows
-        pieces = windows.shape[1] + 1
-        large = max(RELATIVE_ERROR * abs(self.displacement), MIN_ERROR)
-        end = geman_mcclure((forward_displacement(simulated) - self.displacement) / large)
-        scaled = windows * ((1 - DISPLACEMENT_SHARE) * pieces / (pieces - 1))
-        return np.column_stack([scaled, end * (DISPLACEMENT_SHARE * pieces)])
+    windows = np.asarray(series.losses(simulated))
+    if not np.isfinite(displacement):
+        return windows
+    pieces = windows.shape[1] + 1
+    large = max(RELATIVE_ERROR * abs(displacement), MIN_ERROR)
+    end = geman_mcclure((forward_displacement(simulated) - displacement) / large)
+    scaled = windows * ((1 - DISPLACEMENT_SHARE) * pieces / (pieces - 1))
+    return np.column_stack([scaled, end * (DISPLACEMENT_SHARE * pieces)])
 
 
 FORWARD_DISPLACEMENT = ForwardDisplacement()

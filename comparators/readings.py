@@ -7,11 +7,11 @@ controller itself.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray, mean_of_known
 from selfmodel.controllers.controller import TARGET_RANGE, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES
@@ -32,8 +32,7 @@ NOISE_ERROR_SCALE = 0.05
 """Error of a predicted noise level that counts as large, in a reading's unit."""
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedReadings:
+class LoggedReadings(NamedTuple):
     """The readings of the controller in the segments of a trial.
 
     Attributes:
@@ -122,29 +121,23 @@ def command_spans(trial: Trial) -> FloatArray:
 
 def finite_mean(values: FloatArray) -> FloatArray:
     """Returns the mean of the finite values over the last two axes; 0 if there are none."""
-    known = np.isfinite(values)
-    if known.all():
+    if np.isfinite(values).all():
         return np.asarray(values.mean(axis=(-2, -1)))
-    total = np.where(known, values, 0.0).sum(axis=(-2, -1))
-    return np.asarray(total / np.maximum(known.sum(axis=(-2, -1)), 1))
+    return mean_of_known(values, axis=(-2, -1), empty=0.0)
 
 
 def noise_level_loss(predicted: FloatArray, logged: FloatArray, graded: BoolArray) -> FloatArray:
     """Returns the loss of the predicted noise levels of the sensors, ``(n,)``.
 
     Per reading, a hypothesis with noise predicts worse than one without, because its noise values
-    differ from those of the log. Noise levels are comparable.
+    differ from those of the log. Noise levels are comparable. The loss is the mean over the sensors
+    of ``log(1 + (e / NOISE_ERROR_SCALE)^2)``, with e the error of the noise level; exactly 0 if no
+    sensor has an excess of noise in the log or in the prediction.
 
     Args:
         predicted: Predicted readings, ``(n, segments, rows, sensors)``.
         logged: Logged readings, ``(segments, rows, sensors)``; NaN if unknown.
-        graded: Mask of the sensors with readings other than 0 and 1, per hypothesis,
-            ``(n, sensors)``.
-
-    Returns:
-        The mean over the sensors of ``log(1 + (e / NOISE_ERROR_SCALE)^2)``, with e the error of the
-        noise level in a reading's unit; exactly 0 if no sensor has an excess of noise in the log
-        or in the prediction, if segments have no more than ``ORDER`` rows, and without sensors.
+        graded: Mask of the sensors with readings other than 0 and 1, ``(n, sensors)``.
     """
     _, rows, sensors = logged.shape
     if rows <= ORDER or not sensors:
@@ -170,10 +163,8 @@ def _noise_level(readings: FloatArray) -> FloatArray:
     steps = np.abs(np.diff(readings, ORDER, axis=2))
     n, _, _, sensors = steps.shape
     by_sensor = steps.transpose(0, 3, 1, 2).reshape(n, sensors, -1)
-    return _median(by_sensor) / (_NORMAL_MEDIAN * math.sqrt(math.comb(2 * ORDER, ORDER)))
-
-
-_NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal variable
+    # 0.6745 is the median of the absolute value of a standard normal variable.
+    return _median(by_sensor) / (0.6745 * math.sqrt(math.comb(2 * ORDER, ORDER)))
 
 
 def _median(values: FloatArray) -> FloatArray:

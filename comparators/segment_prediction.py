@@ -7,24 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.comparators.encoders import (
-    LoggedMotion,
-    LooseEncoders,
-    encoder_motion_loss,
-    hinge_losses,
-    logged_motion,
-    loose_encoders,
-    with_loose_encoders,
-)
+from selfmodel.comparators import encoders
 from selfmodel.comparators.readings import (
-    LoggedReadings,
     arithmetic_loss,
     finite_mean,
     logged_readings,
     readings_loss,
 )
-from selfmodel.diagnosis.comparator import Losses, TrialRefusedError
-from selfmodel.simulation.requests import Segments, command_steps, cut_segments
+from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
+from selfmodel.simulation.requests import command_steps, cut_segments
 from selfmodel.trials.estimation import ONBOARD, STATE, estimated_states, known_rows
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trajectory import Trajectory
@@ -82,27 +73,47 @@ class SegmentPrediction:
         """The same comparator with a third of the segments."""
         return dataclasses.replace(self, max_segments=max(self.max_segments // 3, MIN_SEGMENTS))
 
-    def prepare(self, trial: Trial) -> "PreparedSegments":
-        """Returns the segments of the trial and the logged values to compare them with."""
+    def prepare(self, trial: Trial) -> Prepared:
+        """Returns the segments of the trial and the logged values to compare them with.
+
+        Segments with a late step are predicted, because later segments may continue from their end,
+        and have no loss.
+        """
         trajectory, horizon = trial.trajectory, self.horizon
         states = estimated_states(trajectory, self.state)
         starts, steady = self._starts(trial, states)
         compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
-        rows = starts[:, np.newaxis] + compared
+        logged = {s: values[starts[:, np.newaxis] + compared] for s, values in states.items()}
+        readings = logged_readings(trajectory["sensors"], starts, horizon)
+        motion = encoders.logged_motion(trajectory["joint_positions"], starts, horizon)
+        loose = encoders.loose_encoders(trajectory, starts, horizon)
+        arithmetic = arithmetic_loss(trial, starts, horizon)
+
+        def losses(simulated: Trajectory) -> Losses:
+            """Returns the losses of each segment without a late step."""
+            predicted = (
+                encoders.with_loose_encoders(simulated, loose) if loose else simulated.signals
+            )
+            shape = predicted["sensors"].shape[:2]
+            terms = {"commands": np.broadcast_to(arithmetic, shape)}
+            for signal, values in logged.items():
+                error = difference(signal, predicted[signal][:, :, compared], values)
+                scaled = error / PREDICTION_ERROR_SCALES[signal]
+                terms[signal] = finite_mean(np.log1p(np.square(scaled)))
+            terms["sensors"] = readings_loss(predicted["sensors"], readings, steady)
+            terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion)
+            total = np.zeros(shape)
+            for term in terms.values():
+                total += term
+            return Losses(
+                total=total if steady.all() else np.ascontiguousarray(total[:, steady]),
+                by_signal={signal: term[:, steady] for signal, term in terms.items()},
+                by_hinge=encoders.hinge_losses(simulated, logged, compared)[:, steady],
+            )
+
         request = cut_segments(trajectory, states, starts, horizon, (*self.state, "sensors"))
-        return PreparedSegments(
-            request=request,
-            compared=compared,
-            states={signal: values[rows] for signal, values in states.items()},
-            steady=steady,
-            readings=logged_readings(trajectory["sensors"], starts, horizon),
-            motion=logged_motion(trajectory["joint_positions"], starts, horizon)
-            if "joint_positions" in states
-            else None,
-            loose=loose_encoders(trajectory, starts, horizon),
-            arithmetic=arithmetic_loss(trial, starts, horizon),
-            piece_steps=(starts[:, np.newaxis] + np.array([0, horizon]))[steady],
-        )
+        piece_steps = (starts[:, np.newaxis] + np.array([0, horizon]))[steady]
+        return Prepared(request, losses, piece_steps)
 
     def _starts(
         self, trial: Trial, states: Mapping[Signal, FloatArray]
@@ -138,67 +149,6 @@ class SegmentPrediction:
                 "give a comparator that needs fewer signals, or leave this log out",
             )
         return starts[usable], steady[usable]
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedSegments:
-    """A trial prepared for ``SegmentPrediction``.
-
-    Segments with a late step are predicted, because later segments may continue from their end, and
-    have no loss.
-
-    Attributes:
-        request: The segments; the state and the readings are recorded.
-        compared: Steps within a segment at which the state is compared, ``(comparisons,)``.
-        states: Logged state at these steps, ``(segments, comparisons, width)`` for each signal.
-        steady: Mask of the segments without a late step, ``(segments,)``.
-        readings: The logged readings.
-        motion: The logged motion of the encoders; None for states without joint positions.
-        loose: Encoders that follow commands, as of a detached limb; None if there are none.
-        arithmetic: Loss of the controller's arithmetic, ``(segments,)``.
-        piece_steps: First and last step of each segment without a late step, ``(segments, 2)``.
-    """
-
-    request: Segments
-    compared: IndexArray
-    states: Mapping[Signal, FloatArray]
-    steady: BoolArray
-    readings: LoggedReadings
-    motion: LoggedMotion | None
-    loose: LooseEncoders | None
-    arithmetic: FloatArray
-    piece_steps: IndexArray
-
-    def losses(self, simulated: Trajectory) -> Losses:
-        """Returns the losses of each segment without a late step; see ``SegmentPrediction``."""
-        shape = simulated["sensors"].shape[:2]
-        terms = {"commands": np.broadcast_to(self.arithmetic, shape), **self._terms(simulated)}
-        total = np.zeros(shape)
-        for term in terms.values():
-            total += term
-        steady, by_hinge = self.steady, None
-        if self.motion is not None:
-            by_hinge = hinge_losses(simulated, self.states, self.compared)[:, steady]
-        return Losses(
-            total=total if steady.all() else np.ascontiguousarray(total[:, steady]),
-            by_signal={signal: term[:, steady] for signal, term in terms.items()},
-            by_hinge=by_hinge,
-        )
-
-    def _terms(self, simulated: Trajectory) -> dict[str, FloatArray]:
-        """Returns the loss of each predicted signal in each segment, ``(n, segments)`` each."""
-        terms: dict[str, FloatArray] = {}
-        predictions = simulated.signals
-        if self.loose is not None and self.motion is not None:
-            predictions = with_loose_encoders(simulated, self.loose)
-        for signal, logged in self.states.items():
-            predicted = predictions[signal][:, :, self.compared]
-            error = difference(signal, predicted, logged) / PREDICTION_ERROR_SCALES[signal]
-            terms[signal] = finite_mean(np.log1p(np.square(error)))
-        terms["sensors"] = readings_loss(predictions["sensors"], self.readings, self.steady)
-        if self.motion is not None:
-            terms["encoder motion"] = encoder_motion_loss(simulated, self.motion)
-        return terms
 
 
 def _all_finite(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:

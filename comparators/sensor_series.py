@@ -2,20 +2,21 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.diagnosis.comparator import Prepared, TrialRefusedError
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.trials.signals import SERIES_SPREAD_FLOORS, Signal, comparable
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
-BLOCK = 5
-"""Control steps that are averaged before the comparison, to reduce noise and jitter."""
-BLOCKS = 5
-"""Blocks of a window."""
+BLOCK, BLOCKS = 5, 5
+"""Control steps that are averaged before the comparison, to reduce noise and jitter, and blocks of
+a window."""
 WINDOW = BLOCK * BLOCKS
 """Control steps of a window."""
 DECAY = 400.0
@@ -53,11 +54,10 @@ class SensorSeries:
     name: str = "sensor-series"
     signals: tuple[Signal, ...] = tuple(SERIES_SPREAD_FLOORS)
 
-    def prepare(self, trial: Trial) -> "PreparedSeries":
+    def prepare(self, trial: Trial) -> Prepared:
         """Returns the observed series of the trial, with their scales and weights."""
         signals = observed_signals(trial, self.signals, self.name)
-        steps = trial.trajectory.steps
-        windows = -(-steps // WINDOW)
+        windows = -(-trial.trajectory.steps // WINDOW)
         columns = {
             signal: _scaled_columns(signal, trial.trajectory[signal], windows) for signal in signals
         }
@@ -67,16 +67,11 @@ class SensorSeries:
         # The decay begins at the first window with an observation.
         age = np.arange(windows) - np.flatnonzero(weight)[0]
         decay = np.exp(-np.maximum(age, 0) * (WINDOW / DECAY)) * (weight > 0)
-        return PreparedSeries(
-            request=ClosedLoop(record=signals),
-            columns=columns,
-            weight=np.where(weight > 0, weight, 1),
-            relative_decay=decay / decay.mean(),
-        )
+        weights = np.where(weight > 0, weight, 1), decay / decay.mean()
+        return Prepared(ClosedLoop(record=signals), partial(_losses, columns, *weights))
 
 
-@dataclass(frozen=True, eq=False)
-class ScaledColumns:
+class ScaledColumns(NamedTuple):
     """The columns of one signal of a trial, with their scales and weights.
 
     Attributes:
@@ -93,36 +88,32 @@ class ScaledColumns:
     share: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedSeries:
-    """A trial prepared for ``SensorSeries``.
+def _losses(
+    series: Mapping[Signal, ScaledColumns],
+    weight: FloatArray,
+    relative_decay: FloatArray,
+    simulated: Trajectory,
+) -> FloatArray:
+    """Returns the loss of each window, weighted so that their mean is the distance.
 
-    Attributes:
-        request: A closed-loop rollout that records the observed signals.
-        columns: The columns of each observed signal.
+    Args:
+        series: The columns of each observed signal.
         weight: Sum of the shares in each window, ``(windows,)``; 1 if nothing was observed.
         relative_decay: Weight of each window over the mean weight, ``(windows,)``; 0 if nothing was
             observed.
+        simulated: The simulations.
     """
-
-    request: ClosedLoop
-    columns: Mapping[Signal, ScaledColumns]
-    weight: FloatArray
-    relative_decay: FloatArray
-
-    def losses(self, simulated: Trajectory) -> FloatArray:
-        """Returns the loss of each window, weighted so that their mean is the distance."""
-        runs, windows = len(simulated[self.request.record[0]]), len(self.weight)
-        steps = len(next(iter(self.columns.values())).logged)
-        lagged = np.clip(np.arange(steps) + np.array(LAGS)[:, np.newaxis], 0, steps - 1)
-        loss = np.zeros((len(LAGS), runs, windows))
-        for signal, columns in self.columns.items():
-            values = comparable(signal, simulated[signal])
-            for lag, rows in enumerate(lagged):
-                blocks = _block_sums(values[:, rows] - columns.logged, columns.observed)
-                terms = geman_mcclure(blocks / columns.scale).reshape(runs, windows, -1)
-                loss[lag] += (terms * columns.share).sum(axis=2)
-        return np.asarray(loss.min(axis=0) / self.weight * self.relative_decay)
+    runs = len(simulated[next(iter(series))])
+    steps = len(next(iter(series.values())).logged)
+    lagged = np.clip(np.arange(steps) + np.array(LAGS)[:, np.newaxis], 0, steps - 1)
+    loss = np.zeros((len(LAGS), runs, len(weight)))
+    for signal, columns in series.items():
+        values = comparable(signal, simulated[signal])
+        for lag, rows in enumerate(lagged):
+            blocks = _block_sums(values[:, rows] - columns.logged, columns.observed)
+            terms = geman_mcclure(blocks / columns.scale).reshape(runs, len(weight), -1)
+            loss[lag] += (terms * columns.share).sum(axis=2)
+    return np.asarray(loss.min(axis=0) / weight * relative_decay)
 
 
 def _scaled_columns(signal: Signal, values: FloatArray, windows: int) -> ScaledColumns:
@@ -130,12 +121,8 @@ def _scaled_columns(signal: Signal, values: FloatArray, windows: int) -> ScaledC
     observed = np.isfinite(logged)
     counts = _block_sums(np.ones((1, *observed.shape)), observed)[0]
     share = (counts > 0) / (BLOCKS * observed.shape[1])
-    return ScaledColumns(
-        logged=logged,
-        observed=observed,
-        scale=np.maximum(counts, 1) * _spread(logged, observed, SERIES_SPREAD_FLOORS[signal]),
-        share=share.reshape(windows, -1),
-    )
+    scale = np.maximum(counts, 1) * _spread(logged, observed, SERIES_SPREAD_FLOORS[signal])
+    return ScaledColumns(logged, observed, scale, share.reshape(windows, -1))
 
 
 def _block_sums(values: FloatArray, observed: BoolArray) -> FloatArray:
@@ -156,11 +143,7 @@ def _spread(logged: FloatArray, observed: BoolArray, floor: float) -> FloatArray
 def observed_signals(
     trial: Trial, signals: Iterable[Signal], comparator: str
 ) -> tuple[Signal, ...]:
-    """Returns the signals that a comparator can use and that have a finite value in the trial.
-
-    Raises:
-        TrialRefusedError: The trial has none of the signals.
-    """
+    """Returns the signals that have a finite value in the trial; refuses a trial without any."""
     wanted = tuple(signals)
     observed = tuple(signal for signal in wanted if np.isfinite(trial.trajectory[signal]).any())
     if not observed:

@@ -1,10 +1,10 @@
 """Comparator interface: losses of simulated trajectories against a logged trial."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
 from selfmodel.trials.trajectory import Trajectory
@@ -48,7 +48,7 @@ class PreparedTrial(Protocol):
         """The simulation that a comparison with the trial requires."""
         ...
 
-    def distances(self, simulated: Trajectory) -> FloatArray:
+    def distances(self, simulated: Trajectory, /) -> FloatArray:
         """Returns the distance of each simulation from the trial.
 
         The result depends on the prepared trial and the argument alone; neither is changed.
@@ -79,7 +79,7 @@ class PiecewiseTrial(Protocol):
         """The simulation that a comparison with the trial requires."""
         ...
 
-    def losses(self, simulated: Trajectory) -> "FloatArray | Losses":
+    def losses(self, simulated: Trajectory, /) -> "FloatArray | Losses":
         """Returns the loss of each segment, window or step of the trial.
 
         Args:
@@ -114,6 +114,15 @@ class Losses:
         by_hinge = None if self.by_hinge is None else self.by_hinge[row]
         by_signal = {signal: losses[row] for signal, losses in self.by_signal.items()}
         return Losses(self.total[row], by_signal, by_hinge)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A ``PiecewiseTrial`` of a request and a function that returns the losses."""
+
+    request: Request
+    losses: Callable[[Trajectory], FloatArray | Losses]
+    piece_steps: IndexArray | None = None
 
 
 class TrialRefusedError(InputError):

@@ -100,7 +100,7 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int):
 
     expected = np.zeros_like(found)
     for signal in JOINTS:
-        steps = prepared.compared
+        steps = [3, 6, 9, 12]
         errors = (wrong[signal] - exact[signal])[:, :, steps][..., others]
         expected += np.log1p(np.square(errors / PREDICTION_ERROR_SCALES[signal])).mean(axis=(2, 3))
     expected += motion_loss(walking, wrong["joint_positions"], others)
