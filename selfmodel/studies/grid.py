@@ -15,7 +15,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from multiprocessing import resource_tracker
@@ -175,7 +175,7 @@ def _computed(
     ready: list[str] = []
     running: dict[Future[Answer], str] = {}
     failed: set[str] = set()
-    with nullcontext(given) if given is not None else Processes(limit) as executor:
+    with _until_all_end(given, running) if given else Processes(limit) as executor:
         while graph.is_active():
             ready = sorted([*ready, *graph.get_ready()], key=rank.__getitem__)
             answers: dict[str, Answer] = {}
@@ -192,6 +192,15 @@ def _computed(
                 graph.done(place)
                 failed |= set() if answer[1] is None else {place}
                 yield cells[place], answer
+
+
+@contextmanager
+def _until_all_end(executor: Executor, running: Iterable["Future[Answer]"]) -> Iterator[Executor]:
+    """Context manager that leaves no cell behind it, which would still write into the folder."""
+    try:
+        yield executor
+    finally:
+        wait([future for future in running if not future.cancel()])
 
 
 def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]":

@@ -283,7 +283,8 @@ def test_a_full_disk_and_an_executor_that_has_ended_end_the_grid(
     with monkeypatch.context() as patched:
         patched.setattr(cell_files, "replace_file", full)
         with pytest.raises(OSError, match="No space left"):
-            study.run(cells(study.notes, 3))
+            study.run(cells(study.notes, 3, seconds=0.05))
+    assert not study.names(), "a cell went on after the end of the grid"
     study.threads.shutdown()
     with pytest.raises(WorkError, match=r"takes no more cells .* the same command continues"):
         study.run(cells(study.notes, 1))
