@@ -7,15 +7,19 @@ import pytest
 from selfmodel.report.content import shots_of
 from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject, subject_of_run
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import selfmodel
+
+RECOVER = (
+    *("recover", "quadruped", "--case", "2", "--gap", "0.1", "--population", "6"),
+    *("--generations", "1", "--steps", "40", "--trials", "1", "--out", "run"),
+)
 
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a small recovery."""
     folder = tmp_path_factory.mktemp("report")
-    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--gap", "0.1")
-    done = selfmodel("recover", "quadruped", *arguments, "--out", "run", cwd=folder)
+    done = selfmodel(*RECOVER, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder / "run"
 

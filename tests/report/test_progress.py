@@ -16,8 +16,9 @@ from selfmodel.report.progress import Progress
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_controllers
+from tests.report.conftest import RECOVER
 
 
 def recorded(folder: Path, robot: Robot) -> Progress:
@@ -90,8 +91,7 @@ def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
         path.write_bytes(data)
 
     monkeypatch.setattr("selfmodel.report.progress.replace_file", kept)
-    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--gap", "0.1")
-    done = selfmodel("recover", "quadruped", *arguments, "--report", "--out", "run", cwd=tmp_path)
+    done = selfmodel(*RECOVER, "--report", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert f"report: {Path('run') / 'report.html'}" in done.stderr
@@ -121,8 +121,7 @@ def test_a_recovery_that_is_interrupted_leaves_the_last_report(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("selfmodel.studies.experiment.is_correct", stopped)
-    arguments = ("--case", "2", *SMALL, "--steps", "60", "--trials", "1", "--no-calibrate")
-    done = selfmodel("recover", "quadruped", *arguments, "--report", "--out", "run", cwd=tmp_path)
+    done = selfmodel(*RECOVER, "--no-calibrate", "--report", cwd=tmp_path)
 
     assert done.returncode != 0
     assert "The recovery is not finished: " in (tmp_path / "run" / "report.html").read_text()

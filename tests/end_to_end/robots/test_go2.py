@@ -6,8 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.go2.sample import positions_and_commands, robot_on_stand, simulated
-from benchmarks.go2.study import FITTED, better_hypotheses, robot_of
+from benchmarks.go2.recording import (
+    FITTED,
+    better_hypotheses,
+    positions_and_commands,
+    robot_of,
+    robot_on_stand,
+    simulated,
+)
 from selfmodel.robot.robot import Robot
 from tests.helpers.go2 import recorded
 

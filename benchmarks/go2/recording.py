@@ -1,25 +1,32 @@
-"""The recording of a Unitree Go2 on a stand: its model, its trials, and faults put into it.
+"""The recording of a Unitree Go2 on a stand: its model, its trials, and what predicts it.
 
 The recording and the model are in ``../shared/samples/go2-stand`` (see its README). The model has
 motors of torque, and the robot's controller is a position servo, so the motors become servos with
 the gains of that README.
 """
 
+import copy
 import tempfile
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.controllers.playback import played_back
-from selfmodel.faults.build import build
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.significance import is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.joints import WEAK_MOTOR
+from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy import split_delay
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.model_factors import with_model
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -27,6 +34,9 @@ from selfmodel.trials.trial import Trial, TrialPlan
 SAMPLE = Path(__file__).parents[3] / "shared" / "samples" / "go2-stand"
 RATE = 200
 """Control steps per second."""
+
+FITTED, ALL = 10 * RATE, 15 * RATE
+"""Steps that the model is fitted to, and all steps."""
 
 _SETTINGS = {"base": "fixed", "kp": 20, "kd": 1.5, "control_timestep": 1 / RATE}
 _PHYSICS_TIMESTEP = 0.0025
@@ -52,7 +62,7 @@ def positions_and_commands(robot: Robot, sample: Path = SAMPLE) -> tuple[FloatAr
 
 
 def trial_of(
-    robot: Robot, positions: FloatArray, commands: FloatArray, first: int = 0, last: int = 3000
+    robot: Robot, positions: FloatArray, commands: FloatArray, first: int = 0, last: int = ALL
 ) -> Trial:
     """Returns a part of the recording as a trial; it has joint positions and commands only."""
     names, steps = robot.anatomy.names, last - first
@@ -69,17 +79,12 @@ def trial_of(
     )
 
 
-def simulated(
-    robot: Robot,
-    positions: FloatArray,
-    commands: FloatArray,
-    hypothesis: Hypothesis = INTACT,
-) -> FloatArray:
+def simulated(robot: Robot, positions: FloatArray, commands: FloatArray) -> FloatArray:
     """Returns the simulated joint positions of the whole recording, ``(steps, hinges)``.
 
     The simulation begins at the first measured positions, at rest, and continues to the end.
     """
-    model = build(robot, hypothesis).model
+    model = robot.model
     data = mujoco.MjData(model)
     hinges = [int(model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]
     data.qpos[hinges] = positions[0]
@@ -94,17 +99,34 @@ def simulated(
     return np.array(found)
 
 
-def with_fault(
-    trial: Trial, robot: Robot, positions: FloatArray, commands: FloatArray, fault: Hypothesis
-) -> Trial:
-    """Returns the trial of the whole recording as if the robot had a fault.
+def robot_of(robot: Robot, fit: dict[str, Any]) -> Robot:
+    """Returns the robot with the parameters and the delay of a fit."""
+    model = copy.copy(robot.model)
+    fields = {"damping": "dof_damping", "dry friction": "dof_frictionloss"}
+    fields["armature"] = "dof_armature"
+    for row in fit["parameters"]:
+        if row["quantity"] == "gain":
+            motor = model.actuator(row["name"]).id
+            model.actuator_gainprm[motor] *= row["value"]
+            model.actuator_biasprm[motor] *= row["value"]
+        else:
+            dof = model.joint(row["name"]).dofadr[0]
+            getattr(model, fields[row["quantity"]])[dof] = row["value"]
+    return with_model(robot, model, fit["delay"])
 
-    Simulated positions with the fault minus those without, both by the given model, are added to
-    the measured positions: what the model does not explain remains in the trial.
-    """
-    change = simulated(robot, positions, commands, fault) - simulated(robot, positions, commands)
-    trajectory = trial.trajectory
-    signals = {**trajectory.signals, "joint_positions": positions + change}
-    return replace(
-        trial, trajectory=replace(trajectory, signals=signals), path=f"{trial.path} with {fault}"
-    )
+
+def better_hypotheses(robot: Robot, threads: int) -> dict[str, Any]:
+    """Returns the weak-motor hypotheses that predict the healthy robot better than ``INTACT``."""
+    evidence = LossTable(Simulator(robot, threads), SegmentPrediction("segment-prediction"))
+    trial = trial_of(robot, *positions_and_commands(robot), FITTED, ALL)
+    hypotheses = [
+        Hypothesis((Fault(WEAK_MOTOR, joint.name, torque),))
+        for joint in robot.anatomy.joints
+        for torque in (0.95, 0.9, 0.7, 0.5, 0.0)
+    ]
+    intact, *rows = evidence.losses([INTACT, *hypotheses], [trial])
+    return {
+        "hypotheses": len(hypotheses),
+        "smaller loss": sum(bool(row.mean() < intact.mean()) for row in rows),
+        "significantly better": sum(is_better(row, intact) for row in rows),
+    }
