@@ -33,18 +33,18 @@ def test_the_losses_are_those_of_the_comparator(subject: Subject):
     assert np.allclose(np.sum([one.y for one in by_signal.series], axis=0), losses)
     assert [one.name.split(":")[0] for one in by_hypothesis.series][0::2] == ["best", "healthy"]
     names = [(mark.label, mark.value) for mark in by_hypothesis.marks]
-    assert names == [("01-after", 0.0), ("02-recovery", pytest.approx(0.4))]
+    assert names == [("01-after", 0.0), ("02-recovery", pytest.approx(0.6))]
 
 
 def test_a_change_is_marked_with_its_interval_in_its_trial(subject: Subject):
-    change = Change("02-recovery", 1, 0.2, 0.1, 0.3, INTACT, subject.diagnosis.best)
+    change = Change("02-recovery", 1, 0.3, 0.2, 0.4, INTACT, subject.diagnosis.best)
     diagnosis = dataclasses.replace(subject.diagnosis, change=change)
 
     section = residual(subject, diagnoses=(diagnosis,))
 
     mark = section.items[0].marks[-1]
-    assert (mark.value, mark.low, mark.high) == pytest.approx((0.6, 0.5, 0.7))
-    said = "changed at about t = 0.2 s (0.1 to 0.3) of 02-recovery; before: intact"
+    assert (mark.value, mark.low, mark.high) == pytest.approx((0.9, 0.8, 1.0))
+    said = "changed at about t = 0.3 s (0.2 to 0.4) of 02-recovery; before: intact"
     assert said in section.text[1]
 
 

@@ -16,7 +16,7 @@ from selfmodel.report.content import report_of
 from selfmodel.report.subject import Subject
 from tests.helpers.browser import ROOT, browses, read_failures, read_report
 
-FRAMES = (0, 31, 39)
+FRAMES = (0, 31, 59)
 
 HOSTILE = "</script><script>alert(1)</script><!-- \u2028 & <b>"
 
