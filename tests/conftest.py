@@ -4,7 +4,6 @@ import importlib
 import json
 import os
 import signal
-from pathlib import Path
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
 os.environ["MUJOCO_GL"] = "disable"
@@ -19,7 +18,6 @@ from selfmodel.robot.mjcf import load
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
-from tests.helpers.command import SMALL, selfmodel
 
 settings.register_profile("full", deadline=None)  # a busy machine is no bug
 settings.register_profile("fast", deadline=None, max_examples=20)
@@ -64,16 +62,3 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
     return ROBOTS["quadruped"].robot()
-
-
-@pytest.fixture(scope="session")
-def recovered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder in which a small recovery ran, and the JSON that the command printed."""
-    folder = tmp_path_factory.mktemp("recovered")
-    done = selfmodel(
-        *("recover", "quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--out", "run"),
-        "--json",
-        cwd=folder,
-    )
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)

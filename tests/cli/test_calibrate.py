@@ -18,7 +18,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.helpers.command import selfmodel
+from tests.helpers.command import SMALL, selfmodel
 from tests.helpers.drivers import random_motion
 
 STEPS = 150
@@ -86,24 +86,24 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     errors = [json.loads(run.stdout)["rms"]["joint_positions"] for run in (replayed, plain)]
     assert json.loads(replayed.stdout)["model"] == "fit.xml"
     assert errors[0] != errors[1]
-    diagnosed = selfmodel("diagnose", "after.mcap", "--robot", "fit.xml", "--json", cwd=folder)
+    diagnose = ("diagnose", "after.mcap", "--comparator", "forward-displacement", "--json")
+    diagnosed = selfmodel(*diagnose, "--robot", "fit.xml", cwd=folder)
     assert diagnosed.returncode == 0, diagnosed.stderr
-    again = selfmodel("calibrate", "intact.mcap", "--robot", "fit.xml", "-o", "2.xml", cwd=folder)
-    assert again.returncode == 0, again.stderr
 
 
 @pytest.mark.search
 def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
     healthy = selfmodel(
-        *("trial", "quadruped", "--stage", "before", "--out", "healthy.mcap"), cwd=tmp_path
+        *("trial", "quadruped", "--steps", "150", "--stage", "before", "--out", "healthy.mcap"),
+        cwd=tmp_path,
     )
     failed = selfmodel(
         *("trial", "quadruped", "--controller", "healthy.mcap", "--out", "failed.mcap"),
-        *("--damage", "break:front_left_knee"),
+        *("--damage", "break:front_left_knee", "--steps", "150"),
         cwd=tmp_path,
     )
     done = selfmodel(
-        *("diagnose", "healthy.mcap", "failed.mcap", "--json"),
+        *("diagnose", "healthy.mcap", "failed.mcap", "--json", *SMALL, "--kinds", "break"),
         *("--comparator", "forward-displacement"),
         cwd=tmp_path,
     )
@@ -127,12 +127,9 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
 @pytest.mark.search
 def test_contacts_that_were_changed_are_printed_and_in_the_model(folder: Path):
     done = selfmodel("calibrate", "hard.mcap", "-o", "hard.xml", cwd=folder)
-    as_json = selfmodel("calibrate", "hard.mcap", "-o", "hard-2.xml", "--json", cwd=folder)
 
-    assert (done.returncode, as_json.returncode) == (0, 0), done.stderr
+    assert done.returncode == 0, done.stderr
     assert "contacts: stiffness x 2, damping x 0.25" in done.stdout
-    found = json.loads(as_json.stdout)
-    assert (found["contact_stiffness"], found["contact_damping"]) == (2.0, 0.25)
     assert 'solref="-10000 -75"' in (folder / "hard.xml").read_text(encoding="utf-8")
 
 

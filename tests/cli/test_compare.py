@@ -45,15 +45,11 @@ def test_pairs_are_printed_with_difference_interval_n_and_p(folder: Path):
     assert row["table"] == "quadruped, 1 trial"
 
 
-@pytest.mark.parametrize(
-    ("name", "file"),
-    [("latex", "comparisons.tex"), ("markdown", "marginal-means.md"), ("parquet", "rows.parquet")],
-)
-def test_tables_are_written_in_the_format_of_choice(folder: Path, name: str, file: str):
-    told = selfmodel("compare", "rows.csv", "-o", "out", "--table", name, cwd=folder)
+def test_tables_are_written_in_the_format_of_choice(folder: Path):
+    told = selfmodel("compare", "rows.csv", "-o", "out", "--table", "markdown", cwd=folder)
 
     assert told.returncode == 0, told.stderr
-    assert (folder / "out" / file).stat().st_size > 100
+    assert (folder / "out" / "marginal-means.md").stat().st_size > 100
 
 
 def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):

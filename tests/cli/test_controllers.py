@@ -9,14 +9,24 @@ from selfmodel.logs import read_log
 from selfmodel.logs.journal import is_calibrated
 from tests.helpers.command import SMALL, selfmodel
 
-FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--out", "run", "--json")
+FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--out", "run", "--json")
 
 
 @pytest.fixture(scope="module")
 def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a robot was recovered with oscillators, and what it said."""
     folder = tmp_path_factory.mktemp("rhythmic")
-    done = selfmodel("recover", "quadruped", "--case", "3", "--controller", "cpg", *FEW, cwd=folder)
+    done = selfmodel(
+        "recover",
+        "quadruped",
+        "--case",
+        "3",
+        "--controller",
+        "cpg",
+        "--no-calibrate",
+        *FEW,
+        cwd=folder,
+    )
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
 
@@ -50,7 +60,7 @@ def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[
 def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Path):
     for number, asked in enumerate((["--controller", "cpg"], ["--neurons", "6"])):
         out = f"{number}.mcap"
-        done = selfmodel("trial", "quadruped", *asked, "--out", out, cwd=tmp_path)
+        done = selfmodel("trial", "quadruped", *asked, "--steps", "9", "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     rhythmic, large = (read_log(tmp_path / f"{k}.mcap").trial.plan.controller for k in (0, 1))
 
@@ -97,7 +107,8 @@ def test_what_cannot_be_evolved_is_said_before_anything_runs(
 
 
 def test_a_controller_of_another_size_is_refused_by_what_differs(tmp_path: Path):
-    first = selfmodel("trial", "quadruped", "--neurons", "6", "--out", "6.mcap", cwd=tmp_path)
+    few = ("--steps", "9", "--out", "6.mcap")
+    first = selfmodel("trial", "quadruped", "--neurons", "6", *few, cwd=tmp_path)
     done = selfmodel(
         *("trial", "quadruped", "--controller", "6.mcap", "--neurons", "3", "--out", "3.mcap"),
         cwd=tmp_path,

@@ -103,8 +103,7 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path):
     ("command", "options"),
     [
         ("ablate", {"--cases": "--case", "--gaps": "--gap", "--damages": "--damage"}),
-        ("ablate", {"--comparators": "--comparator"}),
-        ("suite run", {"--cases": "--case"}),
+        ("paper", {"--comparators": "--comparator"}),
     ],
 )
 def test_older_spellings_work_and_are_not_on_the_page(

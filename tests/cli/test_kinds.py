@@ -20,7 +20,7 @@ def heavy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     kinds = "gravity:GRAVITY,friction,jam"
     arguments = ("--damage", "gravity=3.7+friction=0.4", "--kinds", kinds)
     done = selfmodel(
-        *("recover", "quadruped", *arguments, *SMALL, "--steps", "200", "--trials", "1"),
+        *("recover", "quadruped", *arguments, *SMALL, "--steps", "60", "--trials", "1"),
         *("--out", "run", "--json"),
         cwd=folder,
         PYTHONPATH=PATH,
@@ -63,7 +63,8 @@ def test_the_logs_and_the_kinds_of_a_run_give_its_ranking(heavy: tuple[Path, dic
 def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
     own = ("--kinds", "gravity:GRAVITY")
     logged = selfmodel(
-        *("trial", "quadruped", "--damage", "gravity=3.7", *own, "--out", "a.mcap"),
+        *("trial", "quadruped", "--damage", "gravity=3.7", *own, "--steps", "60"),
+        *("--out", "a.mcap"),
         cwd=tmp_path,
         PYTHONPATH=PATH,
     )

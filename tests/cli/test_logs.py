@@ -214,23 +214,12 @@ def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder in which a recovery with short trials ran, and the JSON that it printed."""
-    folder = tmp_path_factory.mktemp("short")
-    few = (*SMALL, "--steps", "100", "--trials", "1")
-    done = selfmodel(
-        "recover", "quadruped", "--case", "1", *few, "--out", "run", "--json", cwd=folder
-    )
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)
-
-
-@pytest.fixture(scope="module")
 def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a small recovery by displacement alone ran, and what it printed."""
     folder = tmp_path_factory.mktemp("paper")
     done = selfmodel(
-        *("recover", "quadruped", "--case", "1", *SMALL, "--out", "run", "--json", *PAPERS),
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "100", *PAPERS),
+        *("--trials", "1", "--out", "run", "--json"),
         cwd=folder,
     )
     assert done.returncode == 0, done.stderr
@@ -238,14 +227,7 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
 
 
 @pytest.mark.parametrize(
-    ("run", "options"),
-    [
-        pytest.param("short", (), id="short"),
-        pytest.param("recovered", ("--kinds", "paper"), marks=pytest.mark.search, id="segments"),
-        pytest.param(
-            "recovered_as_the_paper_did", PAPERS, marks=pytest.mark.search, id="displacement"
-        ),
-    ],
+    ("run", "options"), [("short", ()), ("recovered_as_the_paper_did", PAPERS)]
 )
 def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     run: str, options: tuple[str, ...], request: pytest.FixtureRequest
@@ -265,21 +247,21 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     assert found["seconds"] > 0
 
 
-@pytest.mark.search
 def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
-    recovered: tuple[Path, dict], tmp_path: Path
+    recovered_as_the_paper_did: tuple[Path, dict], tmp_path: Path
 ):
-    run, told = recovered
+    run, told = recovered_as_the_paper_did
     log = run / told["trials"][1]["log"]
     model = tmp_path / "mine.xml"
     model.write_text(read_log(log).mjcf, encoding="utf-8")
-    named = selfmodel("diagnose", str(log), "--robot", "quadruped", cwd=tmp_path)
-    own = selfmodel("diagnose", str(log), "--robot", "mine.xml", "--json", cwd=tmp_path)
+    diagnose = ("diagnose", str(log), *PAPERS)
+    named = selfmodel(*diagnose, "--robot", "quadruped", cwd=tmp_path)
+    own = selfmodel(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
 
     assert named.returncode == 0, named.stderr
     best = json.loads(own.stdout)["diagnosis"][0]["hypothesis"]
     assert best in named.stdout
-    assert "1 log, segment-prediction" in named.stdout
+    assert "1 log, forward-displacement" in named.stdout
     assert "diagnosis from 1 trial" in named.stderr
 
 

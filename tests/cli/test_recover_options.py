@@ -13,6 +13,9 @@ from selfmodel.robot.designs import network_for
 from selfmodel.simulation.simulator import Simulator
 from tests.helpers.command import SMALL, selfmodel
 
+STEPS = 60
+"""Of the trials of a repertoire."""
+
 
 @pytest.mark.parametrize(
     ("options", "message"),
@@ -49,18 +52,16 @@ def test_a_name_that_is_unknown_is_refused_before_any_work(
     ("options", "score"),
     [
         ((), "upright"),
-        (("--max-joint-speed", "9"), "upright within 9 rad/s"),
         (("--max-joint-torque", "8"), "upright within 8 N m"),
         (("--repair", "paper"), "displacement"),
-        (("--search", "ea", "--score", "energy"), "energy"),
-        (("--score", "selfmodel.recovery.scores:ENERGY"), "energy"),
+        (("--search", "ea", "--score", "selfmodel.recovery.scores:ENERGY"), "energy"),
     ],
 )
 def test_the_score_is_that_of_the_repair_unless_another_is_given(
     tmp_path: Path, options: tuple[str, ...], score: str
 ):
     done = selfmodel(
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "30", "--trials", "1"),
         *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
         *("--gap", "0.05", *options, "--out", "run", "--json"),
         cwd=tmp_path,
@@ -74,7 +75,7 @@ def test_the_score_is_that_of_the_repair_unless_another_is_given(
     assert before["predicted_score"] is not None
     assert after["predicted_score"] is None
     assert recovery["predicted_score"] is not None
-    assert recovery["steps"] == 60
+    assert recovery["steps"] == 30
     assert found["fell"] == (recovery["fell_at_step"] is not None)
 
 
@@ -109,9 +110,9 @@ HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
 def gaits(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small repertoire of the quadruped."""
     robot = load_robot("quadruped")
-    evaluate = simulated_evaluation(Simulator(robot, 1), INTACT, 60)
+    evaluate = simulated_evaluation(Simulator(robot, 1), INTACT, STEPS)
     found = make_repertoire(
-        robot, network_for(robot), evaluate, steps=60, seed=0, evaluations=60, levels=3
+        robot, network_for(robot), evaluate, steps=STEPS, seed=0, evaluations=60, levels=3
     )
     path = tmp_path_factory.mktemp("repertoire") / "gaits.npz"
     save_repertoire(path, found)
@@ -120,23 +121,22 @@ def gaits(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
     run = (
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
-        *("--comparator", "forward-displacement", "--kinds", "paper", "--json"),
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", str(STEPS), "--trials", "1"),
+        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate", "--json"),
     )
     found = [
         json.loads(selfmodel(*run, *options, "--out", name, cwd=tmp_path).stdout)
         for name, options in {
-            "named": ("--search", "repertoire", "--repertoire", str(gaits)),
             "given": ("--repertoire", str(gaits)),
             "without": (),
         }.items()
     ]
     recovered = [one["trials"][2]["displacement"] for one in found]
-    assert [one["search"] for one in found] == ["repertoire", "repertoire", "cma-es"]
-    assert [one["repertoire"] is None for one in found] == [False, False, True]
+    assert [one["search"] for one in found] == ["repertoire", "cma-es"]
+    assert [one["repertoire"] is None for one in found] == [False, True]
     assert found[0]["repertoire"]["robot"] == "quadruped"
 
-    assert recovered[0] == recovered[1] != recovered[2]
+    assert recovered[0] != recovered[1]
 
 
 @pytest.mark.parametrize(

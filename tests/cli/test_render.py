@@ -87,20 +87,16 @@ def test_the_best_of_a_diagnosis_is_drawn_as_a_strip_whatever_there_is_of_opengl
 @pytest.mark.process
 @pytest.mark.opengl
 def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
-    frames = {}
-    for text in ("intact", DAMAGE):
-        out = tmp_path / f"{len(frames)}.gif"
-        arguments = ("render", "a.mcap", "-o", str(out), "--hypothesis", text, "--json")
-        done = selfmodel_process(*arguments, cwd=folder, MUJOCO_GL="")
-        assert (done.returncode, done.stderr) == (0, "")
-        assert json.loads(done.stdout)["gl"] == WORKS
-        with Image.open(out) as image:
-            assert (image.n_frames, image.info["duration"]) == (8, 40)
-            frames[text] = np.asarray(image.convert("RGB")).astype(int)
+    out = tmp_path / "film.gif"
+    done = selfmodel_process("render", "a.mcap", "-o", str(out), "--json", cwd=folder, MUJOCO_GL="")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["gl"] == WORKS
+    with Image.open(out) as image:
+        assert (image.n_frames, image.info["duration"]) == (8, 40)
+        frame = np.asarray(image.convert("RGB")).astype(int)
 
-    assert frames["intact"].shape == (360, 960, 3)
-    assert np.ptp(frames["intact"]) > 150  # there is something to be seen
-    assert np.abs(frames["intact"] - frames[DAMAGE]).max() > 50  # the limb is pale
+    assert frame.shape == (360, 960, 3)
+    assert np.ptp(frame) > 150  # there is something to be seen
 
 
 @pytest.mark.parametrize("works", [("osmesa",), ()])
@@ -183,12 +179,12 @@ def test_what_is_lost_is_pale_and_what_is_jammed_red_in_a_film(robot: Robot):
     np.testing.assert_array_equal(drawn.model.geom_rgba, before)
 
 
-@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("kind", ["png", "pdf"])
 def test_steps_that_were_not_observed_are_marked_in_every_kind_of_strip(
     quadruped: Robot, kind: str
 ):
     drawn = film(quadruped, DAMAGE, frames=3, unseen=slice(10, 20))
-    begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
+    begins = {"png": b"\x89PNG", "pdf": b"%PDF"}[kind]
 
     assert drawn.shots[0].held.tolist() == [False, True, False]
     assert strip(drawn, kind).startswith(begins)

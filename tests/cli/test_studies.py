@@ -11,9 +11,10 @@ from tests.helpers.command import SMALL, selfmodel
 
 ROOT = Path(__file__).parents[2]
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1", "--out", "out")
+QUICK = ("--comparator", "forward-displacement")
 PAPER = ("paper", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
 ABLATE = ("ablate", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
-SUITE = ("suite", "run", "--domains", "walker,biped.xml", "--cases", "1,5", *TINY)
+SUITE = ("suite", "run", "--domains", "walker,biped.xml", "--cases", "1,5", *QUICK, *TINY)
 
 THEIRS = """
 from dataclasses import dataclass

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from selfmodel.cli import app
 from tests.helpers.code_blocks import blocks, commands
+from tests.helpers.command import SMALL
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(ROOT.glob("docs/**/*.md"))
@@ -26,6 +27,12 @@ def expanded(words: list[str]) -> list[str]:
     """The arguments with file patterns replaced by the files of the current folder."""
     files = [sorted(map(str, Path().glob(word))) if "*" in word else [word] for word in words]
     return [name for names in files for name in names]
+
+
+def shortened(words: list[str]) -> list[str]:
+    """The arguments of a command, with a small search where the page has the usual one."""
+    searches = words[0] in ("diagnose", "report", "recover") and "--help" not in words
+    return [*words, *SMALL] if searches and "--population" not in words else words
 
 
 def name_of(page: Path) -> str:
@@ -77,5 +84,5 @@ def test_code_of_a_page_runs_in_order(page: Path, tmp_path: Path, monkeypatch: p
             exec(compile(block.text, place, "exec"), names)  # noqa: S102  # the page's own code
         elif block.is_run:
             for words in commands(block):
-                done = CliRunner().invoke(app, expanded(words[1:]))
+                done = CliRunner().invoke(app, shortened(expanded(words[1:])))
                 assert done.exit_code == 0, f"{place}: {words}\n{done.output}\n{done.exception!r}"

@@ -1,0 +1,26 @@
+"""A recovery that the tests of commands share: its folder, and what it printed."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.command import SMALL, Done, selfmodel
+
+SHORT = ("quadruped", "--case", "4", *SMALL, "--steps", "60", "--trials", "1")
+
+
+@pytest.fixture(scope="session")
+def recovery(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    """A folder in which a recovery with short trials ran, and the command that ran."""
+    folder = tmp_path_factory.mktemp("short")
+    done = selfmodel("recover", *SHORT, "--out", "run", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+@pytest.fixture(scope="session")
+def short(recovery: tuple[Path, Done]) -> tuple[Path, dict]:
+    """A folder in which a recovery with short trials ran, and the JSON that it printed."""
+    folder, done = recovery
+    return folder, json.loads(done.stdout)
