@@ -42,7 +42,7 @@ RECENT = 5
 
 
 class CmaEs:
-    """Raced runs of CMA-ES; fitness is maximised.
+    """Raced runs of CMA-ES, a ``GenomeSearch``; fitness is maximised.
 
     The first generation contains the seeds and random genomes. The best of them are the initial
     means of the runs, of which the better half continues, until one is left (successive halving).
@@ -50,11 +50,7 @@ class CmaEs:
     the evaluations that a repair affords.
 
     Args:
-        length: Number of values of a genome.
-        draw: Draws random genomes.
-        settings: The paper's numbers, which set the size of a generation.
-        rng: Source of all random numbers.
-        seeds: Further genomes of the first generation.
+        length, draw, settings, rng, seeds: As of ``Evolution``; all seeds are used.
         share: Size of the first generation, relative to the population of the paper's EA.
         deviation: Standard deviation of the first generation of a run from a random genome.
     """
@@ -70,8 +66,7 @@ class CmaEs:
         share: float = RANDOM_SHARE,
         deviation: float = DEVIATION,
     ) -> None:
-        self._rng, self._deviation = rng, deviation
-        self._seeds = len(seeds)
+        self._rng, self._deviation, self._seeds = rng, deviation, len(seeds)
         self._population = max(MIN_POPULATION, round(SHARE * settings.population))
         size = max(STARTS + len(seeds), round(share * settings.population))
         self._asked = first_generation(size, length, draw, rng, seeds)
@@ -84,22 +79,17 @@ class CmaEs:
         return self._asked
 
     def tell(self, fitness: FloatArray) -> None:
-        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``.
-
-        Raises:
-            ValueError: ``fitness`` has another shape, or a NaN.
-        """
+        """Sets the fitness of the genomes that ``ask`` returned, ``(n,)``, none of them NaN."""
         check_fitness(fitness, self._asked)
         if not self._runs:
             self._runs = self._started(fitness)
         else:
             # A diverged simulation is worse than all others by a finite number.
-            finite = fitness[np.isfinite(fitness)]
-            worst = finite.min() - 1.0 if len(finite) else 0.0
-            bounded = np.where(np.isfinite(fitness), fitness, worst)
+            worst = np.min(fitness, where=np.isfinite(fitness), initial=np.inf) - 1.0
+            bounded = np.where(np.isfinite(fitness), fitness, worst if worst < np.inf else 0.0)
             parts = (np.split(values, len(self._runs)) for values in (fitness, bounded))
-            for run, values, finite_values in zip(self._runs, *parts, strict=True):
-                run.tell(values, finite_values)
+            for run, *values in zip(self._runs, *parts, strict=True):
+                run.tell(*values)
             if self.generation in PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
                 self._runs = order[: len(order) // 2]
@@ -124,11 +114,9 @@ class CmaEs:
         fitness the highest value seen is an overestimate, and the mean of a run is often better
         than any genome evaluated.
         """
-        means = [run.mean for run in self._runs]
-        recent = sorted(
-            (best for run in self._runs for best in run.recent), key=lambda best: -best[0]
-        )
-        return np.array([*means, *(genome for _, genome in recent)][:count])
+        recent = [best for run in self._runs for best in run.recent]
+        genomes = [genome for _, genome in sorted(recent, key=lambda best: -best[0])]
+        return np.array([*(run.mean for run in self._runs), *genomes][:count])
 
 
 class _Run:

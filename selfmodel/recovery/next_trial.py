@@ -17,8 +17,8 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
-from selfmodel.recovery.repair import mutants
+from selfmodel.recovery.recover import RecoveryLoop, by_repair
+from selfmodel.recovery.repair import mutants, untried_mutants
 from selfmodel.recovery.result import DiscriminatingTrial
 from selfmodel.recovery.scores import first_falls
 from selfmodel.settings import Settings
@@ -88,27 +88,18 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     ``unexplained``, the next in the ranking; then the hypotheses with an undetectable fault. If
     there are none of these either, the next in the ranking follow.
     """
-    followers = tuple(
-        candidate.hypothesis
-        for candidate in diagnosis.ranked[1:]
-        if math.isfinite(candidate.distance)
-    )
-    others = diagnosis.indistinguishable or (
-        followers if diagnosis.verdict == "unexplained" else ()
-    )
+    followers = tuple(one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
+    unexplained = followers if diagnosis.verdict == "unexplained" else ()
+    others = diagnosis.indistinguishable or unexplained
     to_separate = dict.fromkeys([*others, *diagnosis.undetectable]) or followers
     return (diagnosis.best, *to_separate)[:MAX_HYPOTHESES]
 
 
 @dataclass(eq=False)
 class Disagreement:
-    """Disagreement of some hypotheses on controllers, cached by controller.
+    """Disagreement of some hypotheses, best first, on controllers; cached by controller.
 
-    Attributes:
-        hypotheses: Hypotheses to separate, best first.
-        simulator: Self-model.
-        steps: Control steps of a trial. Falls count in all steps, disagreement in the first
-            ``EARLY_STEPS``.
+    Falls count in all steps of a trial, disagreement in the first ``EARLY_STEPS``.
     """
 
     hypotheses: Sequence[Hypothesis]
@@ -116,25 +107,21 @@ class Disagreement:
     steps: int
     _cache: Cache[Controller] = field(default_factory=Cache, init=False)
 
-    @property
-    def _early(self) -> int:
-        return min(self.steps, EARLY_STEPS)
+    def __post_init__(self) -> None:
+        self._early = min(self.steps, EARLY_STEPS)
 
     def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to separate the hypotheses best.
 
         Controllers with which the robot falls under any hypothesis, or whose simulation diverges,
         are excluded. If no controller remains, the controller with the latest first fall is
-        returned.
-
-        Args:
-            candidates: At least one controller; the first of equals is returned.
+        returned. The first of equals is.
         """
         falls, order = self._ordered(candidates)
         for i in order:
             if falls[i] < self._early:
                 break  # the remaining ones fall early, too
-            falls[i] = self._first_falls(self._predicted([candidates[i]], self.steps))[0]
+            falls[i] = self._first_falls([candidates[i]], self.steps)[0][0]
             if falls[i] == self.steps:
                 return candidates[i]
         return candidates[int(falls.argmax())]
@@ -155,25 +142,24 @@ class Disagreement:
 
     def _evaluate(self, candidates: Sequence[Controller]) -> FloatArray:
         """First fall and disagreement per controller, ``(controllers, 2)``."""
-        early = self._predicted(candidates, self._early)
-        falls = self._first_falls(early)
+        falls, early = self._first_falls(candidates, self._early)
         upright = np.flatnonzero(falls == self._early)
         disagreement = np.zeros(len(candidates))
         if upright.size:
-            commands = early.trajectory["commands"][upright, 0]
+            commands = early["commands"][upright, 0]
             known = disagreements_on(commands, self.hypotheses, self.simulator)
             disagreement[upright] = np.where(np.isnan(known), -1.0, known)
         return np.stack([falls, disagreement], axis=1)
 
-    def _predicted(self, drivers: Sequence[Controller], steps: int) -> SimulationResult:
-        return _predicted(self.simulator, drivers, self.hypotheses, steps)
-
-    def _first_falls(self, simulated: SimulationResult) -> IndexArray:
-        """First fall under any hypothesis, ``(drivers,)``; 0 for a simulation that diverges."""
-        robot = self.simulator.robot
+    def _first_falls(
+        self, drivers: Sequence[Controller], steps: int
+    ) -> tuple[IndexArray, Trajectory]:
+        """First fall under any hypothesis, ``(drivers,)``, 0 for a divergence; the rollouts."""
+        robot, outcome = self.simulator.robot, _run(self.simulator, drivers, self.hypotheses, steps)
         normals = np.array([build(robot, hypothesis).normal for hypothesis in self.hypotheses])
-        falls = first_falls(simulated.trajectory, normals, robot.standing_height)
-        return np.asarray(np.where(simulated.diverged, 0, falls).min(axis=1))
+        falls = first_falls(outcome.trajectory, normals, robot.standing_height)
+        first = np.where(outcome.diverged, 0, falls).min(axis=1)
+        return np.asarray(first), outcome.trajectory
 
 
 def disagreements_on(
@@ -181,28 +167,20 @@ def disagreements_on(
 ) -> FloatArray:
     """Returns the disagreement of hypotheses on given commands, 0 to 1, ``(runs,)``.
 
-    All hypotheses are simulated with the same commands. In closed loop, a difference in one reading
-    changes the whole motion, and a comparator that is given the commands gains no evidence from
-    such a change.
-
-    Args:
-        commands: Commands of each run, such as those of a controller under the best hypothesis,
-            ``(runs, steps, motors)``.
-        hypotheses: Hypotheses to separate.
-        simulator: Self-model.
-
-    Returns:
-        The disagreements; NaN where a simulation diverged.
+    All hypotheses are simulated with the same commands, ``(runs, steps, motors)``, such as those of
+    a controller under the best hypothesis. In closed loop, a difference in one reading changes the
+    whole motion, and a comparator that is given the commands gains no evidence from such a change.
+    The disagreement is NaN where a simulation diverged.
     """
     motors = simulator.robot.anatomy.names.motors
     drivers = [Playback(motors, rows) for rows in commands]
-    outcome = _predicted(simulator, drivers, hypotheses, commands.shape[1])
+    outcome = _run(simulator, drivers, hypotheses, commands.shape[1])
     with np.errstate(invalid="ignore", over="ignore"):  # values of a diverged simulation
         values = disagreements(outcome.trajectory)
     return np.where(outcome.diverged.any(axis=1), np.nan, values)
 
 
-def _predicted(
+def _run(
     simulator: Simulator,
     drivers: Sequence[CommandSource],
     hypotheses: Sequence[Hypothesis],
@@ -215,17 +193,11 @@ def _predicted(
 
 
 def disagreements(trajectory: Trajectory) -> FloatArray:
-    """Returns the disagreement of the hypotheses on each controller, 0 to 1.
+    """Returns the disagreement of the hypotheses on each controller, 0 to 1, ``(controllers,)``.
 
     The disagreement is the mean difference of two predictions, relative to ``DISAGREEMENT_SCALES``,
-    over all pairs of hypotheses, signals, columns and early steps.
-
-    Args:
-        trajectory: Signals of ``DISAGREEMENT_SCALES``, ``(controllers, hypotheses, steps, width)``
-            each.
-
-    Returns:
-        ``(controllers,)``; 0 for a single hypothesis, NaN if a simulation diverged.
+    over all pairs of hypotheses, signals, columns and early steps. The signals are
+    ``(controllers, hypotheses, steps, width)``.
     """
     controllers, hypotheses = trajectory["sensors"].shape[:2]
     pairs = list(combinations(range(hypotheses), 2))

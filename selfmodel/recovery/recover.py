@@ -11,7 +11,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -26,7 +26,7 @@ from selfmodel.recovery.repair import (
     MakeRepair,
     Repair,
     RobustRepair,
-    mutants,
+    untried_mutants,
 )
 from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import UPRIGHT, Score, fall_of
@@ -143,12 +143,15 @@ class RecoveryLoop:
         HypothesisSpace.of(self.kinds, self.simulator.robot.anatomy)  # refused before any trial
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(self.simulator.robot)
-        self._repairs = [self._new_repair()]
+        self._repairs: list[Repair] = []
+        self._begin_repair()
         self._predictions: dict[Controller, float] = {}
         self._predicted: list[float] = []
 
-    def _new_repair(self) -> Repair:
-        return self.make_repair(self.simulator, self.settings, self._design, self.score)
+    def _begin_repair(self) -> None:
+        """Adds a repair in the simulator of now."""
+        repair = self.make_repair(self.simulator, self.settings, self._design, self.score)
+        self._repairs.append(repair)
 
     def _evolve_gait(self) -> Controller:
         assumed = partial(assumed_uncertainty, self.simulator.robot)
@@ -183,7 +186,7 @@ class RecoveryLoop:
             self.on_event(self._calibration)
             if self._calibration.robot is not nominal.robot:
                 self.simulator = Simulator(self._calibration.robot, nominal.threads, nominal.stats)
-                self._repairs.append(self._new_repair())
+                self._begin_repair()
         rng = random_stream(self.seed, "posterior")
         self._posterior = Posterior(
             self.simulator, healthy_trials, self._calibration, self.settings, rng
@@ -236,20 +239,6 @@ NextTrial = Callable[[RecoveryLoop], Controller]
 """Chooses the controller of the next physical trial of a recovery."""
 
 
-def untried_mutants(
-    parents: Sequence[Controller],
-    tried: Sequence[Controller],
-    settings: Settings,
-    rng: np.random.Generator,
-) -> list[Controller]:
-    """Returns one population of distinct mutants that were not tried, or a random controller."""
-    distinct = dict.fromkeys(mutants(parents, settings.population, settings, rng))
-    untried = [controller for controller in distinct if controller not in tried]
-    # Every mutant may equal its parent, as without mutation.
-    design = parents[0].design
-    return untried or [Controller(design, draw_genomes(rng, (design.weights,)))]
-
-
 def diagnose_trials(
     trials: Sequence[Trial],
     diagnose: DiagnosticSearch,
@@ -263,15 +252,12 @@ def diagnose_trials(
     a recovery therefore reproduce the recovery's rankings.
 
     Args:
-        trials: Trials since the failure, in the order in which they were run.
+        trials: Trials since the failure, in the order in which they were run; at least one.
         diagnose: Diagnostic EA.
         seed: Seed of all random choices.
         on_event: Callback, called with each event as it happens.
         after: Numbers of trials after which to diagnose, including the number of all trials; after
             each trial, if not given.
-
-    Raises:
-        InputError: There are no trials, or a trial lacks signals that the comparator needs.
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")

@@ -15,17 +15,11 @@ from typing import Protocol
 
 import numpy as np
 
+from selfmodel import evolution
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import (
-    Draw,
-    Evolution,
-    GenerationCallback,
-    GenomeSearch,
-    evolve,
-    reproduce,
-)
+from selfmodel.evolution import Draw, Evolution, GenerationCallback, GenomeSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.cma_es import SEED_DEVIATION, CmaEs
 from selfmodel.recovery.repertoire import Repertoire
@@ -74,12 +68,9 @@ TAIL = 0.25
 
 @dataclass(frozen=True, eq=False)
 class CandidateController:
-    """A controller for the next trial.
+    """A controller for the next trial, and its simulated score under each condition.
 
-    Attributes:
-        controller: The controller.
-        scores: Score in simulation under each condition, ``(conditions,)``; a single one for
-            a repair that simulates the self-model alone.
+    There is a single score from a repair that simulates the self-model alone.
     """
 
     controller: Controller
@@ -141,14 +132,9 @@ random number generator and initial genomes to a search."""
 class RepairSearch:
     """The paper's repair EA, a ``Repair``: evolves in one exact simulation of a hypothesis.
 
-    All rollouts are cached. Source: the paper, section III.
-
-    Attributes:
-        simulator: Self-model.
-        settings: The paper's numbers.
-        design: Design of the controllers to evolve; the paper's network if not given.
-        score: Fitness.
-        evaluations: Number of controllers evaluated so far.
+    The candidates are the surviving controllers: those after the best one are for a next trial if
+    the best one was tried; it may be a seed. All rollouts are cached. The design is the paper's
+    network if not given. Source: the paper, section III.
     """
 
     simulator: Simulator
@@ -166,19 +152,16 @@ class RepairSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
-        """Returns the surviving controllers for the first hypothesis, best first; see ``Repair``.
-
-        Those after the best one are for a next trial if the best one was tried: it may be a seed.
-        """
+        """Returns the surviving controllers for the first hypothesis, best first."""
         hypothesis, design = hypotheses[0], self.design or network_for(self.simulator.robot)
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
             return np.array(self._fitness.get_or_compute(runs, self._simulate))
 
-        known = [controller.genome for controller in seeds if controller.design == design]
+        known = _genomes_of(design, seeds)
         search = Evolution(design.weights, draw_genomes, self.settings, rng, known)
-        evolve(search, fitness, on_generation, search.generations_left)
+        evolution.evolve(search, fitness, on_generation, search.generations_left)
         self.evaluations += search.evaluations
         if search.best_fitness == -np.inf:
             none = f"none with {search.evaluations} controllers"
@@ -220,16 +203,7 @@ class RobustFitness:
 
 @dataclass(eq=False)
 class RobustRepair:
-    """Repair under uncertainty; a ``Repair``.
-
-    Attributes:
-        simulator: Self-model.
-        settings: The paper's numbers; they set the cost of a repair.
-        design: Design of the controllers to evolve.
-        score: Fitness of a rollout.
-        make_search: Makes the search.
-        evaluations: Number of controllers evaluated so far.
-    """
+    """Repair under uncertainty; a ``Repair`` whose cost follows from the paper's numbers."""
 
     simulator: Simulator
     settings: Settings
@@ -246,19 +220,24 @@ class RobustRepair:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
-        """Returns candidates, best first; see ``Repair``.
+        """Returns candidates of a search, compared under more conditions, best first.
 
-        Raises:
-            WorkError: The simulation diverged under most conditions with every candidate.
+        A small search may end far below a known controller; its mutants, which are compared too, do
+        not. A candidate whose rollouts diverged under most conditions is left out.
         """
         fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
-        known = [controller for controller in seeds if controller.design == self.design]
         comparisons = _comparisons(self.settings)
         compared = sum(candidates * conditions for candidates, conditions in comparisons)
+        known = [controller for controller in seeds if controller.design == self.design]
         rollouts = rollouts_of(self.settings, known=bool(known)) - compared
-        search = self._search(fitness, known, rollouts, rng, on_generation)
+        search = self._searched(fitness, seeds, rollouts, rng, on_generation)
         self.evaluations += search.evaluations
-        candidates = self._finalists(search, known, comparisons[0][0], rng)
+        count = comparisons[0][0]
+        near = mutants(known, count // 3, self.settings, rng) if known else []
+        evolved = [Controller(self.design, genome) for genome in search.candidates(count)]
+        new = [one for one in dict.fromkeys([*near, *evolved]) if one not in known]
+        # A search of one generation may have evaluated known controllers alone.
+        candidates = new or [_random_controller(self.design, rng)]
         for count, conditions in comparisons:
             scores = fitness(candidates[:count], conditions, self.settings.steps, rng)
             best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
@@ -271,93 +250,45 @@ class RobustRepair:
             raise _divergence(self.simulator, hypotheses[0], f"{share} {best_of}")
         return tuple(CandidateController(candidates[i], scores[i]) for i in viable)
 
-    def _search(
+    def _searched(
         self,
         fitness: RobustFitness,
-        known: Sequence[Controller],
+        seeds: Sequence[Controller],
         rollouts: int,
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> GenomeSearch:
-        """Returns the search after it has simulated as many steps as whole rollouts have."""
-        design, stats = self.design, self.simulator.stats
-        genomes = [controller.genome for controller in known]
-        search = self.make_search(design.weights, draw_genomes, self.settings, rng, genomes)
-        total, begin = rollouts * self.settings.steps, stats.steps
+        """Returns a search that has simulated as many control steps as whole rollouts have.
+
+        The random genomes of the first generation need few steps. Where short rollouts rank
+        controllers as whole ones do, the first part of a search affords twice as many of them.
+        """
+        design, stats, whole = self.design, self.simulator.stats, self.settings.steps
+        known = _genomes_of(design, seeds)
+        search = self.make_search(design.weights, draw_genomes, self.settings, rng, known)
+        total, begin = rollouts * whole, stats.steps
         halved = HALVED * total if self.score.grows_with_time else 0.0
-        schedule = _Schedule(self.settings.steps, total, halved)
+        short, half = min(SHORT_STEPS, whole), min(whole, max(SHORT_STEPS, whole // 2))
 
         def scores(asked: FloatArray) -> FloatArray:
-            controllers = [Controller(design, genome) for genome in asked]
-            return fitness(controllers, 1, schedule.horizon(stats.steps - begin), rng)[:, 0]
+            controllers, spent = [Controller(design, one) for one in asked], stats.steps - begin
+            steps = short if not spent else half if spent < halved else whole
+            return fitness(controllers, 1, steps, rng)[:, 0]
 
         def generations_left() -> int:
-            return schedule.generations_left(len(search.ask()), stats.steps - begin)
+            size, spent = len(search.ask()), stats.steps - begin
+            halves = math.ceil(max(0.0, halved - spent) / (size * half))
+            return halves + math.ceil(max(0.0, total - max(spent, halved)) / (size * whole))
 
-        evolve(search, scores, on_generation, generations_left, noisy=True)
+        evolution.evolve(search, scores, on_generation, generations_left, noisy=True)
         return search
-
-    def _finalists(
-        self,
-        search: GenomeSearch,
-        known: Sequence[Controller],
-        count: int,
-        rng: np.random.Generator,
-    ) -> list[Controller]:
-        """Returns the candidates of a search and mutants of known controllers, ``count`` or fewer.
-
-        A small search may end far below a known controller; its mutants do not.
-        """
-        design = self.design
-        near = mutants(known, count // 3, self.settings, rng) if known else []
-        evolved = [Controller(design, genome) for genome in search.candidates(count)]
-        new = [one for one in dict.fromkeys([*near, *evolved]) if one not in known][:count]
-        # A search of one generation may have evaluated known controllers alone.
-        return new or [Controller(design, draw_genomes(rng, (design.weights,)))]
-
-
-@dataclass(frozen=True)
-class _Schedule:
-    """Length of the rollouts of a search, and its end.
-
-    The random genomes of the first generation need few steps. Where short rollouts rank controllers
-    as whole ones do, the first part of a search affords twice as many of them.
-
-    Attributes:
-        whole: Control steps of a trial.
-        total: Control steps of the search.
-        halved: Control steps of the search up to which rollouts have half of the steps of a trial.
-    """
-
-    whole: int
-    total: int
-    halved: float
-
-    @property
-    def _half(self) -> int:
-        return min(self.whole, max(SHORT_STEPS, self.whole // 2))
-
-    def horizon(self, spent: int) -> int:
-        """Returns the control steps of the next rollouts of a search that has spent some."""
-        if not spent:
-            return min(SHORT_STEPS, self.whole)
-        return self._half if spent < self.halved else self.whole
-
-    def generations_left(self, size: int, spent: int) -> int:
-        """Returns the number of generations of a size that spend what is left."""
-        short = math.ceil(max(0.0, self.halved - spent) / (size * self._half))
-        rest = max(0.0, self.total - max(spent, self.halved))
-        return short + math.ceil(rest / (size * self.whole))
 
 
 def robust(scores: FloatArray) -> FloatArray:
     """Returns the mean of the mean score and of the mean of the lower tail, ``(controllers,)``.
 
-    A rollout that diverged counts as worse than all others by 1; a controller of which all did has
-    negative infinity.
-
-    Args:
-        scores: ``(controllers, conditions)``.
+    ``scores`` are ``(controllers, conditions)``. A rollout that diverged counts as worse than all
+    others by 1; a controller of which all did has negative infinity.
     """
     finite = np.isfinite(scores)
     if not finite.any():
@@ -383,13 +314,35 @@ def _comparisons(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
     return (finalists, first), (JUDGED, last)
 
 
+def _genomes_of(design: Design, controllers: Sequence[Controller]) -> list[FloatArray]:
+    return [controller.genome for controller in controllers if controller.design == design]
+
+
+def _random_controller(design: Design, rng: np.random.Generator) -> Controller:
+    return Controller(design, draw_genomes(rng, (design.weights,)))
+
+
 def mutants(
     parents: Sequence[Controller], count: int, settings: Settings, rng: np.random.Generator
 ) -> list[Controller]:
     """Returns children by the mutation and the crossover of the paper's EA, of parents in turn."""
     design = parents[0].design
     genomes = np.resize([parent.genome for parent in parents], (count, design.weights))
-    return [Controller(design, child) for child in reproduce(genomes, draw_genomes, settings, rng)]
+    children = evolution.reproduce(genomes, draw_genomes, settings, rng)
+    return [Controller(design, child) for child in children]
+
+
+def untried_mutants(
+    parents: Sequence[Controller],
+    tried: Sequence[Controller],
+    settings: Settings,
+    rng: np.random.Generator,
+) -> list[Controller]:
+    """Returns one population of distinct mutants that were not tried, or a random controller."""
+    distinct = dict.fromkeys(mutants(parents, settings.population, settings, rng))
+    untried = [controller for controller in distinct if controller not in tried]
+    # Every mutant may equal its parent, as without mutation.
+    return untried or [_random_controller(parents[0].design, rng)]
 
 
 def from_repertoire(repertoire: Repertoire) -> MakeSearch:
@@ -399,9 +352,6 @@ def from_repertoire(repertoire: Repertoire) -> MakeSearch:
     of them start the runs. Source of the idea: Cully et al., *Robots that can adapt like animals*
     (Nature 2015); here the gaits are evaluated under the diagnosed faults, which takes no
     physical trial.
-
-    Args:
-        repertoire: Gaits of the healthy robot, with controllers of the design that is searched.
     """
 
     def drawn(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:

@@ -17,12 +17,7 @@ from selfmodel.trials.trial import Trial
 
 @dataclass(frozen=True)
 class SearchBegins:
-    """Start of a search.
-
-    Attributes:
-        kind: Name of the EA: ``repair`` or ``diagnostic``.
-        hypothesis: Hypothesis that a repair compensates; None for a diagnosis.
-    """
+    """Start of a search: a ``repair``, for a hypothesis, or a ``diagnostic`` one."""
 
     kind: str
     hypothesis: Hypothesis | None = None

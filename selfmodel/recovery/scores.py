@@ -84,13 +84,9 @@ class Score:
 def scores_of(
     score: Score, robot: Robot, hypotheses: Sequence[Hypothesis], outcome: SimulationResult
 ) -> FloatArray:
-    """Returns the scores of simulated rollouts; negative infinity for a diverged one.
+    """Returns the scores of rollouts, ``(n, hypotheses)``; negative infinity for a diverged one.
 
-    Args:
-        score: The score.
-        robot: The healthy robot.
-        hypotheses: Faults of the robot in each column of the rollouts.
-        outcome: The rollouts, ``(n, hypotheses)``, which is the shape of the scores.
+    Each column of the rollouts is of the healthy robot with the faults of a hypothesis.
     """
     scores, simulated = np.full(outcome.diverged.shape, -np.inf), outcome.trajectory
     for column, hypothesis in enumerate(hypotheses):
@@ -103,15 +99,9 @@ def scores_of(
 
 
 def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> IndexArray:
-    """Returns the first step at which each run has fallen, or the number of steps without a fall.
+    """Returns the first step at which each run has fallen; see ``first_falls``.
 
-    Args:
-        robot: The healthy robot.
-        hypothesis: Faults of the robot, of which a slope tilts the ground.
-        trajectory: Position and orientation of the base, ``(..., steps, width)`` each.
-
-    Returns:
-        Step indices, ``(...)``.
+    The hypothesis matters because a slope tilts the ground.
     """
     return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
 
@@ -128,9 +118,6 @@ def first_falls(trajectory: Trajectory, normals: FloatArray, standing_height: fl
         normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
             ground passes through the origin.
         standing_height: Height of the base in the initial pose, m.
-
-    Returns:
-        Step indices, ``(...)``.
     """
     height = np.einsum("...sk,...k->...s", trajectory["base_position"], normals)
     # The world's upward direction in the frame of the base, against the first one that is known.
@@ -202,10 +189,6 @@ def _steps_in(duration: float, trajectory: Trajectory) -> int:
     return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
 
 
-def _displacement(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
-    return forward_displacement(trajectory)
-
-
 def _upright(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     x = trajectory["base_position"][..., 0]
     last = np.maximum(falls_of(robot, hypothesis, trajectory) - 1, 0)
@@ -223,10 +206,7 @@ def _upright_less_work(robot: Robot, hypothesis: Hypothesis, trajectory: Traject
 def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:
     """Returns the mechanical work of the joints, J, ``(...)``: work on a motor counts as spent.
 
-    Args:
-        robot: The robot, for its control time step.
-        trajectory: Efforts and velocities of the joints, ``(..., steps, hinges)`` each; single NaN
-            count as 0, and the work of a run without any number is NaN.
+    Single NaN count as 0, and the work of a run without any number is NaN.
     """
     power = np.abs(trajectory["joint_efforts"] * trajectory["joint_velocities"])
     observed = np.isfinite(power).any(axis=(-2, -1))
@@ -234,24 +214,16 @@ def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:
     return np.asarray(np.where(observed, work, np.nan))
 
 
-DISPLACEMENT = Score(
+_metres = partial(Score, unit="m", grows_with_time=True, needs_free_base=True)
+
+DISPLACEMENT = _metres(
     "displacement",
     ("base_position",),
-    _displacement,
-    unit="m",
-    grows_with_time=True,
-    needs_free_base=True,
+    lambda _robot, _hypothesis, trajectory: forward_displacement(trajectory),
 )
 """Forward displacement, m. Source: the paper, section III."""
 
-UPRIGHT = Score(
-    "upright",
-    ("base_position", "base_orientation"),
-    _upright,
-    unit="m",
-    grows_with_time=True,
-    needs_free_base=True,
-)
+UPRIGHT = _metres("upright", ("base_position", "base_orientation"), _upright)
 """Forward displacement up to the last step before the robot falls, m.
 
 A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` (near the
@@ -260,12 +232,11 @@ orientation, or lower than ``FALLEN_HEIGHT`` of its standing height. What follow
 nothing: a controller that tips the robot over and crawls on its back earns what it walked before.
 """
 
-ENERGY = Score(
+ENERGY = _metres(
     "energy",
     (*UPRIGHT.record, "joint_efforts", "joint_velocities"),
     _upright_less_work,
-    unit="m",
-    needs_free_base=True,
+    grows_with_time=False,
 )
 """Displacement up to the first fall, m, less ``WORK_WEIGHT`` times the work over the weight, m.
 
@@ -332,7 +303,7 @@ def upright_within(
     name = f"{UPRIGHT.name} within {' and '.join(texts)}" if texts else UPRIGHT.name
     record = (*UPRIGHT.record, "joint_velocities", "joint_efforts")
     signals = (*record, "joint_positions") if compares_bodies else record
-    return Score(name, signals, of, unit="m", grows_with_time=True, needs_free_base=True)
+    return _metres(name, signals, of)
 
 
 def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
@@ -341,7 +312,7 @@ def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> Flo
     A joint without a measurement is where it was last measured, or else in the initial pose.
     Detached bodies do not count, and encoders have the offsets of the hypothesis.
     """
-    logged = np.moveaxis(_held(np.moveaxis(trajectory["joint_positions"], -1, -2)), -2, -1)
+    logged = _held(trajectory["joint_positions"].swapaxes(-1, -2)).swapaxes(-1, -2)
     angles = logged - build(robot, hypothesis).encoder_offset
     initial = [float(robot.model.joint(name).qpos0[0]) for name in robot.anatomy.hinges]
     poses = np.where(np.isfinite(angles), angles, initial)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, mean_of_known
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
@@ -52,14 +52,10 @@ def tracking(reference: Reference, robot: Robot) -> Score:
     """Returns the score of following a reference trajectory.
 
     The score is the negative root mean square error of the joint positions, rad, over the steps
-    within the time of the reference and the joints of both the reference and the robot; 0 is
-    perfect. Between its rows the reference is interpolated linearly. Joints of a limb that is
+    within the time of the reference and the joints of both the reference and the healthy robot; 0
+    is perfect. Between its rows the reference is interpolated linearly. Joints of a limb that is
     detached under a hypothesis are left out, unless no joint would remain; positions that a
     physical robot did not observe are left out.
-
-    Args:
-        reference: The trajectory.
-        robot: The healthy robot.
 
     Raises:
         InputError: The reference has no joint of the robot, or begins after the first step.
@@ -89,19 +85,11 @@ def _tracked(
     detached = build(robot, hypothesis).detached
     compared = [name for name in hinges if name not in detached] or hinges
     steps = trajectory.time <= reference.time[-1]
-    desired = [
-        np.interp(
-            trajectory.time[steps],
-            reference.time,
-            reference.positions[:, reference.hinges.index(name)],
-        )
-        for name in compared
-    ]
-    columns = [robot.anatomy.hinges.index(name) for name in compared]
-    positions = trajectory["joint_positions"][:, steps][..., columns]
+    columns = dict(zip(reference.hinges, reference.positions.T, strict=True))
+    now = trajectory.time[steps]
+    desired = [np.interp(now, reference.time, columns[name]) for name in compared]
+    joints = [robot.anatomy.hinges.index(name) for name in compared]
+    positions = trajectory["joint_positions"][:, steps][..., joints]
     squares = np.square(positions - np.stack(desired, axis=-1))
-    observed = np.isfinite(squares)
-    count = observed.sum(axis=(1, 2))
-    total = np.where(observed, squares, 0.0).sum(axis=(1, 2))
-    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    mean = mean_of_known(squares, axis=(1, 2), empty=np.nan)
     return np.asarray(0.0 - np.sqrt(mean))  # not -sqrt: a perfect score is 0, not -0

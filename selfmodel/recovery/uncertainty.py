@@ -8,7 +8,7 @@ self-modeling* (Science 2006).
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -123,12 +123,11 @@ def estimated_uncertainty(
     Args:
         simulator: The self-model, calibrated if there is a calibration.
         trials: Trials of the healthy robot, at least one.
-        calibration: Fit of the self-model to the trials; None without one.
+        calibration: Fit of the self-model to the trials.
     """
     robot, assumed = simulator.robot, assumed_uncertainty(simulator.robot)
     touch = _touch(robot.anatomy)
-    variances = [_variances(simulator, trial) for trial in trials]
-    noise, wrong, angles, tilts = zip(*variances, strict=True)
+    noise, wrong, angles, tilts = zip(*(_variances(simulator, one) for one in trials), strict=True)
     angle = _deviation(angles)
     measured = DomainDistribution(
         models=exact(robot),
@@ -156,31 +155,25 @@ def _touch(anatomy: Anatomy) -> BoolArray:
 def _variances(simulator: Simulator, trial: Trial) -> tuple[FloatArray, FloatArray, float, float]:
     """Returns the excess over a simulation of a trial: of readings, of the initial pose.
 
-    Returns:
-        Variance of the readings and frequency of their flips, ``(sensors,)`` each; variance of the
-        initial joint angles, and of the initial roll and pitch, NaN if not observed.
+    These are the variance of the readings and the frequency of their flips, ``(sensors,)`` each;
+    the variance of the initial joint angles, and of the initial roll and pitch; NaN if unknown.
     """
     logged = trial.trajectory
     runs = simulator.run([(INTACT, trial.plan.controller)], logged.steps, NOISY).trajectory
-    pairs = [(logged[signal], runs[signal][0]) for signal in NOISY]
-    readings, angles, orientations = pairs
+    readings, angles, orientations = ((logged[signal], runs[signal][0]) for signal in NOISY)
     roll_and_pitch = [directions(each)[:, 2:4] for each in orientations]
+    logged_flips, simulated_flips = map(_flips, readings)
     return (
-        _excess(_variance, *readings),
-        _excess(_flips, *readings),
+        _noise_variance(*readings),
+        np.maximum(logged_flips - simulated_flips, 0.0),
         _start_variance(*angles),
         _start_variance(*roll_and_pitch),
     )
 
 
-def _excess(
-    estimate: Callable[[FloatArray], FloatArray], logged: FloatArray, simulated: FloatArray
-) -> FloatArray:
-    return np.maximum(estimate(logged) - estimate(simulated), 0.0)
-
-
-def _variance(series: FloatArray) -> FloatArray:
-    return np.square(encoder_noise(series))
+def _noise_variance(logged: FloatArray, simulated: FloatArray) -> FloatArray:
+    one, other = (np.square(encoder_noise(series)) for series in (logged, simulated))
+    return np.asarray(np.maximum(one - other, 0.0))
 
 
 def _flips(series: FloatArray) -> FloatArray:
@@ -191,7 +184,7 @@ def _flips(series: FloatArray) -> FloatArray:
 
 def _start_variance(logged: FloatArray, simulated: FloatArray) -> float:
     """Returns the mean variance of the initial pose; NaN if it was not observed."""
-    noise = float(np.mean(_excess(_variance, logged, simulated)))
+    noise = float(np.mean(_noise_variance(logged, simulated)))
     deviations = np.square(logged[0] - simulated[0])
     known = deviations[np.isfinite(deviations)]
     if not len(known):
@@ -208,12 +201,8 @@ def _deviation(variances: Sequence[float]) -> float:
 class Posterior:
     """The uncertainty of a self-model, updated by trials. It simulates nothing until it is needed.
 
-    Attributes:
-        simulator: Self-model, calibrated if there is a calibration.
-        healthy: Trials of the healthy robot, at least one.
-        calibration: Fit of the self-model to the healthy trials; None without one.
-        settings: The paper's numbers, which set the cost.
-        rng: Random number generator of the sample.
+    ``simulator``, ``healthy`` and ``calibration`` are the arguments of ``estimated_uncertainty``;
+    the settings set the cost of the sample, whose random numbers are of ``rng``.
     """
 
     simulator: Simulator
@@ -296,12 +285,9 @@ def log_likelihood(
 
 
 def flattened_weights(likelihood: FloatArray) -> FloatArray:
-    """Returns the weights of models, ``(models,)``.
+    """Returns the weights of models by the logarithms of their likelihoods, ``(models,)`` both.
 
     The likelihood is flattened until the effective size of the sample is large enough.
-
-    Args:
-        likelihood: Logarithm of the likelihood of each model, ``(models,)``.
     """
     temperature = 1.0
     while True:
@@ -347,8 +333,7 @@ def _observed(trial: Trial) -> FloatArray:
 
     Steps at which the base was not observed are interpolated; all are NaN if it never was.
     """
-    logged = trial.trajectory
-    track = _track(logged["base_position"], logged["base_orientation"])
+    track = _track(trial.trajectory["base_position"], trial.trajectory["base_orientation"])
     steps = np.arange(len(track))
     for column in track.T:
         known = np.isfinite(column)
@@ -358,12 +343,7 @@ def _observed(trial: Trial) -> FloatArray:
 
 
 def _track(position: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns forward and sideways position, m, and heading, rad, ``(steps, 3)``.
-
-    Args:
-        position: ``(steps, 3)``.
-        orientation: ``(steps, 4)``; NaN where unknown.
-    """
+    """Returns forward and sideways position, m, and heading, rad, ``(steps, 3)``."""
     ahead = directions(orientation)
     heading = np.arctan2(ahead[:, 1], ahead[:, 0])
     known = np.isfinite(heading)

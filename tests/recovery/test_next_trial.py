@@ -26,8 +26,8 @@ from selfmodel.recovery.next_trial import (
     disagreements,
     discriminating_controller,
 )
-from selfmodel.recovery.recover import RecoveryLoop, by_repair, untried_mutants
-from selfmodel.recovery.repair import CandidateController
+from selfmodel.recovery.recover import RecoveryLoop, by_repair
+from selfmodel.recovery.repair import CandidateController, untried_mutants
 from selfmodel.recovery.result import Database, DiscriminatingTrial, Event
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
