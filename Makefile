@@ -26,11 +26,11 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "selfmodel needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
-	$(BIN)/python -m pip install --constraint constraints.txt --editable .
+	$(BIN)/python -m pip install --no-compile --constraint constraints.txt --editable .
 	touch $@
 
 $(TOOLS): $(READY)
-	$(BIN)/python -m pip install --constraint constraints.txt --group dev --group docs
+	$(BIN)/python -m pip install --no-compile --constraint constraints.txt --group dev --group docs
 	touch $@
 
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does
