@@ -31,6 +31,7 @@ $(READY): pyproject.toml constraints.txt
 
 $(TOOLS): $(READY)
 	$(BIN)/python -m pip install --no-compile --constraint constraints.txt --group dev --group docs
+	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --only-binary pybullet --group other-engine || echo 'no wheel of PyBullet for this platform: its tests are skipped'
 	touch $@
 
 demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it does

@@ -1,0 +1,290 @@
+"""A damaged robot on the ground in a client of PyBullet, and its URDF."""
+
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pybullet
+from scipy.spatial.transform import Rotation
+
+from benchmarks.other_engine.reality import SUBSTEP, Damage, Reality
+from selfmodel.errors import InputError
+from selfmodel.logs.viewers import urdf as exported_urdf
+from selfmodel.robot.robot import Robot
+
+FOOT_TOLERANCE = 1.2
+"""Largest distance of a contact that a foot senses from the centre of its site, in its radii."""
+
+MASSLESS = "1e-09"
+"""Mass, kg, and inertia, kg m^2, of the links between two hinges of one body; PyBullet gives a link
+without an inertia a mass of 1 kg."""
+
+
+class Contact(NamedTuple):
+    """A contact of the robot with the ground: m, N; the depth is negative for a gap."""
+
+    link: int
+    position: np.ndarray
+    depth: float
+    force: float
+
+
+class Bullet:
+    """A robot in PyBullet, by the names of its model; ``close`` ends the client.
+
+    Args:
+        robot: The healthy robot.
+        reality: Masses and contacts of this robot.
+        damage: Its damage.
+
+    Attributes:
+        client: PyBullet's number of the client; -1 after ``close``.
+    """
+
+    def __init__(self, robot: Robot, reality: Reality, damage: Damage) -> None:
+        self._robot, self._reality, self._damage = robot, reality, damage
+        self._urdf = damaged_urdf(robot, reality, damage)
+        model = robot.model
+        self._sites = {
+            sensor.name: int(model.sensor_objid[model.sensor(sensor.name).id])
+            for sensor in robot.anatomy.sensors
+            if sensor.kind == "touch"
+        }
+        self.client = pybullet.connect(pybullet.DIRECT)
+        self.reset()
+
+    def close(self) -> None:
+        """Ends the client; further calls do nothing."""
+        if self.client >= 0:
+            pybullet.disconnect(physicsClientId=self.client)
+            self.client = -1
+
+    def _call(self, function: str, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401  # PyBullet's
+        """Calls a function of PyBullet for this client."""
+        return getattr(pybullet, function)(*arguments, physicsClientId=self.client, **options)
+
+    def reset(self) -> None:
+        """Loads ground and robot anew, in the initial pose at rest: no contact is remembered."""
+        self._call("resetSimulation")
+        self._call(
+            "setPhysicsEngineParameter",
+            fixedTimeStep=SUBSTEP,
+            numSubSteps=0,
+            deterministicOverlappingPairs=1,
+            enableFileCaching=0,
+        )
+        self._call("setGravity", *self._robot.model.opt.gravity)
+        plane = self._call("createCollisionShape", pybullet.GEOM_PLANE)
+        self._ground = self._call("createMultiBody", 0, plane)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "robot.urdf")
+            path.write_text(self._urdf, encoding="utf-8")
+            flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+            self._body = self._call("loadURDF", str(path), flags=flags)
+        of_joint = partial(self._call, "getJointInfo", self._body)
+        infos = [of_joint(k) for k in range(self._call("getNumJoints", self._body))]
+        self._links = {info[12].decode(): info[0] for info in infos}
+        hinges = {i[1].decode(): i[0] for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
+        names = self._robot.anatomy.hinges
+        self._present = np.array([name in hinges for name in names])
+        self._hinges = [hinges[name] for name in names if name in hinges]
+        self._set_dynamics()
+        root = self._robot.model.body(self._robot.root)
+        self.place(root.pos, root.quat, np.zeros(len(names)))
+
+    def _set_dynamics(self) -> None:
+        # Bullet multiplies the coefficients of the two bodies.
+        change = partial(self._call, "changeDynamics")
+        change(self._ground, -1, lateralFriction=1.0, restitution=1.0)
+        contact = {
+            "lateralFriction": self._reality.friction,
+            "restitution": self._reality.restitution,
+        }
+        for link in (-1, *self._links.values()):
+            change(self._body, link, linearDamping=0, angularDamping=0, jointDamping=0, **contact)
+        # Each joint of PyBullet begins with a motor that holds it.
+        self._control(pybullet.VELOCITY_CONTROL, [0.0] * len(self._hinges))
+        found = self._call("getDynamicsInfo", self._body, -1)
+        self._base_inertial = found[3], found[4]
+
+    def _control(self, mode: int, forces: list[float]) -> None:
+        self._call("setJointMotorControlArray", self._body, self._hinges, mode, forces=forces)
+
+    def place(self, position: np.ndarray, orientation: np.ndarray, angles: np.ndarray) -> None:
+        """Moves the robot to a pose, at rest.
+
+        Args:
+            position: Position of the root body, m.
+            orientation: Its orientation, w x y z.
+            angles: Angle of each hinge of the model, rad; unused for absent and fixed ones.
+        """
+        pose = pybullet.multiplyTransforms(position, np.roll(orientation, -1), *self._base_inertial)
+        self._call("resetBasePositionAndOrientation", self._body, *pose)
+        self._call("resetBaseVelocity", self._body, [0, 0, 0], [0, 0, 0])
+        for joint, angle in zip(self._hinges, angles[self._present], strict=True):
+            self._call("resetJointState", self._body, joint, angle, 0.0)
+        self._call("performCollisionDetection")
+
+    def depth(self) -> float:
+        """Returns the depth of the deepest contact with the ground, m; 0 without one."""
+        return max([0.0, *(contact.depth for contact in self._contacts())])
+
+    def step(self, torques: np.ndarray) -> None:
+        """Advances by a substep under a torque at each hinge of the model, N m.
+
+        Those of absent and fixed hinges have no effect.
+        """
+        self._control(pybullet.TORQUE_CONTROL, torques[self._present].tolist())
+        self._call("stepSimulation")
+
+    def hinges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns angle, rad, and angular velocity, rad/s, of each hinge of the model.
+
+        An absent hinge has the angle 0, a fixed one its angle; both have the velocity 0.
+        """
+        names = self._robot.anatomy.hinges
+        angles = np.array([self._damage.fixed.get(name, 0.0) for name in names])
+        speeds = np.zeros(len(names))
+        states = self._call("getJointStates", self._body, self._hinges)
+        angles[self._present] = [state[0] for state in states]
+        speeds[self._present] = [state[1] for state in states]
+        return angles, speeds
+
+    def base(self) -> tuple[np.ndarray, Rotation, np.ndarray, np.ndarray]:
+        """Returns position, m, orientation, velocity, m/s, angular velocity, rad/s, of the base.
+
+        Those of the origin of the root body; the angular velocity is in the frame of the base.
+        """
+        centre, turn = self._call("getBasePositionAndOrientation", self._body)
+        inverse = pybullet.invertTransform(*self._base_inertial)
+        position, quaternion = pybullet.multiplyTransforms(centre, turn, *inverse)
+        linear, angular = map(np.array, self._call("getBaseVelocity", self._body))
+        orientation = Rotation.from_quat(quaternion)
+        linear = linear + np.cross(angular, np.subtract(position, centre))
+        return np.array(position), orientation, linear, orientation.inv().apply(angular)
+
+    def is_valid(self) -> bool:
+        """Returns whether the state is finite: Bullet has no warning of its own."""
+        centre, turn = self._call("getBasePositionAndOrientation", self._body)
+        numbers = np.concatenate([centre, *self.hinges()])
+        return bool(np.isfinite(numbers).all() and np.linalg.norm(turn) > 0.5)
+
+    def touches(self) -> dict[str, bool]:
+        """Returns whether each touch sensor senses the ground."""
+        by_link: dict[int, list[np.ndarray]] = {}
+        for contact in self._contacts():
+            if contact.force > 0 or contact.depth >= 0:  # there is no force before the first step
+                by_link.setdefault(contact.link, []).append(contact.position)
+        model, felt = self._robot.model, dict.fromkeys(self._sites, False)
+        for name, site in self._sites.items():
+            link = self._links.get(model.body(model.site_bodyid[site]).name)
+            if link in by_link:
+                pose, place = self._pose(link), (model.site_pos[site], [0, 0, 0, 1])
+                foot, _ = pybullet.multiplyTransforms(*pose, *place)
+                reach = FOOT_TOLERANCE * float(model.site_size[site, 0])
+                felt[name] = any(np.linalg.norm(at - foot) <= reach for at in by_link[link])
+        return felt
+
+    def _pose(self, link: int) -> tuple[Any, Any]:
+        state = self._call("getLinkState", self._body, link, computeForwardKinematics=1)
+        return state[4], state[5]
+
+    def positions(self) -> dict[str, np.ndarray]:
+        """Returns the position of each present body other than the root, m."""
+        return {name: np.array(self._pose(link)[0]) for name, link in self._links.items()}
+
+    def mass(self) -> float:
+        """Returns the total mass, kg."""
+        links = (-1, *self._links.values())
+        return float(sum(self._call("getDynamicsInfo", self._body, link)[0] for link in links))
+
+    def _contacts(self) -> list[Contact]:
+        found = self._call("getContactPoints", self._body, self._ground)
+        return [Contact(point[3], np.array(point[5]), -point[8], point[9]) for point in found]
+
+
+def damaged_urdf(robot: Robot, reality: Reality, damage: Damage) -> str:
+    """Returns selfmodel's URDF with collision shapes and other masses, and without lost links."""
+    # The export is selfmodel's own text, so no untrusted XML is parsed.
+    tree = ET.fromstring(exported_urdf(robot))  # noqa: S314  # see the line above
+    for link in tree.findall("link"):
+        _complete(link, robot.model, reality)
+    joints = {joint.get("name"): joint for joint in tree.findall("joint")}
+    links = {link.get("name"): link for link in tree.findall("link")}
+    for hinge in damage.lost:
+        tree.remove(links[_part(joints[hinge], "child").get("link")])
+        tree.remove(joints[hinge])
+    for hinge, angle in damage.fixed.items():
+        _fix(joints[hinge], angle)
+    return ET.tostring(tree, encoding="unicode")
+
+
+def _complete(link: ET.Element, model: mujoco.MjModel, reality: Reality) -> None:
+    """Replaces the shapes of a viewer by collision shapes, and scales the mass."""
+    for visual in link.findall("visual"):
+        link.remove(visual)
+    inertial = link.find("inertial")
+    if inertial is None:
+        inertial = ET.SubElement(link, "inertial")
+        ET.SubElement(inertial, "mass", value=MASSLESS)
+        axes = dict.fromkeys(("ixx", "iyy", "izz"), MASSLESS)
+        ET.SubElement(inertial, "inertia", axes, ixy="0", ixz="0", iyz="0")
+        return
+    body = model.body(link.get("name")).id
+    for element in inertial.findall("mass") + inertial.findall("inertia"):
+        for name, value in element.attrib.items():
+            element.set(name, repr(float(value) * reality.masses[body]))
+    first = int(model.body_geomadr[body])
+    for geom in range(first, first + int(model.body_geomnum[body])):
+        if model.geom_contype[geom] or model.geom_conaffinity[geom]:
+            _add_collision(link, model, geom)
+
+
+def _add_collision(link: ET.Element, model: mujoco.MjModel, geom: int) -> None:
+    """Adds a shape that includes the margin: the soft skin in which contact forces begin."""
+    size = model.geom_size[geom] + model.geom_margin[geom]
+    match int(model.geom_type[geom]):
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            shape = ET.Element("box", size=_text(2 * size))
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            length = repr(2 * float(model.geom_size[geom][1]))
+            shape = ET.Element("capsule", radius=repr(float(size[0])), length=length)
+        case kind:
+            raise InputError(
+                f"expected collision shapes that are boxes or capsules, as those of our robots "
+                f"are, got {mujoco.mjtGeom(kind).name}: add its URDF shape here"
+            )
+    collision = ET.SubElement(link, "collision")
+    turn = Rotation.from_quat(model.geom_quat[geom], scalar_first=True).as_euler("xyz")
+    ET.SubElement(collision, "origin", xyz=_text(model.geom_pos[geom]), rpy=_text(turn))
+    ET.SubElement(collision, "geometry").append(shape)
+
+
+def _fix(joint: ET.Element, angle: float) -> None:
+    """Makes a hinge a fixed joint at an angle, rad."""
+    origin, axis = _part(joint, "origin"), _part(joint, "axis")
+    turn = Rotation.from_euler("xyz", _numbers(origin, "rpy"))  # URDF's are about fixed axes
+    turn *= Rotation.from_rotvec(angle * _numbers(axis, "xyz"))
+    origin.set("rpy", _text(turn.as_euler("xyz")))
+    joint.set("type", "fixed")
+    for element in joint.findall("axis") + joint.findall("limit"):
+        joint.remove(element)
+
+
+def _part(element: ET.Element, name: str) -> ET.Element:
+    found = element.find(name)
+    if found is None:
+        raise ValueError(f"{element.get('name')} has no {name}")
+    return found
+
+
+def _numbers(element: ET.Element, name: str) -> np.ndarray:
+    return np.array([float(value) for value in element.get(name, "").split()])
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)

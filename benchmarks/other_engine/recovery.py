@@ -1,0 +1,221 @@
+"""Recoveries of robots in PyBullet, walks of given gaits in both engines, and their tables."""
+
+import dataclasses
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import selfmodel
+from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
+from benchmarks.other_engine.reality import Damage, Reality, damage_of, draw_reality, ideal_reality
+from selfmodel.controllers.controller import Controller
+from selfmodel.errors import WorkError, describe
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.notation import parse
+from selfmodel.logs import load_controller
+from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.scores import falls_of
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies.experiment import is_correct
+from selfmodel.studies.statistics import proportion
+from selfmodel.tasks import ROBOTS
+from selfmodel.trials.trajectory import collect, forward_displacement
+from selfmodel.version import __version__
+
+Row = dict[str, Any]
+
+
+def recovered(  # the options of the command
+    name: str,
+    case: int,
+    seed: int,
+    folder: Path,
+    *,
+    settings: Settings | None = None,
+    threads: int = 0,
+) -> Row:
+    """Runs a recovery and returns its row.
+
+    Args:
+        name: Name of the robot.
+        case: Number of the failure in Table I.
+        seed: Seed of the physical robot, and of the recovery.
+        folder: Folder of the run, new or empty.
+        settings: Parameters of the recovery; None for the paper's.
+        threads: Threads of the self-model's physics; 0 for all processors.
+    """
+    entry, settings = ROBOTS[name], settings or Settings()
+    robot, notation = entry.robot(), entry.cases[case]
+    reality = draw_reality(robot, seed)
+    row: Row = {
+        "robot": name,
+        "case": case,
+        "truth": notation,
+        "seed": seed,
+        "settings": dataclasses.asdict(settings),
+        "reality": dataclasses.asdict(reality),
+        "version": __version__,
+    }
+    start = perf_counter()
+    with (
+        BulletEnvironment(robot, reality, Damage(), stream=0) as healthy,
+        BulletEnvironment(robot, reality, damage_of(notation, robot.anatomy), stream=1) as damaged,
+    ):
+        try:
+            found = selfmodel.recover(
+                physical_robot(healthy, robot),
+                physical_robot(damaged, robot),
+                robot,
+                folder,
+                settings=settings,
+                seed=seed,
+                threads=threads,
+            )
+        except WorkError as error:
+            return {**row, "error": describe(error), "seconds": perf_counter() - start}
+    row["seconds"] = perf_counter() - start
+    return {**row, **_facts(found, robot, parse(notation, robot.anatomy), threads)}
+
+
+def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) -> Row:
+    diagnosis, nominal = recovery.diagnosis, Simulator(robot, threads)
+    trials = zip(recovery.trials, recovery.tried, _simulated(recovery, nominal), strict=True)
+    return {
+        "diagnosis": str(diagnosis.best),
+        "verdict": diagnosis.verdict,
+        "indistinguishable": [str(other) for other in diagnosis.indistinguishable],
+        "correct": is_correct(diagnosis.best, truth, recovery.trials[1:], nominal),
+        "comparator": recovery.comparator.comparator.name,
+        "calibration": recovery.calibration.to_dict() if recovery.calibration else None,
+        "before": recovery.before,
+        "after": recovery.after,
+        "recovered": recovery.recovered,
+        "trials": [
+            {
+                "stage": trial.plan.stage,
+                "hypothesis": str(tried),
+                "displacement": trial.displacement,
+                "simulated": simulated,
+                "upright": bool(
+                    falls_of(robot, INTACT, trial.trajectory) == trial.trajectory.steps
+                ),
+            }
+            for trial, tried, simulated in trials
+        ],
+    }
+
+
+def _simulated(recovery: Recovery, nominal: Simulator) -> Iterator[float | None]:
+    """Yields the displacement of each trial's controller in the self-model of its search, m.
+
+    The failing trial has None: its controller was evolved for the healthy robot. So has a
+    simulation that diverged.
+    """
+    fitted = recovery.calibration
+    calibrated = Simulator(fitted.robot, nominal.threads) if fitted else nominal
+    for trial, tried in zip(recovery.trials, recovery.tried, strict=True):
+        simulator = nominal if trial.plan.stage == "before" else calibrated
+        runs = [(tried, trial.plan.controller)]
+        result = simulator.run(runs, trial.plan.steps, ("base_position",))
+        lost = trial.plan.stage == "after" or bool(result.diverged[0])
+        yield None if lost else float(forward_displacement(result.trajectory)[0])
+
+
+def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) -> Iterator[str]:
+    """Yields a Markdown table, line by line: a row per gait, m in a trial of the paper's length.
+
+    Args:
+        robot: The healthy robot.
+        gaits: Files of its controllers.
+        seeds: Seeds of robots in PyBullet.
+    """
+    realities = [ideal_reality(robot), *(draw_reality(robot, seed) for seed in seeds)]
+    names = ["gait", "MuJoCo", "PyBullet, ideal", *(f"PyBullet, robot {seed}" for seed in seeds)]
+    yield f"| {' | '.join(names)} |"
+    yield "|---" * len(names) + "|"
+    for path in gaits:
+        gait = load_controller(path)
+        result = Simulator(robot, threads=1).run(
+            [(INTACT, gait)], Settings().steps, ("base_position",)
+        )
+        found = [forward_displacement(result.trajectory)[0]]
+        found += [_in_bullet(robot, gait, reality) for reality in realities]
+        yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
+
+
+def _in_bullet(robot: Robot, gait: Controller, reality: Reality) -> float:
+    with BulletEnvironment(robot, reality) as environment:
+        samples = physical_robot(environment, robot).run(gait, Settings().steps)
+        return float(forward_displacement(collect(robot.anatomy.names, samples)))
+
+
+HEADINGS = (
+    *("recoveries", "diagnosis right", "before, m", "after, m", "recovered, m"),
+    *("recovered ÷ before", "first trial ÷ before", "physical ÷ simulated", "upright", "seconds"),
+)
+
+
+def read_rows(paths: Iterable[Path]) -> list[Row]:
+    """Returns the rows of some files, each with a JSON object per line."""
+    texts = [path.read_text(encoding="utf-8") for path in paths]
+    return [json.loads(line) for text in texts for line in text.splitlines() if line.strip()]
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Returns rates with Wilson's 95 % intervals and medians as Markdown, by robot and case.
+
+    A recovery that ended with an error counts as a wrong diagnosis, and as a recovery of 0 m that
+    is not upright. One whose healthy robot went backwards has no ratio to the displacement before.
+    """
+    headings = ("robot", "case", *HEADINGS)
+    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
+    for robot in dict.fromkeys(row["robot"] for row in rows):
+        of_robot = [row for row in rows if row["robot"] == robot]
+        for case in (*sorted({row["case"] for row in of_robot}), "all"):
+            chosen = [row for row in of_robot if case in ("all", row["case"])]
+            lines.append(f"| {robot} | {case} | {' | '.join(_cells(chosen))} |")
+    return "\n".join(lines)
+
+
+def _cells(rows: Sequence[Row]) -> list[str]:
+    complete = [row for row in rows if "error" not in row]
+    forward = [row for row in complete if row["before"] > 0]
+    errors = [0.0] * (len(rows) - len(complete))
+    trials = [trial for row in complete for trial in _recovery_trials(row)]
+    ratios = [trial["displacement"] / trial["simulated"] for trial in trials if trial["simulated"]]
+    first = [_recovery_trials(row)[0]["displacement"] / row["before"] for row in forward]
+    best = [max(_recovery_trials(row), key=lambda trial: trial["displacement"]) for row in complete]
+    return [
+        str(len(rows)),
+        _rate([row.get("correct", False) for row in rows]),
+        *(_median([row[key] for row in complete]) for key in ("before", "after", "recovered")),
+        _median([row["recovered"] / row["before"] for row in forward] + errors),
+        _median(first + errors),
+        _median(ratios),
+        _rate([trial["upright"] for trial in best] + [False] * len(errors)),
+        _median([row["seconds"] for row in rows]),
+    ]
+
+
+def _recovery_trials(row: Row) -> list[Row]:
+    return [trial for trial in row["trials"] if trial["stage"] == "recovery"]
+
+
+def _rate(values: Sequence[bool]) -> str:
+    found = proportion(sum(values), len(values))
+    return (
+        f"{sum(values)}/{len(values)}, {100 * found.estimate:.0f} % "
+        f"({100 * found.low:.0f} to {100 * found.high:.0f})"
+    )
+
+
+def _median(values: Sequence[float]) -> str:
+    if not values:
+        return ""
+    return f"{np.median(values):.3g} ({min(values):.3g} to {max(values):.3g})"
