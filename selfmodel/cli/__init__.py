@@ -1,12 +1,14 @@
 """The command line: one file a command, imported when the command runs."""
 
+import os
 import sys
 from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
+from typer.main import get_command
 
-from selfmodel.cli.groups import Interrupted, group
+from selfmodel.cli.groups import group
 from selfmodel.cli.output import (
     counted_warnings,
     flush_output,
@@ -103,7 +105,7 @@ def main() -> None:
     open_streams()
     with handle_stop_signals():
         try:
-            _run()
+            sys.exit(_run())
         except InputError as error:
             _fail(describe(error), 2)
         except BrokenPipeError:
@@ -112,37 +114,34 @@ def main() -> None:
             # A full disk, a folder without write permission: the message contains the file's name.
             _fail(describe(error), 1)
         except MemoryError as error:
-            _fail(
-                f"there is not enough memory ({str(error) or 'for this'}): request less at once", 1
-            )
+            reason = str(error) or "for this"
+            _fail(f"there is not enough memory ({reason}): request less at once", 1)
         except KeyboardInterrupt as interruption:
             notes = "; ".join(getattr(interruption, "__notes__", ()))
             _fail(f"interrupted: {notes}" if notes else "interrupted", status_of(interruption))
 
 
-def _run() -> None:
+def _run() -> int:
     try:
         with counted_warnings():
-            # The same usage line for `python -m selfmodel` as for the installed command.
-            status = app(prog_name="selfmodel", standalone_mode=False)
-    except Interrupted as end:
-        raise end.interruption from None
+            if "_SELFMODEL_COMPLETE" in os.environ:
+                app(prog_name="selfmodel")
+            # As typer's own main, which replaces a KeyboardInterrupt by an exit status.
+            with get_command(app).make_context("selfmodel", sys.argv[1:]) as context:
+                context.command.invoke(context)
+    except typer.Exit as end:
+        return end.exit_code
     except UsageError as error:
-        status = _print_usage(error)
+        # Without arguments, the message is the help page: lines of ours.
+        if error.ctx is None or error.message != error.ctx.get_help():
+            error.message = plain(error.message)
+        error.show()
+        return int(error.exit_code)
     finally:
         flush_output()
-    sys.exit(status or 0)
-
-
-def _print_usage(error: Any) -> int:  # noqa: ANN401  # typer hides the type
-    """Prints a usage error with the usage line, and returns the exit status."""
-    # Without arguments, the message is the help page: lines of ours.
-    if error.ctx is None or error.message != error.ctx.get_help():
-        error.message = plain(error.message)
-    error.show()
-    return int(error.exit_code)
+    return 0
 
 
 def _fail(message: str, status: int) -> None:
     print_notes(f"error: {message}")
-    sys.exit(status or 0)
+    sys.exit(status)

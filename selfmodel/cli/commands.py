@@ -1,6 +1,6 @@
 """The options of each command: the fields of a dataclass, whose docstring is the command's help.
 
-``options`` has the help of each field. A class that several commands inherit from is what the
+``options.toml`` has the help of each field. A class that several commands inherit from is what the
 functions that they share take.
 """
 
@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from selfmodel.cli import options
-from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
+from selfmodel.faults.registry import ALL_KINDS, DEFAULT_KINDS, KIND_SETS, PAPER_KINDS
 from selfmodel.settings import Settings
+from selfmodel.trials.trial import STAGES
 
 DEFAULT_KIND_NAMES = ",".join(kind.name for kind in DEFAULT_KINDS)
 PAPER_KIND_NAMES = ",".join(kind.name for kind in PAPER_KINDS)
+LISTED = {"kinds": [kind.name for kind in ALL_KINDS], "sets": KIND_SETS, "stages": STAGES}
+"""Names that texts of ``options.toml`` list."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +149,7 @@ class Recover(Robot):
 class RunTrial(Robot, Notation):
     """Run one trial of the simulated physical robot and write its log."""
 
-    PANELS: ClassVar = (options.FAILURE, options.CONTROLLER, options.PHYSICAL)
+    PANELS: ClassVar = ("Arguments", "Failure", "Controllers and trials", "Physical robot")
     out: Path
     damage: str | None = None
     controller: str | None = None
@@ -335,9 +337,7 @@ class RunSuite(Study, Repair):
     An interrupted study is continued by the same command.
     """
 
-    PANELS: ClassVar = (
-        *(options.STUDY, options.PHYSICAL, options.SEARCH, options.CONTROLLER, options.DIAGNOSIS),
-    )
+    PANELS: ClassVar = ("Study", "Physical robot", "Search", "Controllers and trials", "Diagnosis")
     domains: str = "all"
     tasks: str | None = None
     gap: float = 0.0

@@ -1,51 +1,20 @@
 """Command groups that import a command as it runs, and its help page, so that help is fast."""
 
+import dataclasses
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from importlib import import_module
-from typing import Any
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib import import_module, resources
+from inspect import Parameter, Signature
+from typing import Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 ARGUMENTS, OTHERS = "Arguments", "Options"
-"""Headings of the first and the last group on a page."""
-
-
-class Interrupted(Exception):  # noqa: N818  # no error: the user ended the command
-    """Interruption of a command; typer replaces a ``KeyboardInterrupt`` by an exit status.
-
-    Args:
-        interruption: The interruption.
-    """
-
-    def __init__(self, interruption: KeyboardInterrupt) -> None:
-        super().__init__()
-        self.interruption = interruption
-
-
-class InterruptibleGroup(TyperGroup):
-    """Command group whose commands end with ``Interrupted``."""
-
-    def make_context(self, *args: Any, **extra: Any) -> Any:  # noqa: ANN401  # as typer declares it
-        """Parses the arguments before the command."""
-        with _interruptible():
-            return super().make_context(*args, **extra)
-
-    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401  # as typer declares it
-        """Runs a command."""
-        with _interruptible():
-            return super().invoke(ctx)
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    try:
-        yield
-    except KeyboardInterrupt as interruption:
-        raise Interrupted(interruption) from interruption
+"""Headings of the first and the last group on a page, and sections of ``options.toml``."""
 
 
 class LazyCommand(TyperCommand):
@@ -73,23 +42,18 @@ class HelpPageCommand(TyperCommand):
         groups: dict[str, list[tuple[str, str]]] = {ARGUMENTS: []}
         others: list[tuple[str, str]] = []
         for param in self.get_params(ctx):
-            record = param.get_help_record(ctx)
-            if record is None:
-                continue
-            heading = getattr(param, "rich_help_panel", None)
-            if param.param_type_name == "argument":
-                groups[ARGUMENTS].append((str(param.metavar), record[1]))
-            else:
+            if (record := param.get_help_record(ctx)) is not None:
+                heading = getattr(param, "rich_help_panel", None)
+                heading = ARGUMENTS if param.param_type_name == "argument" else heading
                 rows = groups.setdefault(heading, []) if heading else others
                 rows.append((_names(param), record[1]))
         groups[OTHERS] = others
         # The same first column in every group.
         column = 4 + max(len(names) for rows in groups.values() for names, _ in rows)
-        for heading, rows in groups.items():
-            if rows:
-                with formatter.section(heading):
-                    for names, text in rows:
-                        formatter.write(_row(f"  {names}".ljust(column), text, formatter.width))
+        for heading, rows in filter(lambda group: group[1], groups.items()):
+            with formatter.section(heading):
+                for names, text in rows:
+                    formatter.write(_row(f"  {names}".ljust(column), text, formatter.width))
 
 
 def _row(names: str, text: str, width: int) -> str:
@@ -98,13 +62,15 @@ def _row(names: str, text: str, width: int) -> str:
     return f"{wrapper.fill(text)}\n"
 
 
-def _names(option: Any) -> str:  # noqa: ANN401  # the same
+def _names(param: Any) -> str:  # noqa: ANN401  # the same
     """Returns the names that a help page shows: short ones, and the first of the long ones."""
-    short = [name for name in option.opts if not name.startswith("--")]
-    names = ", ".join([*short, next(name for name in option.opts if name.startswith("--"))])
-    if option.secondary_opts:
-        return f"{names}/{option.secondary_opts[0]}"
-    return names if option.is_flag else f"{names} {option.metavar}"
+    if param.param_type_name == "argument":
+        return str(param.metavar)
+    short = [name for name in param.opts if not name.startswith("--")]
+    names = ", ".join([*short, next(name for name in param.opts if name.startswith("--"))])
+    if param.secondary_opts:
+        return f"{names}/{param.secondary_opts[0]}"
+    return names if param.is_flag else f"{names} {param.metavar}"
 
 
 def group(
@@ -124,13 +90,7 @@ def group(
             options that the work takes. A group has its application instead of the last two.
         completion: Adds the options that install shell completion.
     """
-    app = _app(
-        cls=InterruptibleGroup,
-        name=name,
-        help=summary,
-        no_args_is_help=True,
-        add_completion=completion,
-    )
+    app = _app(name=name, help=summary, no_args_is_help=True, add_completion=completion)
     for command, (text, *source) in commands.items():
         app.command(command, help=text, cls=LazyCommand)(_importer(command, *source))
     return app
@@ -138,6 +98,7 @@ def group(
 
 def _app(**settings: Any) -> typer.Typer:  # noqa: ANN401  # of several types
     return typer.Typer(
+        cls=TyperGroup,
         context_settings={"help_option_names": ["-h", "--help"]},
         # An unforeseen error prints its traceback: it is a bug report.
         pretty_exceptions_enable=False,
@@ -161,11 +122,53 @@ def _importer(name: str, work: Any, options: str = "") -> Callable[[], Any]:  # 
 
         # What typer reads of a function.
         run.__doc__ = taken.__doc__
-        signature = import_module("selfmodel.cli.options").signature_of(taken)
-        run.__annotations__ = {key: one.annotation for key, one in signature.parameters.items()}
-        vars(run)["__signature__"] = signature
+        parameters = parameters_of(taken)
+        run.__annotations__ = {one.name: one.annotation for one in parameters}
+        vars(run)["__signature__"] = Signature(parameters)
         alone = _app(add_completion=False)
         alone.command(name, cls=HelpPageCommand)(run)
         return get_command(alone)
 
     return imported
+
+
+def parameters_of(command: type) -> list[Parameter]:
+    """Returns the fields of a command's dataclass as parameters with typer's options.
+
+    An option is that of ``CLASS.FIELD`` in ``options.toml``, for the command or a class it inherits
+    from, or else of ``FIELD``; the order is that of the file, but for the command's ``PANELS``.
+    """
+    annotated: Any = Annotated  # with types of run time
+    table, hints = options(), get_type_hints(command)
+    panels = {name: place for place, name in enumerate(getattr(command, "PANELS", ()))}
+    found = {}
+    for field in dataclasses.fields(command):
+        names = [f"{one.__name__}.{field.name}" for one in command.__mro__] + [field.name]
+        name = next(name for name in names if name in table)
+        panel, option = table[name]
+        default = Parameter.empty if field.default is dataclasses.MISSING else field.default
+        typed = annotated[hints[field.name], option]
+        parameter = Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=typed)
+        found[panels.get(panel, len(panels)), list(table).index(name)] = parameter
+    return [found[place] for place in sorted(found)]
+
+
+@cache
+def options() -> dict[str, tuple[str, Any]]:
+    """Returns the heading and typer's declaration of each option, in the order of a help page."""
+    commands = import_module("selfmodel.cli.commands")
+    text = resources.files(__package__).joinpath("options.toml").read_text(encoding="utf-8")
+    for name, listed in commands.LISTED.items():
+        text = text.replace(f"{{{name}}}", ", ".join(listed))
+    return {
+        name: (heading, _declaration(heading, **facts))
+        for heading, section in tomllib.loads(text).items()
+        for name, facts in section.items()
+    }
+
+
+def _declaration(heading: str, names: Sequence[str] = (), **facts: Any) -> Any:  # noqa: ANN401
+    if heading == ARGUMENTS:
+        return typer.Argument(**facts)
+    panel = None if heading == OTHERS else heading
+    return typer.Option(*names, rich_help_panel=panel, **facts)

@@ -311,12 +311,12 @@ def test_a_process_ends_with_the_status_and_writes_each_stream_apart(tmp_path: P
 def test_the_notes_of_an_error_are_in_its_message(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    def fail(**_: str) -> None:
+    def fail() -> None:
         error = TrialError("the environment failed")
         error.add_note("the safe command could not be sent")
         raise error
 
-    monkeypatch.setattr(cli, "app", fail)
+    monkeypatch.setattr(cli, "_run", fail)
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     told = capsys.readouterr().err

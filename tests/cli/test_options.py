@@ -9,7 +9,7 @@ import pytest
 
 from selfmodel import api, plugins
 from selfmodel.cli import commands, inputs
-from selfmodel.cli.options import OPTIONS, signature_of
+from selfmodel.cli.groups import options, parameters_of
 from selfmodel.cli.view import PORT
 from selfmodel.recovery.map_elites import make_repertoire
 from selfmodel.settings import Settings
@@ -72,5 +72,5 @@ def test_every_option_of_the_table_is_of_a_command():
     used = {(one.__name__, field.name) for one in COMMANDS for field in dataclasses.fields(one)}
     names = {name for pair in used for name in (pair[1], ".".join(pair))}
 
-    assert set(OPTIONS) <= names
-    assert all(signature_of(one).parameters for one in COMMANDS)
+    assert set(options()) <= names
+    assert all(map(parameters_of, COMMANDS))
