@@ -5,24 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from selfmodel import plugins
-from selfmodel.arguments import (
-    AUTO,
-    KindSource,
-    RobotSource,
-    TrialSource,
-    check_seed,
-    comparator_choice,
-    fitted,
-    hypothesis_of,
-    kinds_of,
-    read_logs,
-    repertoire_of,
-    robot_of,
-    robot_of_logs,
-    sources_of,
-    trials_of,
-)
+from selfmodel import arguments, plugins
+from selfmodel.arguments import AUTO, KindSource, RobotSource, TrialSource
 from selfmodel.controllers.controller import CommandSource, Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
@@ -38,13 +22,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.recover import (
-    NextTrial,
-    RecoveryLoop,
-    by_repair,
-    diagnose_trials,
-    random_stream,
-)
+from selfmodel.recovery import recover as recovery_loop
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
@@ -55,7 +33,6 @@ from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.simulation.trial_replay import Replay
 from selfmodel.studies.experiment import check_motion, draw_reality
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
@@ -100,13 +77,19 @@ def evolve_controller(
         InputError: The design or the robot is unknown, the notation is invalid, a motor has no
             command range, or the base is fixed and the score is a displacement.
     """
-    check_seed(seed)
-    robot = robot_of(robot)
+    arguments.check_seed(seed)
+    robot = arguments.robot_of(robot)
     check_motion(score, robot)
     chosen = plugins.design(design, robot) if isinstance(design, str) else design
     repair = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
-    assumed, faults = partial(assumed_uncertainty, robot), (hypothesis_of(hypothesis, robot),)
-    return repair(faults, assumed, seeds, random_stream(seed, "repair"), on_event)[0].controller
+    repaired = repair(
+        (arguments.hypothesis_of(hypothesis, robot),),
+        partial(assumed_uncertainty, robot),
+        seeds,
+        recovery_loop.random_stream(seed, "repair"),
+        on_event,
+    )
+    return repaired[0].controller
 
 
 def run_trial(
@@ -146,10 +129,10 @@ def run_trial(
         LogError: The robot stopped early, or the log failed its verification.
         TrialError: The physical robot could not finish the trial.
     """
-    check_seed(seed)
-    path = Path(path)
+    arguments.check_seed(seed)
+    path, header = Path(path), TrialHeader(Settings())
     plan = TrialPlan(path.stem, stage, controller, steps, seed)
-    return physical_trial.run_trial(physical, plan, path, robot_of(robot), TrialHeader(Settings()))
+    return physical_trial.run_trial(physical, plan, path, arguments.robot_of(robot), header)
 
 
 def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
@@ -173,7 +156,7 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
     """
     return write_trial(
         Path(path),
-        robot_of(robot),
+        arguments.robot_of(robot),
         trial.plan,
         samples_of(trial.trajectory),
         TrialHeader(Settings()),
@@ -208,7 +191,8 @@ def calibrate(
         InputError: There are no trials, a log is unusable, or a trial lacks the signals that a fit
             needs.
     """
-    return calibration.calibrate(robot_of(robot), trials_of(trials), thread_count(threads))
+    (healthy,), _ = arguments.trials_of(trials)
+    return calibration.calibrate(arguments.robot_of(robot), healthy, thread_count(threads))
 
 
 def replay(
@@ -218,7 +202,7 @@ def replay(
     *,
     tolerance: float = 0.0,
     threads: int = 0,
-) -> Replay:
+) -> trial_replay.Replay:
     """Returns the comparison of a trial with its simulation under a hypothesis.
 
     Example:
@@ -236,9 +220,9 @@ def replay(
     Raises:
         InputError: The log is unusable, the robot is unknown, or the notation is invalid.
     """
-    (logged,) = trials_of([trial])
-    robot = robot_of(robot)
-    assumed = hypothesis_of(hypothesis, robot)
+    ((logged,),), _ = arguments.trials_of(trial)
+    robot = arguments.robot_of(robot)
+    assumed = arguments.hypothesis_of(hypothesis, robot)
     return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)
 
 
@@ -288,22 +272,31 @@ def diagnose(
         InputError: There are no trials, a log is unusable, the comparator cannot judge a trial, or
             no kind applies to the robot.
     """
-    check_seed(seed)
-    found = set_up_diagnosis(
-        sources_of(trials),
-        sources_of(healthy),
-        robot=None if robot is None else robot_of(robot),
-        choose_comparator=comparator_choice(comparator),
-        kinds=kinds_of(kinds),
-        settings=settings,
+    arguments.check_seed(seed)
+    own = None if robot is None else arguments.robot_of(robot)
+    choose, searched = arguments.comparator_choice(comparator), arguments.kinds_of(kinds)
+    (to_explain, reference), logs = arguments.trials_of(trials, healthy)
+    if not to_explain:
+        raise InputError("expected at least one trial to explain, got none")
+    if own is None and len(logs) < len(to_explain) + len(reference):
+        raise InputError(
+            "a trial without a log has no model of its robot: give robot=, such as "
+            'selfmodel.load_robot("quadruped")'
+        )
+    if not reference:
+        to_explain, reference = by_stage(to_explain)
+    logged = {log.trial.path: log.settings for log in logs}
+    return set_up_diagnosis(
+        to_explain,
+        reference,
+        robot=own or arguments.robot_of_logs(logs, None),
+        choose_comparator=choose,
+        kinds=searched,
+        settings=settings or logged.get(to_explain[0].path, Settings()),
         seed=seed,
         calibrate=calibrate,
         threads=threads,
-    )
-    on_event(found.comparator)
-    if found.calibration is not None:
-        on_event(found.calibration)
-    return diagnose_trials(found.damaged, found.search, found.seed, on_event)
+    ).run(on_event)
 
 
 def recover(
@@ -317,7 +310,7 @@ def recover(
     settings: Settings | None = None,
     design: str | Design = "network",
     calibrate: bool = True,
-    next_trial: NextTrial = by_repair,
+    next_trial: recovery_loop.NextTrial = recovery_loop.by_repair,
     score: Score | None = None,
     repair: str = plugins.ROBUST,
     search: str | None = None,
@@ -371,17 +364,17 @@ def recover(
             score is a displacement.
         TrialError: A physical robot could not finish a trial.
     """
-    check_seed(seed)
-    robot, count = robot_of(robot), thread_count(threads)
+    arguments.check_seed(seed)
+    robot, count = arguments.robot_of(robot), thread_count(threads)
     score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
     check_motion(score, robot)
-    chosen, searched = settings or Settings(), kinds_of(kinds)
+    chosen, searched = settings or Settings(), arguments.kinds_of(kinds)
     drawn = plugins.design(design, robot) if isinstance(design, str) else design
-    make_repair = plugins.repair(repair, search, repertoire_of(repertoire, robot, drawn))
+    make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
     journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
-    return RecoveryLoop(
+    return recovery_loop.RecoveryLoop(
         simulator=Simulator(robot, count),
-        choose_comparator=comparator_choice(comparator),
+        choose_comparator=arguments.comparator_choice(comparator),
         run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
         journal=journal,
         settings=chosen,
@@ -389,7 +382,7 @@ def recover(
         on_event=on_event,
         design=drawn,
         kinds=searched,
-        calibrate=partial(fitted, robot, threads=count) if calibrate else None,
+        calibrate=partial(arguments.fitted, robot, threads=count) if calibrate else None,
         next_trial=next_trial,
         score=score,
         make_repair=make_repair,
@@ -422,9 +415,9 @@ def simulated_robot(
         InputError: The level is out of range, the seed is negative, the robot is unknown, or the
             notation is invalid.
     """
-    check_seed(seed)
-    robot = robot_of(robot)
-    hidden = hypothesis_of(hypothesis, robot)
+    arguments.check_seed(seed)
+    robot = arguments.robot_of(robot)
+    hidden = arguments.hypothesis_of(hypothesis, robot)
     stream = 1 if hidden.faults else 0
     return draw_reality(robot, seed, gap).robot(robot, hidden, stream)
 
@@ -443,58 +436,47 @@ class LogDiagnosis:
     search: DiagnosticSearch
     seed: int
 
+    def run(self, on_event: Callable[[Event], None]) -> Diagnosis:
+        """Returns the diagnosis of the trials; the events begin with the inputs."""
+        on_event(self.comparator)
+        if self.calibration is not None:
+            on_event(self.calibration)
+        return recovery_loop.diagnose_trials(self.damaged, self.search, self.seed, on_event)
+
 
 def set_up_diagnosis(
-    trials: Sequence[TrialSource],
-    healthy: Sequence[TrialSource] = (),
+    damaged: Sequence[Trial],
+    healthy: Sequence[Trial],
     *,
-    robot: Robot | None,
+    robot: Robot,
     choose_comparator: ComparatorChoice,
     kinds: Sequence[FaultKind],
-    settings: Settings | None,
+    settings: Settings,
     seed: int | None,
     calibrate: bool,
     threads: int,
 ) -> LogDiagnosis:
-    """Returns the inputs of a diagnosis: reads the logs, calibrates, and sets up the search.
+    """Returns the inputs of a diagnosis: chooses the comparator, then calibrates.
 
-    The arguments are those of ``diagnose``; the comparator is chosen before the calibration.
+    The arguments are those of ``diagnose``; without healthy trials, there is no calibration.
 
     Raises:
-        InputError: As for ``diagnose``; or a trial has no log and no robot is given.
+        InputError: As for ``diagnose``.
     """
-    if not trials:
-        raise InputError("expected at least one trial to explain, got none")
-    sources = [*trials, *healthy]
-    read = {
-        log.trial.path: log
-        for log in read_logs([Path(s) for s in sources if not isinstance(s, Trial)])
-    }
-    found = [s if isinstance(s, Trial) else read[str(Path(s))].trial for s in sources]
-    if robot is None and len(read) < len(found):
-        raise InputError(
-            "a trial without a log has no model of its robot: give robot=, such as "
-            'selfmodel.load_robot("quadruped")'
-        )
-    nominal = robot_of_logs(list(read.values()), None) if robot is None else robot
-    to_explain, reference = found[: len(trials)], found[len(trials) :]
-    if not reference:
-        to_explain, reference = by_stage(to_explain)
-    first = to_explain[0]
-    if settings is None:
-        settings = read[first.path].settings if first.path in read else Settings()
-    chosen = choose_comparator(nominal, [*reference, *to_explain])
-    count = thread_count(threads)
-    fit = fitted(nominal, reference, count) if calibrate and reference else None
-    simulator = Simulator(fit.robot if fit else nominal, count)
+    chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
+    fit = arguments.fitted(robot, healthy, count) if calibrate and healthy else None
     search = DiagnosticSearch(
-        simulator, chosen.comparator, settings, kinds, healthy_trials=reference
+        Simulator(fit.robot if fit else robot, count),
+        chosen.comparator,
+        settings,
+        kinds,
+        healthy_trials=healthy,
     )
-    drawn = first.plan.seed if seed is None else seed
-    return LogDiagnosis(tuple(to_explain), tuple(reference), chosen, fit, search, drawn)
+    drawn = damaged[0].plan.seed if seed is None else seed
+    return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn)
 
 
-def by_stage(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+def by_stage(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], tuple[Trial, ...]]:
     """Returns the trials to explain, and those of the stage ``before`` unless all are."""
-    failed = [trial for trial in trials if trial.plan.stage != "before"] or list(trials)
-    return failed, [trial for trial in trials if trial not in failed]
+    failed = tuple(trial for trial in trials if trial.plan.stage != "before") or tuple(trials)
+    return failed, tuple(trial for trial in trials if trial not in failed)

@@ -1,9 +1,11 @@
 """Arguments by name, notation or path: robots, trials, controllers, hypotheses, repertoires."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from types import UnionType
 
 from selfmodel import plugins
 from selfmodel.comparators import PREFERENCE
@@ -27,6 +29,7 @@ from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.tasks import Entry, entry
+from selfmodel.trials.signals import Names
 from selfmodel.trials.trial import Trial
 
 AUTO = "auto"
@@ -99,13 +102,9 @@ def robot_of(source: RobotSource) -> Robot:
     Raises:
         InputError: The name is unknown, the file is no valid robot, or the type is another.
     """
-    if isinstance(source, Robot):
-        return source
-    if not isinstance(source, str | Path):
-        raise _unexpected(
-            'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file', source
-        )
-    return load_robot(source)
+    expected = 'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file'
+    _check_type(source, Robot | str | Path, expected)
+    return source if isinstance(source, Robot) else load_robot(source)
 
 
 def hypothesis_of(source: Hypothesis | str, robot: Robot) -> Hypothesis:
@@ -114,11 +113,9 @@ def hypothesis_of(source: Hypothesis | str, robot: Robot) -> Hypothesis:
     Raises:
         InputError: The notation is invalid for the robot, or the type is another.
     """
-    if isinstance(source, Hypothesis):
-        return source
-    if not isinstance(source, str):
-        raise _unexpected('a Hypothesis or notation such as "break:front_left_knee"', source)
-    return parse_hypothesis(source, robot)
+    expected = 'a Hypothesis or notation such as "break:front_left_knee"'
+    _check_type(source, Hypothesis | str, expected)
+    return source if isinstance(source, Hypothesis) else parse_hypothesis(source, robot)
 
 
 def comparator_choice(source: Comparator | str) -> ComparatorChoice:
@@ -127,11 +124,10 @@ def comparator_choice(source: Comparator | str) -> ComparatorChoice:
     Raises:
         InputError: The name is unknown, or its object is no comparator.
     """
-    if not isinstance(source, str):
-        return partial(given_comparator, source, PREFERENCE)
     if source == AUTO:
         return partial(best_comparator, PREFERENCE)
-    return partial(given_comparator, plugins.comparator(source), PREFERENCE)
+    given = plugins.comparator(source) if isinstance(source, str) else source
+    return partial(given_comparator, given, PREFERENCE)
 
 
 def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:
@@ -142,59 +138,49 @@ def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:
     """
     found: list[FaultKind] = []
     for item in [source] if isinstance(source, str | FaultKind) else source:
-        if not isinstance(item, str | FaultKind):
-            raise _unexpected("a FaultKind or its name", item)
+        _check_type(item, str | FaultKind, "a FaultKind or its name")
         found += plugins.kinds(item) if isinstance(item, str) else [item]
     if not found:
         raise InputError('expected at least one fault kind, got none: give kinds="break,jam"')
     return tuple(dict.fromkeys(found))
 
 
-def sources_of(given: TrialSource | Sequence[TrialSource]) -> tuple[TrialSource, ...]:
-    """Returns a sequence of trials and paths, given as such or as one trial or path.
-
-    Raises:
-        InputError: An item has another type.
-    """
-    if isinstance(given, Trial | str | Path):
-        return (given,)
-    expected = "trials or paths of their logs"
-    if not isinstance(given, Sequence):
-        raise _unexpected(expected, given)
-    for item in given:
-        if not isinstance(item, Trial | str | Path):
-            raise _unexpected(expected, item)
-    return tuple(given)
-
-
-def trials_of(given: TrialSource | Sequence[TrialSource]) -> tuple[Trial, ...]:
-    """Returns trials, given as themselves or as paths of their logs.
+def trials_of(
+    *groups: TrialSource | Sequence[TrialSource],
+) -> tuple[list[tuple[Trial, ...]], list[TrialLog]]:
+    """Returns groups of trials, given as themselves or as paths of their logs, and these logs.
 
     Args:
-        given: The trials.
+        groups: Each a trial, a path, or a sequence of them.
 
     Raises:
         InputError: A log is unusable or given twice, or an item has another type.
     """
-    sources = sources_of(given)
-    paths = [Path(one) for one in sources if not isinstance(one, Trial)]
-    logs = iter(read_logs(paths))
-    return tuple(one if isinstance(one, Trial) else next(logs).trial for one in sources)
+    one, expected = Trial | str | Path, "trials or paths of their logs"
+    listed = [(group,) if isinstance(group, one) else group for group in groups]
+    for sources in listed:
+        _check_type(sources, Sequence, expected)
+        for source in sources:
+            _check_type(source, one, expected)
+    logs = read_logs([Path(s) for sources in listed for s in sources if not isinstance(s, Trial)])
+    read = iter(logs)
+    found = [
+        tuple(s if isinstance(s, Trial) else next(read).trial for s in sources)
+        for sources in listed
+    ]
+    return found, logs
+
+
+def _check_type(got: object, known: type | UnionType, expected: str) -> None:
+    if not isinstance(got, known):
+        remedy = ": give its attribute trial" if hasattr(got, "trial") else ""
+        raise InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
 
 
 def check_seed(seed: int | None) -> None:
-    """Checks a seed; None is valid.
-
-    Raises:
-        InputError: The seed is negative.
-    """
+    """Raises ``InputError`` for a negative seed."""
     if seed is not None and seed < 0:
         raise InputError(f"expected a seed of 0 or above, got {seed}: give one such as seed=0")
-
-
-def _unexpected(expected: str, got: object) -> InputError:
-    remedy = ": give its attribute trial" if hasattr(got, "trial") else ""
-    return InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
 
 
 def repertoire_of(
@@ -208,19 +194,16 @@ def repertoire_of(
     """
     if source is None:
         return None
-    found = source if isinstance(source, Repertoire) else load_repertoire(Path(source))
-    named = "the repertoire" if isinstance(source, Repertoire) else str(source)
-    check_model(found, robot, named)
+    given = isinstance(source, Repertoire)
+    found, named = (source, "the repertoire") if given else (load_repertoire(Path(source)), source)
+    check_model(found, robot, str(named))
     if found.design != design:
+        wanted, got = (f"a {one.name} of {one.weights} weights" for one in (design, found.design))
         raise InputError(
-            f"{named}: expected gaits of the controllers to evolve, {_described(design)}, got "
-            f"{_described(found.design)}: leave the design out, or make a repertoire of it"
+            f"{named}: expected gaits of the controllers to evolve, {wanted}, got {got}: leave the "
+            f"design out, or make a repertoire of it"
         )
     return found
-
-
-def _described(design: Design) -> str:
-    return f"a {design.name} of {design.weights} weights"
 
 
 def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
@@ -237,7 +220,12 @@ def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
         ) from error
 
 
-def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
+def is_model(name: str) -> bool:
+    """Returns whether a robot's name is the path of an MJCF or URDF file."""
+    return Path(name).suffix.lower() in _MODEL_ENDINGS
+
+
+def robot_entry(name: str, settings: Sequence[str] = ()) -> Entry:
     """Returns a robot, its cases and its tasks, by name or by MJCF or URDF file.
 
     Args:
@@ -249,106 +237,92 @@ def robot_entry(name: str, settings: Iterable[str] = ()) -> Entry:
         InputError: The name is unknown (the message has the nearest names), the file is no valid
             robot, or settings are given for a robot by name.
     """
-    given = tuple(settings)
     if is_model(name):
-        made = load_mjcf(Path(name), _settings(name, given))
+        made = load_mjcf(Path(name), _settings(name, settings))
         return Entry(robot=lambda: made)
-    if given:
+    if settings:
         raise InputError(
-            f"--set {given[0]} is for an MJCF or URDF file: {name!r} is the name of a robot"
+            f"--set {settings[0]} is for an MJCF or URDF file: {name!r} is the name of a robot"
         )
     # dm_control would load an OpenGL library.
     os.environ.setdefault("MUJOCO_GL", "disable")
     return entry(name)
 
 
-def notes_on(name: str, settings: Iterable[str]) -> tuple[str, ...]:
+def notes_on(name: str, settings: Sequence[str]) -> tuple[str, ...]:
     """Returns the changes that made an MJCF or URDF file a robot; see ``robot_entry``."""
     return adapt(Path(name), _settings(name, settings)).notes
 
 
-def _settings(name: str, given: Iterable[str]) -> MjcfSettings:
+def _settings(name: str, given: Sequence[str]) -> MjcfSettings:
     extra = {key: value for text in given for key, value in parse_setting(text).items()}
     return read_settings(Path(name), extra)
 
 
-def is_model(name: str) -> bool:
-    """Returns whether a robot's name is the path of an MJCF or URDF file."""
-    return Path(name).suffix.lower() in _MODEL_ENDINGS
-
-
-def recorded_robot(name: str, control_timestep: float | None) -> Robot:
+def recorded_robot(name: str, control_timestep: float | None, names: Names | None = None) -> Robot:
     """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
 
-    A model that a calibration wrote is a robot already, and is not adapted.
+    A model that a calibration wrote is a robot already, and is not adapted; nor is one that has the
+    recorded names as it is only.
 
     Args:
         name: Name of a robot of selfmodel, or the path of a model file.
         control_timestep: Duration of a control step of a model file, s; None for that of its
             settings.
+        names: Names of the recorded signals.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
     """
     if not is_model(name):
         return robot_entry(name).robot()
-    path = Path(name)
+    path, raw = Path(name), None
     if control_timestep is not None and path.suffix.lower() == ".xml":
-        try:
-            raw = unadapted_robot(name, control_timestep)
-        except InputError:
-            raw = None
-        if raw is not None and raw.is_calibrated:
-            return raw
+        with suppress(InputError):  # it needs adaptation
+            raw = _unadapted(path, control_timestep)
+    if raw is not None and raw.is_calibrated:
+        return raw
     step = {} if control_timestep is None else {"control_timestep": control_timestep}
-    return load_mjcf(path, read_settings(path, step))
+    ready = load_mjcf(path, read_settings(path, step))
+    return raw if raw is not None and ready.anatomy.names != names == raw.anatomy.names else ready
 
 
-def unadapted_robot(name: str, control_timestep: float) -> Robot:
-    """Returns a robot by name, or the robot of an unadapted MJCF file.
-
-    Args:
-        name: Name of a robot of selfmodel, or a path that ends in ``.xml``.
-        control_timestep: Duration of a control step of an MJCF file, s.
+def _unadapted(path: Path, control_timestep: float) -> Robot:
+    """Returns the robot of an MJCF file as it is.
 
     Raises:
-        InputError: The name is unknown, or the model is unusable.
+        InputError: The model is no robot without an adaptation.
     """
-    path = Path(name)
-    if not is_model(name):
-        return robot_entry(name).robot()
-    if path.suffix.lower() != ".xml":
-        raise InputError(f"{path}: expected an MJCF file, ROBOT.xml, that needs no adaptation")
     data = read_file(path, "an MJCF file", MAX_TEXT)
     try:
         check_compiles(data.decode(), {}, control_timestep)
         return Robot(encodable(path.stem), data.decode(), control_timestep)
     except (ValueError, KeyError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(
-            f"{path}: expected an MJCF file of a robot without other files: {reason}"
-        ) from error
+        raise InputError(f"{path}: expected an MJCF file of a robot: {error}") from error
 
 
 def read_logs(paths: Sequence[Path]) -> list[TrialLog]:
     """Returns the trials in log files.
 
-    Args:
-        paths: The logs.
-
     Raises:
         InputError: A log is unusable, or is given twice.
     """
-    try:
+    with _log_errors_as_input_errors():
         found = [read_log(path) for path in paths]
-    except LogError as error:
-        raise InputError(str(error)) from error
     digests: dict[str, Path] = {}
     for path in paths:
         first = digests.setdefault(file_digest(path), path)
         if first is not path:
             raise InputError(f"{first} and {path} are the same log: give each log once")
     return found
+
+
+@contextmanager
+def _log_errors_as_input_errors() -> Iterator[None]:
+    try:
+        yield
+    except LogError as error:
+        raise InputError(str(error)) from error
 
 
 def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
@@ -362,38 +336,18 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
         InputError: The logs have different robots, their model is unusable, or the replacement has
             other sensors, motors or hinges.
     """
-    try:
+    with _log_errors_as_input_errors():
         own = common_robot(found)
-    except LogError as error:
-        raise InputError(str(error)) from error
     if override is None:
         return own
-    chosen = _override(override, own)
-    if chosen.anatomy.names != own.anatomy.names:
+    names = own.anatomy.names
+    chosen = recorded_robot(override, own.control_timestep, names)
+    if chosen.anatomy.names != names:
         raise InputError(
             f"{override} is another robot than that of {found[0].trial.path}: "
-            f"{describe_difference(chosen.anatomy.names, own.anatomy.names)}"
+            f"{describe_difference(chosen.anatomy.names, names)}"
         )
     return chosen
-
-
-def _override(name: str, own: Robot) -> Robot:
-    """Returns the robot that replaces the model in a log; a file is adapted or unchanged."""
-    if not is_model(name):
-        return robot_entry(name).robot()
-    try:
-        raw = unadapted_robot(name, own.control_timestep)
-    except InputError:
-        raw = None
-    if raw is not None and raw.is_calibrated:
-        return raw
-    path = Path(name)
-    settings = read_settings(path, {"control_timestep": own.control_timestep})
-    ready = load_mjcf(path, settings)
-    names = own.anatomy.names
-    if raw is not None and ready.anatomy.names != names == raw.anatomy.names:
-        return raw
-    return ready
 
 
 def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Controller:
@@ -407,26 +361,21 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
     Raises:
         InputError: The file contains no controller, or one that does not fit.
     """
-    try:
-        loaded = (
-            read_log(path).trial.plan.controller
-            if path.suffix.lower() == ".mcap"
-            else load_controller(path)
-        )
-    except LogError as error:
-        raise InputError(str(error)) from error
+    with _log_errors_as_input_errors():
+        is_log = path.suffix.lower() == ".mcap"
+        loaded = read_log(path).trial.plan.controller if is_log else load_controller(path)
     if isinstance(loaded, Playback):
         raise InputError(
             f"{path} has recorded commands and no controller: give the log of a trial that "
             f"selfmodel ran, or a .npz file"
         )
     found = loaded.design
-    hidden = (found.hidden or None) if neurons is None else neurons
-    needed = DESIGNS[found.name](robot, hidden)
-    if _connections(found) != _connections(needed):
+    needed = DESIGNS[found.name](robot, (found.hidden or None) if neurons is None else neurons)
+    got, expected = map(_connections, (found, needed))
+    if got != expected:
         raise InputError(
-            f"{path} has a controller for {_connections(found)}; this robot needs one for "
-            f"{_connections(needed)}: give a controller of this robot"
+            f"{path} has a controller for {got}; this robot needs one for {expected}: give a "
+            f"controller of this robot"
         )
     return loaded
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import selfmodel
-from selfmodel import api
+from selfmodel import arguments
 from selfmodel.arguments import kinds_of
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.choice import ChosenComparator
@@ -191,7 +191,7 @@ def test_a_comparator_that_cannot_judge_is_refused_before_the_calibration(
     blind: Trial, monkeypatch: pytest.MonkeyPatch
 ):
     fits: list[object] = []
-    monkeypatch.setattr(api, "fitted", lambda *given: fits.append(given))
+    monkeypatch.setattr(arguments, "fitted", lambda *given: fits.append(given))
     healthy = selfmodel.read_log(BEFORE).trial
 
     with pytest.raises(

@@ -25,7 +25,6 @@ from selfmodel.diagnosis.text import (
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.results import LogsResult, as_json as values_of
-from selfmodel.recovery.recover import diagnose_trials
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -129,10 +128,7 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
     )
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
-        on_event(inputs.comparator)
-        if inputs.calibration is not None:
-            on_event(inputs.calibration)
-        diagnosis = diagnose_trials(inputs.damaged, inputs.search, inputs.seed, on_event)
+        diagnosis = inputs.run(on_event)
     return DiagnosedLogs(tuple(explained), robot, inputs, diagnosis)
 
 

@@ -132,7 +132,7 @@ def test_the_contract_kit_sees_each_way_to_break_it(kind: FaultKind, said: str, 
 
 
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
-    robot = arguments.unadapted_robot("quadruped", 0.01)
+    robot = arguments.robot_entry("quadruped").robot()
 
     def wrong(_variant: ModelVariant, _anatomy: Anatomy, _fault: Fault) -> None:
         robot.model.body_mass[1] = 5.0
