@@ -156,12 +156,14 @@ def trials_of(
     Raises:
         InputError: A log is unusable or given twice, or an item has another type.
     """
-    one, expected = Trial | str | Path, "trials or paths of their logs"
-    listed = [(group,) if isinstance(group, one) else group for group in groups]
+    expected = "trials or paths of their logs"
+    listed: list[Sequence[TrialSource]] = [
+        (group,) if isinstance(group, Trial | str | Path) else group for group in groups
+    ]
     for sources in listed:
         _check_type(sources, Sequence, expected)
         for source in sources:
-            _check_type(source, one, expected)
+            _check_type(source, Trial | str | Path, expected)
     logs = read_logs([Path(s) for sources in listed for s in sources if not isinstance(s, Trial)])
     read = iter(logs)
     found = [
@@ -194,9 +196,11 @@ def repertoire_of(
     """
     if source is None:
         return None
-    given = isinstance(source, Repertoire)
-    found, named = (source, "the repertoire") if given else (load_repertoire(Path(source)), source)
-    check_model(found, robot, str(named))
+    if isinstance(source, Repertoire):
+        found, named = source, "the repertoire"
+    else:
+        found, named = load_repertoire(Path(source)), str(source)
+    check_model(found, robot, named)
     if found.design != design:
         wanted, got = (f"a {one.name} of {one.weights} weights" for one in (design, found.design))
         raise InputError(

@@ -1,9 +1,12 @@
 """Contract checks of plug-ins: of a comparator, and of a fault kind."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
@@ -27,6 +30,15 @@ DEPENDS_ON_BATCH = (
     "must not depend on the other runs, to the last bit: numpy sums in memory order, so "
     "np.ascontiguousarray is required before a sum or a mean"
 )
+
+BATCH_STEPS = 20
+"""Control steps of the check that robots with the fault share a batch with others."""
+
+
+def _require(holds: object, breach: str) -> None:
+    """Raises ``ValueError``, as every breach of a contract does, unless a rule holds."""
+    if not holds:
+        raise ValueError(breach)
 
 
 def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory) -> None:
@@ -58,47 +70,50 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
         ValueError: The comparator violates its contract, or ``simulated`` does not have the
             requested shapes; the message names the violation.
     """
-    if not comparator.name or comparator.name != comparator.name.strip():
-        raise ValueError(f"a comparator needs a name, got {comparator.name!r}")
-    logged = _copied(trial.trajectory)
+    name = comparator.name
+    _require(name and name == name.strip(), f"a comparator needs a name, got {name!r}")
+    logged = _bits(trial.trajectory.signals)
     prepared, again = comparator.prepare(trial), comparator.prepare(trial)
     for one in (prepared, again):
-        if not isinstance(one, PreparedTrial | PiecewiseTrial):
-            raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
-                f"prepare must return an object with request and losses or distances, got {one!r}"
-            )
-    _check_request(prepared.request, trial)
-    if not _is_same_request(prepared.request, again.request):
-        raise ValueError("the same trial must be prepared with the same request")
-    requested = _as_requested(prepared.request, trial, simulated)
-    before = _copied(requested)
-    if isinstance(prepared, PiecewiseTrial) != isinstance(again, PiecewiseTrial):
-        raise ValueError("a trial that is prepared again must have losses again")
-    _check_comparison(prepared, again, requested)
-    if not _is_same(before, requested):
-        raise ValueError("a comparator must not change its arguments")
-    if not _is_same(logged, trial.trajectory):
-        raise ValueError("a comparator must not change the trial")
-
-
-def _check_comparison(
-    prepared: PreparedTrial | PiecewiseTrial,
-    again: PreparedTrial | PiecewiseTrial,
-    simulated: Trajectory,
-) -> None:
-    """Checks the numbers of a comparison, and that they depend on the trial and each run alone."""
-    runs = len(simulated[prepared.request.record[0]])
-    parts = _parts(prepared, simulated)
+        _require(
+            isinstance(one, PreparedTrial | PiecewiseTrial),
+            f"prepare must return an object with request and losses or distances, got {one!r}",
+        )
+    request = prepared.request
+    _check_request(request, trial)
+    _require(
+        _content(request) == _content(again.request),
+        "the same trial must be prepared with the same request",
+    )
+    requested = _as_requested(request, trial, simulated)
+    before = _bits(requested.signals)
+    parts = _parts(prepared, requested)
+    runs = len(requested[request.record[0]])
     for what, values in parts.items():
         _check_numbers(what, values, runs)
     for other in (prepared, again):
-        for what, values in _parts(other, simulated).items():
-            if not np.array_equal(values, parts[what], equal_nan=True):
-                raise ValueError(f"the same trial and arguments must give the same {what}")
+        repeated = _parts(other, requested)
+        for what, values in parts.items():
+            same = what in repeated and np.array_equal(repeated[what], values, equal_nan=True)
+            _require(same, f"the same trial and arguments must give the same {what}")
     for run in range(runs):
-        for what, values in _parts(prepared, _only(simulated, run)).items():
-            if not np.array_equal(values, parts[what][run : run + 1], equal_nan=True):
-                raise ValueError(f"the {what} of run {run} {DEPENDS_ON_BATCH}")
+        for what, values in _parts(prepared, _only(requested, run)).items():
+            alone = np.array_equal(values, parts[what][run : run + 1], equal_nan=True)
+            _require(alone, f"the {what} of run {run} {DEPENDS_ON_BATCH}")
+    _require(before == _bits(requested.signals), "a comparator must not change its arguments")
+    _require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
+
+
+def _bits(arrays: Mapping[Any, NDArray[Any]]) -> dict[Any, bytes]:
+    return {name: values.tobytes() for name, values in arrays.items()}
+
+
+def _content(request: Request) -> object:
+    """Returns what two equal requests have in common."""
+    if not isinstance(request, Segments):
+        return request
+    arrays = _bits({**request.states, "starts": request.starts, "commands": request.commands})
+    return request.horizon, request.record, arrays
 
 
 def _parts(
@@ -114,18 +129,32 @@ def _parts(
     return {"losses": losses.total, **parts, **by_hinge}
 
 
+def _only(simulated: Trajectory, run: int) -> Trajectory:
+    row = slice(run, run + 1)
+    return replace(
+        simulated,
+        signals={signal: values[row] for signal, values in simulated.signals.items()},
+        welded=None if simulated.welded is None else simulated.welded[row],
+        detached=None if simulated.detached is None else simulated.detached[row],
+    )
+
+
 def _check_numbers(what: str, values: FloatArray, runs: int) -> None:
-    dimensions = {"distances": 1, "losses of hinges": 3}.get(what, 2)
-    if values.ndim != dimensions or len(values) != runs or 0 in values.shape[1:2]:
-        shape = ("n", "1 or more pieces", "hinges")[:dimensions]
-        raise ValueError(
-            f"{what} must have shape ({', '.join(shape)}) with n = {runs}, got {values.shape}"
-        )
-    unknown = np.isnan(values) if what == "losses of hinges" else np.zeros_like(values, dtype=bool)
-    if not ((np.isfinite(values) & (values >= 0)) | unknown).all():
-        raise ValueError(f"{what} must be finite and at least 0, got {values}")
-    if (values[0][~unknown[0]] != 0).any():
-        raise ValueError(f"{what} of a run that reproduces the trial must be 0, got {values[0]}")
+    sizes = ("n", "1 or more pieces", "hinges")
+    shape = sizes[: {"distances": 1, "losses of hinges": 3}.get(what, 2)]
+    _require(
+        values.ndim == len(shape) and len(values) == runs and 0 not in values.shape[1:2],
+        f"{what} must have shape ({', '.join(shape)}) with n = {runs}, got {values.shape}",
+    )
+    of_known = ~np.isnan(values) if what == "losses of hinges" else np.full(values.shape, True)
+    _require(
+        (np.isfinite(values[of_known]) & (values[of_known] >= 0)).all(),
+        f"{what} must be finite and at least 0, got {values}",
+    )
+    _require(
+        (values[0][of_known[0]] == 0).all(),
+        f"{what} of a run that reproduces the trial must be 0, got {values[0]}",
+    )
 
 
 def shown(request: Request, trial: Trial) -> Trajectory:
@@ -154,67 +183,56 @@ def shown(request: Request, trial: Trial) -> Trajectory:
 
 
 def _check_request(request: Request, trial: Trial) -> None:
-    if not isinstance(request, ClosedLoop | Segments | Ensemble):
-        raise ValueError(  # noqa: TRY004  # every breach of the contract is a ValueError
-            f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}"
-        )
+    _require(
+        isinstance(request, ClosedLoop | Segments | Ensemble),
+        f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}",
+    )
     possible = recordable(request)
-    if not request.record or not set(request.record) <= set(possible):
-        raise ValueError(
-            f"a request of {type(request).__name__} must record some of {possible}, got "
-            f"{request.record}"
-        )
-    if isinstance(request, Ensemble) and not (request.members >= 1 and request.level >= 0):
-        raise ValueError(
+    _require(
+        request.record and set(request.record) <= set(possible),
+        f"a request of {type(request).__name__} must record some of {possible}, got "
+        f"{request.record}",
+    )
+    if isinstance(request, Ensemble):
+        _require(
+            request.members >= 1 and request.level >= 0,
             f"an ensemble needs at least one member and a level of at least 0, got "
-            f"{request.members} members at level {request.level}"
+            f"{request.members} members at level {request.level}",
         )
     if isinstance(request, Segments):
-        _check_segments(request, trial)
+        _check_segments(request, trial.trajectory)
 
 
-def _check_segments(request: Segments, trial: Trial) -> None:
-    trajectory, starts, horizon = trial.trajectory, request.starts, request.horizon
-    names, expected = trajectory.names, trajectory["commands"].shape
-    if request.commands.shape != expected:
-        raise ValueError(
-            f"the commands of segments must be those of the trial, of shape (steps, motors) = "
-            f"{expected}, got {request.commands.shape}"
-        )
-    last = trajectory.steps - 1 - horizon
-    if horizon < 1 or not starts.size or not ((starts >= 0) & (starts <= last)).all():
-        raise ValueError(
-            f"segments need a horizon of at least 1 step, got {horizon}, and at least one start, "
-            f"from 0 to {last}, got {starts.tolist()}"
-        )
+def _check_segments(request: Segments, logged: Trajectory) -> None:
+    starts, horizon, commands = request.starts, request.horizon, request.commands
+    _require(
+        commands.shape == logged["commands"].shape,
+        f"the commands of segments must be those of the trial, of shape (steps, motors) = "
+        f"{logged['commands'].shape}, got {commands.shape}",
+    )
+    last = logged.steps - 1 - horizon
+    _require(
+        horizon >= 1 and starts.size and ((starts >= 0) & (starts <= last)).all(),
+        f"segments need a horizon of at least 1 step, got {horizon}, and at least one start, "
+        f"from 0 to {last}, got {starts.tolist()}",
+    )
+    _require(
+        np.isfinite(commands[starts[:, np.newaxis] + np.arange(horizon)]).all(),
+        "the commands of segments must be finite",
+    )
     for signal, values in request.states.items():
-        expected = (len(starts), names.width(signal))
-        if values.shape != expected:
-            raise ValueError(
-                f"the states of {signal} must have shape (segments, width) = {expected}, got "
-                f"{values.shape}"
-            )
-    if not np.isfinite(request.commands[starts[:, np.newaxis] + np.arange(horizon)]).all():
-        raise ValueError("the commands of segments must be finite")
-    for signal, values in request.states.items():
+        expected = (len(starts), logged.names.width(signal))
+        _require(
+            values.shape == expected,
+            f"the states of {signal} must have shape (segments, width) = {expected}, got "
+            f"{values.shape}",
+        )
         wrong = np.isinf(values) if signal in JOINTS else ~np.isfinite(values)
-        if wrong.any():
-            raise ValueError(
-                f"the states of {signal} must be finite; only those of joints may be NaN, where a "
-                f"hinge is unknown"
-            )
-
-
-def _is_same_request(one: Request, other: Request) -> bool:
-    if isinstance(one, Segments) and isinstance(other, Segments):
-        return (
-            (one.horizon, one.record) == (other.horizon, other.record)
-            and np.array_equal(one.starts, other.starts)
-            and np.array_equal(one.commands, other.commands, equal_nan=True)
-            and one.states.keys() == other.states.keys()
-            and all(np.array_equal(one.states[key], other.states[key]) for key in one.states)
+        _require(
+            not wrong.any(),
+            f"the states of {signal} must be finite; only those of joints may be NaN, where a "
+            f"hinge is unknown",
         )
-    return one == other
 
 
 def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Trajectory:
@@ -223,40 +241,15 @@ def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Traj
     if isinstance(request, Segments):
         lengths = (len(request.starts), request.horizon + 1)
     elif isinstance(request, Ensemble):
-        lengths = (request.members, trial.trajectory.steps)
-    for signal in request.record:
-        if simulated[signal].shape[1:-1] != lengths:
-            raise ValueError(
-                f"for a request of {type(request).__name__}, {signal} must have shape "
-                f"(n, {', '.join(map(str, lengths))}, width), got {simulated[signal].shape}"
-            )
+        lengths = (request.members, *lengths)
     signals = {signal: simulated[signal] for signal in request.record}
+    for signal, values in signals.items():
+        _require(
+            values.shape[1:-1] == lengths,
+            f"for a request of {type(request).__name__}, {signal} must have shape "
+            f"(n, {', '.join(map(str, lengths))}, width), got {values.shape}",
+        )
     return replace(simulated, signals=signals)
-
-
-def _copied(trajectory: Trajectory) -> Trajectory:
-    signals = {signal: values.copy() for signal, values in trajectory.signals.items()}
-    return replace(trajectory, signals=signals)
-
-
-def _is_same(one: Trajectory, other: Trajectory) -> bool:
-    return all(
-        np.array_equal(values, other[signal], equal_nan=True)
-        for signal, values in one.signals.items()
-    )
-
-
-def _only(simulated: Trajectory, run: int) -> Trajectory:
-    return replace(
-        simulated,
-        signals={signal: values[run : run + 1] for signal, values in simulated.signals.items()},
-        welded=None if simulated.welded is None else simulated.welded[run : run + 1],
-        detached=None if simulated.detached is None else simulated.detached[run : run + 1],
-    )
-
-
-BATCH_STEPS = 20
-"""Control steps of the check that robots with the fault share a batch with others."""
 
 
 def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
@@ -276,86 +269,90 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
         InputError: The notation of the kind's own faults cannot be parsed.
     """
     for what, text in (("name", kind.name), ("keyword", kind.keyword)):
-        if not text or set(text) & set(" ,:+="):
-            raise ValueError(
-                f"a kind needs a {what} without spaces and without any of ,:+=, got {text!r}"
-            )
+        _require(
+            text and not set(text) & set(" ,:+="),
+            f"a kind needs a {what} without spaces and without any of ,:+=, got {text!r}",
+        )
     candidates = kind.candidates(robot.anatomy)
-    if not candidates:
-        raise ValueError(f"{kind.name} has no part or no level: nothing can be proposed")
+    _require(candidates, f"{kind.name} has no part or no level: nothing can be proposed")
     for fault in candidates:
-        _check_severity(fault, robot)
-        _check_round_trips(fault, robot)
-        if kind.absorbs(fault, fault, robot.anatomy):
-            raise ValueError(f"{fault} absorbs itself, so no hypothesis can contain it")
+        _check_candidate(fault, robot)
     for other in kind.degenerate_kinds:
-        if other.bounds is not None or (kind.searchable and not other.searchable):
-            raise ValueError(
-                f"{kind.name} degenerates to {other.name}, which must be a searchable kind "
-                f"without severities"
-            )
+        _require(
+            other.bounds is None and (other.searchable or not kind.searchable),
+            f"{kind.name} degenerates to {other.name}, which must be a searchable kind without "
+            f"severities",
+        )
     _check_edits(kind, candidates, robot)
-    _check_batch(kind, robot)
+    _check_batch(candidates, robot)
     if kind.adapts_to_contacts:
         _check_contacts(kind, candidates, robot)
-    _check_parts(kind, candidates, robot)
-    _check_contradictions(kind, candidates, robot)
+    joints = {joint.name for joint in robot.anatomy.joints}
+    others = sorted({fault.part for fault in candidates} - joints)
+    _require(
+        not (kind.is_of_joint and others),
+        f"{kind.name} is of joints, and {', '.join(others)} is no joint",
+    )
+    if type(kind).contradicted is not FaultKind.contradicted:
+        _check_contradictions(kind, candidates, robot)
 
 
-def _check_severity(fault: Fault, robot: Robot) -> None:
+def _check_candidate(fault: Fault, robot: Robot) -> None:
+    """Checks the level of a fault, and that notation and genome give the fault again."""
     bounds = fault.kind.bounds_at(robot.anatomy, fault.part)
-    if bounds is None:
-        if fault.severity != 0:
-            raise ValueError(f"{fault} has the level {fault.severity}, but its kind has no bounds")
-        return
-    lowest, highest = bounds
-    if not lowest <= fault.severity <= highest:
-        raise ValueError(f"the level of {fault} is not between {lowest} and {highest}")
-
-
-def _check_round_trips(fault: Fault, robot: Robot) -> None:
+    _require(
+        bounds or fault.severity == 0,
+        f"{fault} has the level {fault.severity}, but its kind has no bounds",
+    )
+    lowest, highest = bounds or (0, 0)
+    _require(
+        lowest <= fault.severity <= highest,
+        f"the level of {fault} is not between {lowest} and {highest}",
+    )
     space = HypothesisSpace(robot.anatomy, (fault.kind,))
     alone = space.canonical([fault])
-    if alone != Hypothesis((fault,)):
-        raise ValueError(f"{fault} is a candidate, but its canonical form is {alone}")
-    parsed = space.parse(str(alone))
-    if parsed != alone:
-        raise ValueError(f"{alone} is parsed as {parsed}")
-    decoded = space.decode(space.encode(alone, 1))
-    if decoded != alone:
-        raise ValueError(f"{alone} is decoded from its genome as {decoded}")
+    _require(
+        alone == Hypothesis((fault,)),
+        f"{fault} is a candidate, but its canonical form is {alone}",
+    )
+    parsed, decoded = space.parse(str(alone)), space.decode(space.encode(alone, 1))
+    _require(parsed == alone, f"{alone} is parsed as {parsed}")
+    _require(decoded == alone, f"{alone} is decoded from its genome as {decoded}")
+    _require(
+        not fault.kind.absorbs(fault, fault, robot.anatomy),
+        f"{fault} absorbs itself, so no hypothesis can contain it",
+    )
 
 
 def _check_edits(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     before, nominal = _saved(robot.model), _contents(build(robot, INTACT))
     changed = False
     for fault in candidates:
-        built = _contents(build(robot, Hypothesis((fault,))))
-        if built != _contents(build(robot, Hypothesis((fault,)))):
-            raise ValueError(f"{fault} does not make the same robot every time")
+        built, again = (_contents(build(robot, Hypothesis((fault,)))) for _ in range(2))
+        _require(built == again, f"{fault} does not make the same robot every time")
         changed |= built != nominal
-    if _saved(robot.model) != before:
-        raise ValueError(f"{kind.name} changes the robot itself instead of its variant")
-    if not changed:
-        raise ValueError(f"{kind.name} changes nothing about a robot")
+    _require(
+        _saved(robot.model) == before,
+        f"{kind.name} changes the robot itself instead of its variant",
+    )
+    _require(changed, f"{kind.name} changes nothing about a robot")
 
 
-def _check_batch(kind: FaultKind, robot: Robot) -> None:
+def _check_batch(candidates: tuple[Fault, ...], robot: Robot) -> None:
     """Checks that a robot with a fault moves equally alone and in a batch, for each part."""
-    firsts = {fault.part: fault for fault in reversed(kind.candidates(robot.anatomy))}
-    hypotheses = [INTACT, *(Hypothesis((fault,)) for fault in firsts.values())]
+    firsts = {fault.part: fault for fault in reversed(candidates)}
     network = network_for(robot, MAX_HIDDEN_NEURONS)  # with the neurons of all faults
     controller = Controller(network, np.linspace(-1, 1, network.weights))
-    runs = [(hypothesis, controller) for hypothesis in hypotheses]
+    runs = [(INTACT, controller)]
+    runs += [(Hypothesis((fault,)), controller) for fault in firsts.values()]
     simulator = Simulator(robot, 1)
-    together = simulator.run(runs, BATCH_STEPS, SIGNALS)
+    together = simulator.run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, run in enumerate(runs):
-        alone = simulator.run([run], BATCH_STEPS, SIGNALS)
-        if any(
-            not np.array_equal(alone.trajectory[signal][0], together.trajectory[signal][row])
-            for signal in SIGNALS
-        ):
-            raise ValueError(f"a robot with {run[0]} moves differently in a batch and alone")
+        alone = simulator.run([run], BATCH_STEPS, SIGNALS).trajectory
+        _require(
+            all(np.array_equal(alone[signal][0], together[signal][row]) for signal in SIGNALS),
+            f"a robot with {run[0]} moves differently in a batch and alone",
+        )
 
 
 def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
@@ -366,44 +363,33 @@ def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot
             before, own = points.copy(), build(robot, Hypothesis((fault,)))
             size = mujoco.mj_sizeModel(own.model)
             kind.adapt_to_contacts(own, fault, points)
-            if mujoco.mj_sizeModel(own.model) != size or not np.array_equal(points, before):
-                raise ValueError(f"{kind.name} changes the contact points, or a model's layout")
-
-
-def _check_parts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
-    joints = {joint.name for joint in robot.anatomy.joints}
-    others = sorted({fault.part for fault in candidates} - joints)
-    if kind.is_of_joint and others:
-        raise ValueError(f"{kind.name} is of joints, and {', '.join(others)} is no joint")
+            _require(
+                mujoco.mj_sizeModel(own.model) == size and np.array_equal(points, before),
+                f"{kind.name} changes the contact points, or a model's layout",
+            )
 
 
 def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -> None:
     """Checks that the log of a robot with a fault does not contradict the fault."""
-    if type(kind).contradicted is FaultKind.contradicted:
-        return
     network = network_for(robot)
     controller = Controller(network, np.linspace(-1, 1, network.weights))
-    hypotheses = [Hypothesis((fault,)) for fault in candidates]
-    runs = [(hypothesis, controller) for hypothesis in hypotheses]
+    runs = [(Hypothesis((fault,)), controller) for fault in candidates]
     simulated = Simulator(robot, 1).run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, fault in enumerate(candidates):
         signals = {signal: values[row] for signal, values in simulated.signals.items()}
-        log = Trajectory(simulated.names, simulated.time, signals)
-        mask = kind.contradicted(fault, log)
-        if np.shape(mask) != (BATCH_STEPS,) or np.asarray(mask).dtype != np.bool_:
-            raise ValueError(f"{kind.name} must return a mask of the {BATCH_STEPS} steps of a log")
-        if np.any(mask):
-            raise ValueError(f"the log of a robot with {fault} contradicts the fault")
+        mask = kind.contradicted(fault, Trajectory(simulated.names, simulated.time, signals))
+        _require(
+            np.shape(mask) == (BATCH_STEPS,) and np.asarray(mask).dtype == np.bool_,
+            f"{kind.name} must return a mask of the {BATCH_STEPS} steps of a log",
+        )
+        _require(not np.any(mask), f"the log of a robot with {fault} contradicts the fault")
 
 
 def _contents(variant: ModelVariant) -> tuple[bytes, ...]:
     own = variant
     parts = (own.gain, own.offset, own.bias, own.noise, own.added_delay, own.encoder_offset)
-    return (
-        _saved(variant.model),
-        str(sorted(variant.silent_neurons)).encode(),
-        *(part.tobytes() for part in parts),
-    )
+    silent = str(sorted(own.silent_neurons)).encode()
+    return (_saved(own.model), silent, *(part.tobytes() for part in parts))
 
 
 def _saved(model: mujoco.MjModel) -> bytes:
