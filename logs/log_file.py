@@ -6,62 +6,27 @@ statistics, and the digests of selfmodel's records. All 2,000 of 2,000 random bi
 noticed.
 """
 
-import contextlib
 import io
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 import zstandard
-from mcap.exceptions import EndOfFile, InvalidMagic, McapError
+from mcap import exceptions, records as mcap
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    Channel,
-    Chunk,
-    DataEnd,
-    Footer,
-    McapRecord,
-    Message,
-    Metadata,
-    Schema,
-    Statistics,
-)
 from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.files import read_file, sync
-from selfmodel.logs.errors import (
-    AGAIN,
-    ANOTHER,
-    IMPORT_IT,
-    CorruptError,
-    LogError,
-    LogWriteError,
-    NotMcapError,
-    SchemaMismatchError,
-    TruncatedError,
-    UnsupportedError,
-    salvage_it,
-)
+from selfmodel.logs import errors, records
+from selfmodel.logs.errors import LogError
 from selfmodel.logs.files import no_folder, partial_path, publish, refuse_existing, taken
 from selfmodel.logs.messages import schema_text
-from selfmodel.logs.records import (
-    MEDIA_TYPES,
-    OWN,
-    RESULT,
-    SEAL_TYPE,
-    SEALS,
-    Result,
-    texts_of,
-    with_digest,
-    without_digest,
-)
 from selfmodel.version import __version__
 
 CHUNK = 256 * 2**10
@@ -73,12 +38,9 @@ Row = tuple[int, int, int, bytes]
 
 
 class LogFile:
-    """Writer of the records of a log; the constructor creates the file.
+    """Writer of the records of a log, whose name ends in ``.part`` until ``finish``.
 
     The order is: metadata and attachments, channels and messages, ``finish``.
-
-    Args:
-        path: Name of the finished file; until then, its name ends in ``.part``.
 
     Raises:
         InputError: The file exists, finished or not, or its folder does not.
@@ -86,8 +48,7 @@ class LogFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.part = partial_path(path)
+        self.path, self.part = path, partial_path(path)
         refuse_existing(path)
         with self._writing():
             try:
@@ -97,11 +58,9 @@ class LogFile:
             except (FileNotFoundError, NotADirectoryError):
                 raise no_folder(path) from None
         self._schemas: dict[str, int] = {}
+        # No other checksum than that of the data covers attachments and metadata.
         self._mcap = Writer(
-            self._file,
-            chunk_size=CHUNK,
-            compression=CompressionType.ZSTD,
-            enable_data_crcs=True,  # no other checksum covers attachments and metadata
+            self._file, CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
         with self._writing():
             self._mcap.start(profile="ros2", library=f"selfmodel/{__version__}")
@@ -109,11 +68,11 @@ class LogFile:
     def metadata(self, name: str, texts: Mapping[str, str]) -> None:
         """Writes a metadata record, with its digest."""
         with self._writing():
-            self._mcap.add_metadata(name, with_digest(name, texts))
+            self._mcap.add_metadata(name, records.with_digest(name, texts))
 
     def attach(self, name: str, data: bytes) -> None:
         """Writes an attachment."""
-        media_type = MEDIA_TYPES.get(name, "application/octet-stream")
+        media_type = records.MEDIA_TYPES.get(name, "application/octet-stream")
         with self._writing():
             # Times of 0: the bytes do not depend on the date.
             self._mcap.add_attachment(0, 0, name, media_type, data)
@@ -143,10 +102,10 @@ class LogFile:
         with self._writing():
             sync(self._file)
 
-    def finish(self, result: Result) -> None:
+    def finish(self, result: records.ResultRecord) -> None:
         """Writes the result and the end of the file, and renames the ``.part``."""
         self.flush()
-        self.metadata(RESULT, texts_of(result))
+        self.metadata(records.RESULT, records.texts_of(result))
         with self._writing():
             self._mcap.finish()
             sync(self._file)
@@ -160,7 +119,7 @@ class LogFile:
 
     def close(self) -> None:
         """Closes the file without finishing it; no effect on a closed file."""
-        with contextlib.suppress(OSError):  # an earlier error has been raised already
+        with suppress(OSError):  # an earlier error has been raised already
             self._file.close()
 
     @contextmanager
@@ -168,7 +127,7 @@ class LogFile:
         try:
             yield
         except OSError as error:
-            raise LogWriteError(self.part, error) from error
+            raise errors.LogWriteError(self.part, error) from error
 
 
 # ---------------------------------------------------------------- reading
@@ -179,7 +138,7 @@ MAX_BYTES = 2**31
 """Largest size of a log, bytes; a quadruped's trial of 10 s takes 0.5 MB."""
 
 _FAILURES = (
-    McapError,
+    exceptions.McapError,
     ValueError,  # a wrong checksum or digest, and text that is not UTF-8
     RuntimeError,  # lz4
     struct.error,
@@ -216,13 +175,10 @@ class Messages:
 
 @dataclass
 class Contents:
-    """Records of a file.
+    """Records of a file: metadata and attachments by name, messages by topic.
 
-    Attributes:
-        path: The file.
-        metadata: Metadata records by name; those of selfmodel without their verified digest.
-        attachments: Attached files by name.
-        topics: Messages by topic. Seals, of logs that version 0.1 wrote, are left out.
+    Records of selfmodel are without their verified digest. Seals, of logs that version 0.1 wrote,
+    are left out.
     """
 
     path: Path
@@ -231,7 +187,10 @@ class Contents:
     topics: dict[str, Messages] = field(default_factory=dict)
 
     def error(
-        self, what: str, kind: type[LogError] = SchemaMismatchError, advice: str = AGAIN
+        self,
+        what: str,
+        kind: type[LogError] = errors.SchemaMismatchError,
+        advice: str = errors.AGAIN,
     ) -> LogError:
         """Returns an error of the file, which says how much of it is complete."""
         counts = [len(messages.payloads) for messages in self.topics.values()]
@@ -265,50 +224,53 @@ def read_undamaged(path: Path, unread: Collection[str] = ()) -> tuple[Contents, 
     return contents, None
 
 
-def verified_records(data: bytes) -> Iterator[McapRecord]:
+def verified_records(data: bytes) -> Iterator[mcap.McapRecord]:
     """Yields the records of a file, each after the checks of what is before it.
 
     The file is intact if the iteration ends without an exception.
     """
-    stream, counts = io.BytesIO(data), Counter[type[McapRecord]]()
+    stream, counts = io.BytesIO(data), Counter[type[mcap.McapRecord]]()
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(data))
     for record in reader.records:
         counts[type(record)] += 1
-        if isinstance(record, Chunk):
+        if isinstance(record, mcap.Chunk):
             for part in _chunk_records(record):
                 counts[type(part)] += 1
                 yield part
         else:
             _check(record, data, stream.tell(), counts)
             yield record
-    if not counts[DataEnd]:
+    if not counts[mcap.DataEnd]:
         raise ValueError("the end of its data is not marked")
     if rest := stream.read(len(MAGIC)):
-        raise InvalidMagic(rest)
+        raise exceptions.InvalidMagic(rest)
 
 
 def _check(
-    record: McapRecord, data: bytes, end: int, counts: Mapping[type[McapRecord], int]
+    record: mcap.McapRecord,
+    data: bytes,
+    end: int,
+    counts: Mapping[type[mcap.McapRecord], int],
 ) -> None:
     """Checks what mcap does not, of a record that ends at an offset of the file."""
     match record:
-        case Attachment(name=name):
+        case mcap.Attachment(name=name):
             texts = len(name.encode()) + len(record.media_type.encode())
             size = 8 + 8 + 4 + 4 + texts + 8 + len(record.data) + 4
             _check_sum(data, end - size, end, f"attachment {name!r}")
-        case DataEnd(data_section_crc=0):
+        case mcap.DataEnd(data_section_crc=0):
             raise UncheckedError("it has no checksum over its data")
-        case Statistics():
+        case mcap.Statistics():
             for claimed, kind in (
-                (record.message_count, Message),
-                (record.chunk_count, Chunk),
-                (record.attachment_count, Attachment),
-                (record.metadata_count, Metadata),
+                (record.message_count, mcap.Message),
+                (record.chunk_count, mcap.Chunk),
+                (record.attachment_count, mcap.Attachment),
+                (record.metadata_count, mcap.Metadata),
             ):
                 if claimed != counts[kind]:
                     counted = f"{claimed} of {kind.__name__}, its records {counts[kind]}"
                     raise ValueError(f"its statistics have {counted}")
-        case Footer():
+        case mcap.Footer():
             # The checksum covers the footer except its own bytes.
             start = record.summary_start or end - (1 + 8 + 8 + 8 + 4)
             _check_sum(data, start, end, "summary")
@@ -321,7 +283,7 @@ def _check_sum(data: bytes, start: int, end: int, what: str) -> None:
         raise ValueError(f"the checksum of its {what} is wrong")
 
 
-def _chunk_records(chunk: Chunk) -> Iterator[McapRecord]:
+def _chunk_records(chunk: mcap.Chunk) -> Iterator[mcap.McapRecord]:
     """Does what mcap's ``breakup_chunk`` does, in a third of the time for messages."""
     if chunk.uncompressed_size and not chunk.uncompressed_crc:
         raise UncheckedError("a chunk has no checksum")
@@ -331,13 +293,13 @@ def _chunk_records(chunk: Chunk) -> Iterator[McapRecord]:
         opcode, length = _FRAME.unpack_from(data, offset)
         start, end = offset + _FRAME.size, offset + _FRAME.size + length
         if end > size:
-            raise EndOfFile
+            raise exceptions.EndOfFile
         if opcode == Opcode.MESSAGE:
             channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
             payload = data[start + _MESSAGE.size : end]
-            yield Message(channel, log_time, payload, publish_time, sequence)
+            yield mcap.Message(channel, log_time, payload, publish_time, sequence)
         else:
-            yield from breakup_chunk(Chunk("", data[offset:end], 0, 0, 0, end - offset))
+            yield from breakup_chunk(mcap.Chunk("", data[offset:end], 0, 0, 0, end - offset))
         offset = end
 
 
@@ -347,28 +309,28 @@ _MESSAGE = struct.Struct("<HIQQ")
 
 def _gather(data: bytes, contents: Contents, unread: Collection[str]) -> None:
     """Adds the records of a file to its contents; raises one of ``_FAILURES`` at damage."""
-    schemas: dict[int, Schema] = {0: Schema(0, b"", "", "")}
+    schemas: dict[int, mcap.Schema] = {0: mcap.Schema(0, b"", "", "")}
     channels: dict[int, Messages] = {}
     for record in verified_records(data):
         match record:
-            case Message():
+            case mcap.Message():
                 messages = channels[record.channel_id]
                 messages.payloads.append(record.data)
                 messages.times.append((record.log_time, record.publish_time))
-            case Schema():
+            case mcap.Schema():
                 schemas[record.id] = record
-            case Channel() if record.id not in channels:  # channels are repeated at the end
+            case mcap.Channel() if record.id not in channels:  # they are repeated at the end
                 schema = schemas[record.schema_id]
                 messages = Messages(schema.name, schema.data, record.message_encoding)
                 channels[record.id] = messages
-                if (record.topic, schema.name) != (SEALS, SEAL_TYPE):
+                if (record.topic, schema.name) != (records.SEALS, records.SEAL_TYPE):
                     _add_once(contents.topics, record.topic, messages)
-            case Metadata() if record.name not in unread:
+            case mcap.Metadata() if record.name not in unread:
                 texts = record.metadata
-                if record.name.startswith(OWN):
-                    texts = without_digest(record.name, texts)
+                if record.name.startswith(records.OWN):
+                    texts = records.without_digest(record.name, texts)
                 _add_once(contents.metadata, record.name, texts)
-            case Attachment():
+            case mcap.Attachment():
                 _add_once(contents.attachments, record.name, record.data)
 
 
@@ -382,17 +344,17 @@ def _add_once(items: dict[str, _Item], name: str, item: _Item) -> None:
 
 
 def _explained(data: bytes, failure: Exception, contents: Contents) -> LogError:
-    path = contents.path
+    path, salvage_it = contents.path, errors.salvage_it(contents.path)
     if len(data) <= len(MAGIC):
-        return NotMcapError(path, "the file is empty or too short", advice=ANOTHER)
+        return errors.NotMcapError(path, "the file is empty or too short", advice=errors.ANOTHER)
     if not data.startswith(MAGIC):
-        return NotMcapError(path, "this is not an MCAP file", advice=ANOTHER)
+        return errors.NotMcapError(path, "this is not an MCAP file", advice=errors.ANOTHER)
     if isinstance(failure, UncheckedError):
         what = f"{failure}: selfmodel did not write this file"
-        return contents.error(what, UnsupportedError, IMPORT_IT)
-    if isinstance(failure, InvalidMagic):
-        return contents.error("its last bytes are damaged", CorruptError, salvage_it(path))
+        return contents.error(what, errors.UnsupportedError, errors.IMPORT_IT)
+    if isinstance(failure, exceptions.InvalidMagic):
+        return contents.error("its last bytes are damaged", errors.CorruptError, salvage_it)
     if not data.endswith(MAGIC):
-        return contents.error("the file ends too early", TruncatedError, salvage_it(path))
+        return contents.error("the file ends too early", errors.TruncatedError, salvage_it)
     what = f"the file is damaged: {failure or type(failure).__name__}"
-    return contents.error(what, CorruptError, salvage_it(path))
+    return contents.error(what, errors.CorruptError, salvage_it)

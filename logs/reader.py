@@ -13,41 +13,10 @@ from selfmodel.arrays import BoolArray, FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
+from selfmodel.logs import errors, records
 from selfmodel.logs.controllers import parse_controller
-from selfmodel.logs.errors import (
-    ANOTHER,
-    IMPORT_IT,
-    OTHER_VERSION,
-    CorruptError,
-    IncompleteError,
-    UnsupportedError,
-    salvage_it,
-)
 from selfmodel.logs.log_file import Contents, Messages, read_contents
 from selfmodel.logs.messages import TIMING, Part, Topic, is_known, names_in, schema_text, topics
-from selfmodel.logs.records import (
-    CONTROLLER_FILE,
-    FINISHED,
-    FORMAT,
-    GAP,
-    HIDDEN,
-    IMPORT,
-    INTERRUPTED,
-    MAPPING_FILE,
-    MODEL_FILE,
-    RESULT,
-    SETTINGS_FILE,
-    SOFTWARE,
-    STOPPED,
-    TIMED_FORMAT,
-    TRIAL,
-    TRUTH,
-    Result,
-    TrialRecord,
-    parse_settings,
-    record_of,
-    sha256,
-)
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS, Names
 from selfmodel.trials.trajectory import Trajectory
@@ -56,13 +25,12 @@ from selfmodel.trials.trial import Trial, TrialPlan
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Timing of a trial's steps; see ``selfmodel.trials.trajectory.StepTiming``.
+    """Timing of a trial's steps, ``(steps,)`` each; see ``trials.trajectory.StepTiming``.
 
     Attributes:
-        elapsed: Time since the first step, ``(steps,)`` s; NaN if unknown.
-        late: Flags of late steps, ``(steps,)``; a step lost from a damaged log is late.
-        missing: Flags of steps without an observation, ``(steps,)``; a step lost from a damaged log
-            is missing.
+        elapsed: Time since the first step, s; NaN if unknown.
+        late: Flags of late steps; a step lost from a damaged log is late, and missing.
+        missing: Flags of steps without an observation.
     """
 
     elapsed: FloatArray
@@ -106,9 +74,9 @@ class TrialLog:
 def read_log(path: str | Path) -> TrialLog:
     """Returns the content of a log.
 
-    Verified are the checksums of the file, the digests of its records, of the model and of the
-    controller, the layout and time of every message, the names, and the displacement. The hidden
-    faults of a simulated robot are not read.
+    Verified are the checksums of the file and the counts of its records, the digests of its
+    records, of the model and of the controller, the layout and time of every message, the names,
+    and the displacement. The hidden faults of a simulated robot are not read.
 
     Example:
         >>> import selfmodel
@@ -116,14 +84,11 @@ def read_log(path: str | Path) -> TrialLog:
         >>> print(log.trial.plan.stage, log.trial.trajectory.steps, log.status)
         before 60 finished
 
-    Args:
-        path: The log.
-
     Raises:
         LogError: A check failed.
         InputError: The file does not exist.
     """
-    return interpret(read_contents(Path(path), (HIDDEN,)))
+    return interpret(read_contents(Path(path), (records.HIDDEN,)))
 
 
 def interpret(contents: Contents) -> TrialLog:
@@ -134,7 +99,7 @@ def interpret(contents: Contents) -> TrialLog:
         if is_known(messages.type) and messages.schema != schema_text(messages.type).encode():
             what = f"on {topic}: its definition of {messages.type} is not that of selfmodel"
             raise contents.error(what)
-    mjcf = _attachment(contents, MODEL_FILE, record.model_sha256)
+    mjcf = _attachment(contents, records.MODEL_FILE, record.model_sha256)
     controller = read_controller(contents, record)
     trajectory = read_trajectory(contents, record, result.steps, controller)
     timing = _timing(contents, record, result.steps)
@@ -150,25 +115,23 @@ def interpret(contents: Contents) -> TrialLog:
             f"the displacement is {result.displacement!r} m in its result, and "
             f"{trial.displacement!r} m in its messages"
         )
-        raise contents.error(what, CorruptError)
+        raise contents.error(what, errors.CorruptError)
     with contents.mismatch("an attachment cannot be read"):
-        settings = parse_settings(_attachment(contents, SETTINGS_FILE))
+        settings = records.parse_settings(_attachment(contents, records.SETTINGS_FILE))
         text = mjcf.decode()
-    ours = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
+    assets = {k: v for k, v in contents.attachments.items() if k not in records.OWN_FILES}
     return TrialLog(
         trial=trial,
         mjcf=text,
-        assets=MappingProxyType(
-            {name: data for name, data in contents.attachments.items() if name not in ours}
-        ),
+        assets=MappingProxyType(assets),
         root=record.root,
         control_timestep=record.control_timestep,
         settings=settings,
-        software=MappingProxyType(dict(contents.metadata.get(SOFTWARE, {}))),
+        software=MappingProxyType(dict(contents.metadata.get(records.SOFTWARE, {}))),
         status=result.status,
         reason=result.reason,
         timing=timing,
-        imported=IMPORT in contents.metadata,
+        imported=records.IMPORT in contents.metadata,
     )
 
 
@@ -181,7 +144,7 @@ def read_truth(path: str | Path) -> str | None:
         LogError: The file is damaged.
         InputError: The file does not exist.
     """
-    return read_contents(Path(path)).metadata.get(HIDDEN, {}).get(TRUTH)
+    return read_contents(Path(path)).metadata.get(records.HIDDEN, {}).get(records.TRUTH)
 
 
 def read_gap(path: str | Path) -> dict[str, Any] | None:
@@ -198,7 +161,7 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
         InputError: The file does not exist.
     """
     contents = read_contents(Path(path))
-    text = contents.metadata.get(HIDDEN, {}).get(GAP)
+    text = contents.metadata.get(records.HIDDEN, {}).get(records.GAP)
     if text is None:
         return None
     with contents.mismatch("its gap cannot be read"):
@@ -208,30 +171,34 @@ def read_gap(path: str | Path) -> dict[str, Any] | None:
 # ---------------------------------------------------------------- records and attachments
 
 
-def read_record(contents: Contents) -> TrialRecord:
+def read_record(contents: Contents) -> records.TrialRecord:
     """Returns the record ``selfmodel.trial``, which precedes the first step."""
-    texts = contents.metadata.get(TRIAL)
+    texts = contents.metadata.get(records.TRIAL)
+    known = records.FORMAT, records.TIMED_FORMAT
     if texts is None:
-        raise contents.error(f"it has no record {TRIAL}", advice=f"{ANOTHER}; {IMPORT_IT}")
-    if texts.get("format") not in (FORMAT, TIMED_FORMAT):
-        what = f"expected format {FORMAT} or {TIMED_FORMAT}, got {texts.get('format')!r}"
-        raise UnsupportedError(contents.path, what, advice=OTHER_VERSION)
-    with contents.mismatch(f"its record {TRIAL} is wrong"):
-        return record_of(TrialRecord, texts)
+        advice = f"{errors.ANOTHER}; {errors.IMPORT_IT}"
+        raise contents.error(f"it has no record {records.TRIAL}", advice=advice)
+    if texts.get("format") not in known:
+        what = f"expected format {' or '.join(known)}, got {texts.get('format')!r}"
+        raise errors.UnsupportedError(contents.path, what, advice=errors.OTHER_VERSION)
+    with contents.mismatch(f"its record {records.TRIAL} is wrong"):
+        return records.record_of(records.TrialRecord, texts)
 
 
-def _result(contents: Contents, record: TrialRecord) -> Result:
-    texts = contents.metadata.get(RESULT)
+def _result(contents: Contents, record: records.TrialRecord) -> records.ResultRecord:
+    texts = contents.metadata.get(records.RESULT)
     if texts is None:
-        what = f"it has no record {RESULT}, so the trial did not finish"
-        raise contents.error(what, IncompleteError, salvage_it(contents.path))
-    with contents.mismatch(f"its record {RESULT} is wrong"):
-        result = record_of(Result, texts)
-    if result.status not in (FINISHED, INTERRUPTED, STOPPED):
-        raise contents.error(f"the trial is {result.status!r}", UnsupportedError, OTHER_VERSION)
-    if result.steps > record.steps or (result.status == FINISHED and result.steps < record.steps):
+        what = f"it has no record {records.RESULT}, so the trial did not finish"
+        raise contents.error(what, errors.IncompleteError, errors.salvage_it(contents.path))
+    with contents.mismatch(f"its record {records.RESULT} is wrong"):
+        result = records.record_of(records.ResultRecord, texts)
+    if result.status not in records.STATUSES:
+        what = f"the trial is {result.status!r}"
+        raise contents.error(what, errors.UnsupportedError, errors.OTHER_VERSION)
+    missing = record.steps - result.steps
+    if missing < 0 or (missing > 0 and result.status == records.FINISHED):
         what = f"the trial is {result.status!r} after {result.steps} of {record.steps} steps"
-        raise contents.error(what, IncompleteError)
+        raise contents.error(what, errors.IncompleteError)
     return result
 
 
@@ -240,19 +207,19 @@ def _attachment(contents: Contents, name: str, expected: str = "") -> bytes:
     data = contents.attachments.get(name)
     if data is None:
         raise contents.error(f"it has no attachment {name}")
-    if expected and sha256(data) != expected:
+    if expected and records.sha256(data) != expected:
         what = f"{name} is not the file of the trial: its SHA-256 differs"
-        raise contents.error(what, CorruptError)
+        raise contents.error(what, errors.CorruptError)
     return data
 
 
-def read_controller(contents: Contents, record: TrialRecord) -> Controller | None:
+def read_controller(contents: Contents, record: records.TrialRecord) -> Controller | None:
     """Returns the controller of the robot; None if unknown."""
     if not record.controller_sha256:
         return None
-    data = _attachment(contents, CONTROLLER_FILE, record.controller_sha256)
+    data = _attachment(contents, records.CONTROLLER_FILE, record.controller_sha256)
     try:
-        return parse_controller(data, CONTROLLER_FILE)
+        return parse_controller(data, records.CONTROLLER_FILE)
     except InputError as error:
         raise contents.error(str(error)) from error
 
@@ -261,7 +228,7 @@ def read_controller(contents: Contents, record: TrialRecord) -> Controller | Non
 
 
 def read_trajectory(
-    contents: Contents, record: TrialRecord, steps: int, controller: Controller | None
+    contents: Contents, record: records.TrialRecord, steps: int, controller: Controller | None
 ) -> Trajectory:
     """Returns the trajectory in the messages of a log; they must have the names of a controller."""
     names = read_names(contents)
@@ -299,7 +266,7 @@ def _messages(contents: Contents, topic: str) -> Messages:
 
 
 def _rows(
-    contents: Contents, topic: Topic, record: TrialRecord, steps: int
+    contents: Contents, topic: Topic, record: records.TrialRecord, steps: int
 ) -> dict[Part, FloatArray]:
     """Numbers in the messages of a topic, one at each step, ``(steps, width)`` per part."""
     messages = _messages(contents, topic.name)
@@ -310,7 +277,7 @@ def _rows(
         )
     if len(messages.payloads) != steps:
         what = f"{len(messages.payloads)} messages on {topic.name} for {steps} steps"
-        raise contents.error(what, CorruptError)
+        raise contents.error(what, errors.CorruptError)
     with contents.mismatch(f"on {topic.name}"):
         stamps, values = topic.template.decode(messages.payloads)
     expected = np.rint(np.arange(steps, dtype=np.float64) * record.control_timestep * 1e9)
@@ -321,9 +288,9 @@ def _rows(
     return topic.unpack(values)
 
 
-def _timing(contents: Contents, record: TrialRecord, steps: int) -> Timing | None:
+def _timing(contents: Contents, record: records.TrialRecord, steps: int) -> Timing | None:
     """Measured timing of the steps; None for a robot without its own clock."""
-    if record.format != TIMED_FORMAT:
+    if record.format != records.TIMED_FORMAT:
         return None
     rows = _rows(contents, TIMING, record, steps)["timing"]
     elapsed, marks = rows[:, 0], rows[:, 1:]

@@ -16,11 +16,9 @@ from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import MAX_SEED, Stage
 
-FORMAT = "1"
-"""Version of the format of a log; a reader refuses unknown versions."""
-
-TIMED_FORMAT = "2"
-"""Version of the format of a robot with its own clock: the same with ``/timing``."""
+FORMAT, TIMED_FORMAT = "1", "2"
+"""Versions of the format of a log; that of a robot with its own clock is the same with ``/timing``.
+"""
 
 TRIAL = "selfmodel.trial"
 SOFTWARE = "selfmodel.software"
@@ -39,10 +37,10 @@ OWN = "selfmodel."
 """Prefix of the names of selfmodel's records; each contains a digest of itself."""
 DIGEST = "sha256"
 
-MODEL_FILE = "model.xml"
-CONTROLLER_FILE = "controller.npz"
-SETTINGS_FILE = "settings.json"
-MAPPING_FILE = "mapping.toml"
+MODEL_FILE, CONTROLLER_FILE = "model.xml", "controller.npz"
+SETTINGS_FILE, MAPPING_FILE = "settings.json", "mapping.toml"
+OWN_FILES = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
+"""Attachments of selfmodel; all others are files that the model may name."""
 
 MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
     {
@@ -53,11 +51,10 @@ MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
 )
 """Media types by attachment; other attachments are ``application/octet-stream``."""
 
-TRUTH = "truth"
-GAP = "gap"
-FINISHED = "finished"
-INTERRUPTED = "interrupted"
-STOPPED = "stopped"
+TRUTH, GAP = "truth", "gap"
+"""Keys of ``HIDDEN``."""
+
+STATUSES = FINISHED, INTERRUPTED, STOPPED = "finished", "interrupted", "stopped"
 
 MAX_TEXT = 1000
 """Maximum length of a text in a record, characters."""
@@ -95,11 +92,11 @@ class TrialRecord(Struct, frozen=True):
     model_sha256: Text
 
 
-class Result(Struct, frozen=True, omit_defaults=True):
+class ResultRecord(Struct, frozen=True, omit_defaults=True):
     """Record ``selfmodel.result``, written last.
 
     Attributes:
-        status: ``finished``, ``interrupted`` or ``stopped``.
+        status: One of ``STATUSES``.
         steps: Number of logged control steps.
         displacement: Forward displacement of the base, m.
         reason: Cause of the stop, or "".
@@ -111,7 +108,7 @@ class Result(Struct, frozen=True, omit_defaults=True):
     reason: Text = ""
 
 
-Record = TypeVar("Record", TrialRecord, Result)
+Record = TypeVar("Record", TrialRecord, ResultRecord)
 
 
 def texts_of(record: Struct) -> dict[str, str]:
@@ -129,12 +126,7 @@ def record_of(kind: type[Record], texts: Mapping[str, str]) -> Record:
 
 @dataclass(frozen=True)
 class Imported:
-    """Origin of an imported trial.
-
-    Attributes:
-        facts: Source and quality of the recording, as texts by name.
-        mapping: Mapping from the recording's topics to signals, as TOML.
-    """
+    """Origin of an imported trial: source and quality by name, and the mapping as TOML."""
 
     facts: Mapping[str, str]
     mapping: str

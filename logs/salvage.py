@@ -1,35 +1,16 @@
 """Salvage: a new log with the steps of a damaged or unfinished log before its first damage."""
 
-import dataclasses
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, file_digest
+from selfmodel.logs import reader, records
 from selfmodel.logs.errors import CorruptError, LogError
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.log_file import Contents, LogFile, read_undamaged
 from selfmodel.logs.messages import DESCRIPTION, TRANSFORMS, topics
-from selfmodel.logs.reader import (
-    interpret,
-    read_controller,
-    read_log,
-    read_names,
-    read_record,
-    read_trajectory,
-)
-from selfmodel.logs.records import (
-    INTERRUPTED,
-    OWN,
-    RESULT,
-    SALVAGE,
-    TIMED_FORMAT,
-    TRIAL,
-    Result,
-    TrialRecord,
-    texts_of,
-)
 from selfmodel.trials.trajectory import forward_displacement
 
 _SEALED = "selfmodel.manifest"
@@ -63,11 +44,11 @@ def salvage(path: Path, out: Path) -> Salvaged:
     """
     refuse_existing(out)
     try:
-        status = read_log(path).status
+        status = reader.read_log(path).status
     except LogError:
         contents, result, saved = _saved(path)
         _write(out, contents, result)
-        return dataclasses.replace(saved, log=str(out))
+        return replace(saved, log=str(out))
     raise InputError(
         f"{path} is valid, and the trial in it is {status}: there is nothing to salvage"
     )
@@ -85,41 +66,43 @@ def salvageable_steps(path: Path) -> int:
         return 0
 
 
-def _saved(path: Path) -> tuple[Contents, Result, Salvaged]:
+def _saved(path: Path) -> tuple[Contents, records.ResultRecord, Salvaged]:
     """Contents and result of the new log, checked as a reader would check them."""
     contents, damage = read_undamaged(path)
     reason = damage.what if damage else "the trial did not finish"
-    record = read_record(contents)
-    controller = read_controller(contents, record)
+    record = reader.read_record(contents)
+    controller = reader.read_controller(contents, record)
     steps = _cut(contents, record, reason)
-    trajectory = read_trajectory(contents, record, steps, controller)
-    result = Result(INTERRUPTED, steps, float(forward_displacement(trajectory)))
+    trajectory = reader.read_trajectory(contents, record, steps, controller)
+    result = records.ResultRecord(
+        records.INTERRUPTED, steps, float(forward_displacement(trajectory))
+    )
     contents.metadata = {
         name: texts
         for name, texts in contents.metadata.items()
-        if name.startswith(OWN) and name != _SEALED
+        if name.startswith(records.OWN) and name != _SEALED
     } | {
-        TRIAL: texts_of(record),
-        RESULT: texts_of(result),
-        SALVAGE: {
+        records.TRIAL: records.texts_of(record),
+        records.RESULT: records.texts_of(result),
+        records.SALVAGE: {
             "source": encodable(path.name),
             "source_sha256": file_digest(path),
             "complete_steps": str(steps),
         },
     }
-    interpret(contents)
+    reader.interpret(contents)
     return contents, result, Salvaged("", steps, record.steps, reason)
 
 
-def _cut(contents: Contents, record: TrialRecord, reason: str) -> int:
+def _cut(contents: Contents, record: records.TrialRecord, reason: str) -> int:
     """Removes what is not of the complete first steps, and returns their number."""
     what = f"nothing can be salvaged before its first damage: {reason}"
     nothing = CorruptError(contents.path, what)
     try:
-        names = read_names(contents)
+        names = reader.read_names(contents)
     except LogError as error:
         raise nothing from error
-    every = topics(names, record.root, timed=record.format == TIMED_FORMAT)
+    every = topics(names, record.root, timed=record.format == records.TIMED_FORMAT)
 
     def time_of(step: int) -> int:
         return round(step * record.control_timestep * 1e9)
@@ -141,12 +124,12 @@ def _cut(contents: Contents, record: TrialRecord, reason: str) -> int:
     return steps
 
 
-def _write(out: Path, contents: Contents, result: Result) -> None:
+def _write(out: Path, contents: Contents, result: records.ResultRecord) -> None:
     log = LogFile(out)
     with ExitStack() as undo:
         undo.callback(log.abandon)  # on any error; the damaged file is unchanged
         for name, texts in contents.metadata.items():
-            if name != RESULT:
+            if name != records.RESULT:
                 log.metadata(name, texts)
         for name, data in contents.attachments.items():
             log.attach(name, data)

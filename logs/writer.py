@@ -1,10 +1,10 @@
 """Writer of a trial's log, while the trial runs: a kill loses at most the last steps."""
 
-import dataclasses
 import itertools
 import platform
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
+from dataclasses import astuple
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
@@ -17,57 +17,14 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError, describe
+from selfmodel.logs import messages, records, viewers
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.errors import IncompleteError, salvage_it
 from selfmodel.logs.files import partial_path
 from selfmodel.logs.log_file import LogFile, Row
-from selfmodel.logs.messages import (
-    DESCRIPTION,
-    DESCRIPTION_TYPE,
-    Part,
-    description,
-    frames_stride,
-    topics,
-    transforms,
-)
-from selfmodel.logs.records import (
-    CONTROLLER_FILE,
-    FINISHED,
-    FORMAT,
-    GAP,
-    HIDDEN,
-    IMPORT,
-    MAPPING_FILE,
-    MAX_TEXT,
-    MODEL_FILE,
-    SETTINGS_FILE,
-    SOFTWARE,
-    STOPPED,
-    TIMED_FORMAT,
-    TRIAL,
-    TRUTH,
-    Result,
-    TrialHeader,
-    TrialRecord,
-    checked_name,
-    settings_json,
-    sha256,
-    texts_of,
-)
-from selfmodel.logs.viewers import (
-    Kinematics,
-    body_names,
-    parent_names,
-    to_body_frame,
-    to_micrometres,
-    urdf,
-)
-from selfmodel.physical.safety import (
-    cleanup,
-    handle_stop_signals,
-    hold_stop_signals,
-    release_stop_signals,
-)
+from selfmodel.logs.messages import Part
+from selfmodel.logs.records import TrialHeader
+from selfmodel.physical import safety
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample
@@ -108,13 +65,13 @@ def write_trial(
     iterator = itertools.islice(samples, plan.steps)
     # The robot is stopped in any case, and a signal interrupts nothing but the robot.
     with (
-        handle_stop_signals(),
-        hold_stop_signals(),
+        safety.handle_stop_signals(),
+        safety.hold_stop_signals(),
         TrialWriter(path, robot, plan, header) as writer,
-        cleanup(getattr(samples, "close", lambda: None)),
+        safety.cleanup(getattr(samples, "close", lambda: None)),
     ):
         while True:
-            with release_stop_signals():
+            with safety.release_stop_signals():
                 sample = next(iterator, None)
             if sample is None:
                 return path
@@ -141,7 +98,7 @@ class TrialWriter:
     """
 
     def __init__(self, path: Path, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
-        checked_name(plan.name)
+        records.checked_name(plan.name)
         names, driver = robot.anatomy.names, plan.controller
         ends = (
             (names.sensors, driver.motors)
@@ -159,13 +116,13 @@ class TrialWriter:
         self.steps = 0
         self._robot, self._plan, self._header = robot, plan, header
         self._topics = (
-            *topics(names, robot.root, timed=header.timed),
-            transforms(body_names(robot.model), parent_names(robot.model)),
+            *messages.topics(names, robot.root, timed=header.timed),
+            messages.transforms(viewers.body_names(robot.model), viewers.parent_names(robot.model)),
         )
         widths: dict[Part, int] = {signal: names.width(signal) for signal in SIGNALS}
         if header.timed:
             widths["timing"] = 3
-        self._kinematics = Kinematics(robot)
+        self._kinematics = viewers.Kinematics(robot)
         self._rows = {part: np.empty((FLUSH_STEPS, width)) for part, width in widths.items()}
         self._written = 0
         self._start = self._end = 0.0
@@ -198,7 +155,7 @@ class TrialWriter:
             )
         sampled = dict[Part, FloatArray](sample.values.items())
         if sample.moment is not None:
-            sampled["timing"] = np.array(dataclasses.astuple(sample.moment), dtype=np.float64)
+            sampled["timing"] = np.array(astuple(sample.moment), dtype=np.float64)
         for part, rows in self._rows.items():
             row = sampled.get(part)
             if row is None or row.shape != rows.shape[1:]:
@@ -226,12 +183,12 @@ class TrialWriter:
             if self._sound:
                 self._flush()
             if error is None and self.steps == self._plan.steps:
-                self._finish(FINISHED)
+                self._finish(records.FINISHED)
             elif self._sound and (
                 isinstance(error, TrialError) or (error is not None and self._header.timed)
             ):
                 if self.steps:
-                    self._finish(STOPPED, _stop_reason(error))
+                    self._finish(records.STOPPED, _stop_reason(error))
                 else:
                     self._log.abandon()
         except (OSError, InputError) as failure:
@@ -265,28 +222,32 @@ class TrialWriter:
         """Messages of the steps in some rows, in order; the last topic is not in every step."""
         steps = np.arange(self._written, self.steps)
         stamps = np.rint(steps * self._robot.control_timestep * 1e9).astype(np.int64)
-        stride = frames_stride(self._robot.control_timestep)
+        stride = messages.frames_stride(self._robot.control_timestep)
         drawn = slice(-self._written % stride, None, stride)
         parts: dict[Part, FloatArray] = {
             **rows,
-            "child_linear_velocity": to_micrometres(
-                to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
+            "child_linear_velocity": viewers.to_micrometres(
+                viewers.to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
             ),
             "transforms": self._kinematics.transforms({k: v[drawn] for k, v in rows.items()}),
         }
-        messages: list[Row] = []
+        encoded: list[Row] = []
         for index, topic in enumerate(self._topics):
             chosen = drawn if index == len(self._topics) - 1 else slice(None)
             times = stamps[chosen]
             payloads = topic.template.encode(times, topic.pack(parts))
-            messages += zip(
+            encoded += zip(
                 steps[chosen].tolist(), itertools.repeat(index), times.tolist(), payloads
             )
-        messages.sort(key=itemgetter(0, 1))
-        return messages
+        encoded.sort(key=itemgetter(0, 1))
+        return encoded
 
     def _finish(self, status: str, reason: str = "") -> None:
-        self._log.finish(Result(status, self.steps, self._end - self._start, reason[:MAX_TEXT]))
+        self._log.finish(
+            records.ResultRecord(
+                status, self.steps, self._end - self._start, reason[: records.MAX_TEXT]
+            )
+        )
 
 
 def _stop_reason(error: BaseException) -> str:
@@ -300,8 +261,8 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
     driver = plan.controller
     controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
-    record = TrialRecord(
-        format=TIMED_FORMAT if header.timed else FORMAT,
+    record = records.TrialRecord(
+        format=records.TIMED_FORMAT if header.timed else records.FORMAT,
         name=plan.name,
         stage=plan.stage,
         robot=robot.name,
@@ -309,12 +270,12 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         control_timestep=robot.control_timestep,
         steps=plan.steps,
         seed=plan.seed,
-        controller_sha256=sha256(controller) if controller else "",
-        model_sha256=sha256(model),
+        controller_sha256=records.sha256(controller) if controller else "",
+        model_sha256=records.sha256(model),
     )
-    log.metadata(TRIAL, texts_of(record))
+    log.metadata(records.TRIAL, records.texts_of(record))
     log.metadata(
-        SOFTWARE,
+        records.SOFTWARE,
         {
             "selfmodel": __version__,
             "mujoco": mujoco.__version__,
@@ -323,17 +284,17 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
             "mcap": mcap.__version__,
         },
     )
-    truths = {TRUTH: header.hidden, GAP: header.gap}
+    truths = {records.TRUTH: header.hidden, records.GAP: header.gap}
     if known := {name: text for name, text in truths.items() if text is not None}:
-        log.metadata(HIDDEN, known)
-    log.attach(MODEL_FILE, model)
+        log.metadata(records.HIDDEN, known)
+    log.attach(records.MODEL_FILE, model)
     for name, data in robot.assets.items():
         log.attach(name, data)
     if controller:
-        log.attach(CONTROLLER_FILE, controller)
-    log.attach(SETTINGS_FILE, settings_json(header.settings))
+        log.attach(records.CONTROLLER_FILE, controller)
+    log.attach(records.SETTINGS_FILE, records.settings_json(header.settings))
     if header.imported is not None:
-        log.metadata(IMPORT, header.imported.facts)
-        log.attach(MAPPING_FILE, header.imported.mapping.encode())
-    channel = log.channel(DESCRIPTION, DESCRIPTION_TYPE)
-    log.messages([channel], [(0, 0, 0, description(urdf(robot)))])
+        log.metadata(records.IMPORT, header.imported.facts)
+        log.attach(records.MAPPING_FILE, header.imported.mapping.encode())
+    channel = log.channel(messages.DESCRIPTION, messages.DESCRIPTION_TYPE)
+    log.messages([channel], [(0, 0, 0, messages.description(viewers.urdf(robot)))])
