@@ -24,12 +24,6 @@ def salvage_it(path: str | PathLike[str]) -> str:
 class LogError(WorkError):
     """A log cannot be used.
 
-    Args:
-        path: The file.
-        what: Description of the damage.
-        good: Description of the intact part, if known.
-        advice: Remedy.
-
     Attributes:
         path: The file.
         what: Description of the damage.

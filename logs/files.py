@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from itertools import count
+from itertools import chain, count
 from os import PathLike, path as os_path
 from pathlib import Path
 from typing import IO
@@ -36,10 +36,10 @@ def refuse_existing(path: Path) -> None:
 
 
 @contextmanager
-def create_file(path: Path) -> Iterator[IO[bytes]]:
-    """Opens a new file, which gets its name once it is complete; see ``files.new_file``."""
+def create_file(path: Path, *, replace: bool = False) -> Iterator[IO[bytes]]:
+    """Opens a file, which gets its name once it is complete; see ``files.new_file``."""
     try:
-        with new_file(path) as file:
+        with new_file(path, replace=replace) as file:
             yield file
     except FileExistsError:
         raise taken(path) from None
@@ -51,11 +51,8 @@ def create_file(path: Path) -> Iterator[IO[bytes]]:
 
 def replace_file(path: Path, data: bytes) -> None:
     """Writes a file, or replaces its content, in one atomic step."""
-    try:
-        with new_file(path, replace=True) as file:
-            file.write(data)
-    except OSError as error:
-        raise not_written(path, error) from error
+    with create_file(path, replace=True) as file:
+        file.write(data)
 
 
 def write_new(path: Path, data: bytes) -> Path:
@@ -64,18 +61,18 @@ def write_new(path: Path, data: bytes) -> Path:
     Returns:
         ``path``; if that name was taken, the next one that is free, such as ``NAME-2.html``.
     """
-    names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
-    name = path
+    numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    names = chain([path], numbered)
     while True:
+        name = next(names)
         try:
             with new_file(name) as file:
                 file.write(data)
         except FileExistsError:
-            name = next(names)
+            continue
         except OSError as error:
-            raise not_written(path, error) from error
-        else:
-            return name
+            raise not_written(name, error) from error
+        return name
 
 
 def publish(part: Path, path: Path) -> None:
@@ -103,12 +100,9 @@ def make_folder(path: Path) -> None:
         raise not_written(path, error) from error
 
 
-def not_written(
-    path: str | PathLike[str],
-    cause: OSError,
-    kept: str = "files that were finished before are kept",
-) -> LogWriteError:
+def not_written(path: str | PathLike[str], cause: OSError) -> LogWriteError:
     """Returns the error of a file that is written as a whole."""
     if isinstance(cause, LogWriteError):
         return cause
+    kept = "files that were finished before are kept"
     return LogWriteError(path, cause, again="run the command again", kept=kept)

@@ -41,7 +41,6 @@ class Info:
         attachments: Sizes of the attachments by name, bytes.
         records: Names of the metadata records.
         observed: Fraction of observed numbers by signal, in [0, 1].
-        driver: Description of the controller, or of its replacement by recorded commands.
         source: Origin of an imported or salvaged trial; empty for other trials.
         digest: SHA-256 of the file.
     """
@@ -52,9 +51,13 @@ class Info:
     attachments: Mapping[str, int]
     records: tuple[str, ...]
     observed: Mapping[Signal, float]
-    driver: str
     source: Mapping[str, str]
     digest: str
+
+    @property
+    def driver(self) -> str:
+        """Description of the controller, or of its replacement by recorded commands."""
+        return self.log.trial.plan.controller.summary
 
     @property
     def has_truth(self) -> bool:
@@ -71,7 +74,7 @@ def read_info(path: Path) -> Info:
     """
     contents = read_contents(path)
     log = interpret(contents)
-    trajectory = log.trial.trajectory
+    signals = {signal: log.trial.trajectory[signal] for signal in SIGNALS}
     return Info(
         log=log,
         bytes=path.stat().st_size,
@@ -79,12 +82,9 @@ def read_info(path: Path) -> Info:
         attachments={name: len(data) for name, data in contents.attachments.items()},
         records=tuple(contents.metadata),
         observed={
-            signal: float(np.mean(~np.isnan(trajectory[signal])))
-            if trajectory[signal].size
-            else 1.0
-            for signal in SIGNALS
+            signal: float(np.mean(~np.isnan(values))) if values.size else 1.0
+            for signal, values in signals.items()
         },
-        driver=log.trial.plan.controller.summary,
         source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
         digest=file_digest(path),
     )

@@ -14,7 +14,7 @@ from selfmodel.files import read_file
 from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.logs.reader import read_log
-from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, result_bytes
+from selfmodel.logs.results import MAX_BYTES, parse_json, read_result, result_bytes
 from selfmodel.recovery.result import Database
 from selfmodel.robot.anatomy import Anatomy
 
@@ -111,7 +111,7 @@ def is_calibrated(folder: Path) -> bool:
     if not path.exists():
         return True
     what, remedy = "the options of a run", "move it away, and the run counts as calibrated"
-    calibrated = read_result(path, what, remedy).content.get("calibrated")
+    calibrated = read_result(path, what, remedy).get("calibrated")
     if not isinstance(calibrated, bool):
         raise InputError(f"{path}: expected {what}, true or false as calibrated; {remedy}")
     return calibrated

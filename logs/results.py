@@ -1,11 +1,20 @@
-"""Results as files: what ``recover`` and ``diagnose`` write and reports read, by the same classes.
+"""Result files: what ``recover`` and ``diagnose`` write and reports read, by the same classes.
 
-The fields are the keys of the JSON, which is a published format. A file may have more keys, such as
-those of another version.
+The fields are the keys of the JSON, which is a published format; a file may have more keys, such as
+those of another version. Besides its content, a result file has the keys ``made_with``, the
+versions of selfmodel, MuJoCo and numpy, and ``sha256``, the SHA-256 of all its other values in a
+canonical form. The digest detects damage and changes by hand; it is no signature. Files of version
+0.1 have neither key.
 """
 
-from collections.abc import Sequence
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path, PurePath
 from typing import Annotated, Any, TypeVar
 
@@ -16,14 +25,15 @@ from selfmodel.diagnosis.diagnosis import renamed
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.files import replace_file
-from selfmodel.logs.result_files import MAX_BYTES, parse_json, read_result, verified
 from selfmodel.settings import Settings
 
-RESULT = "result.json"
-"""File of the result of a recovery, in the folder of its run."""
+MAX_BYTES = 16 * 2**20
+"""Largest JSON file that is written and read, bytes."""
 
-SEARCHES = "searches.json"
-"""File of the progress of all searches of a recovery, likewise."""
+MADE_WITH, DIGEST = "made_with", "sha256"
+
+RESULT, SEARCHES = "result.json", "searches.json"
+"""Files in the folder of a recovery: its result, and the progress of all its searches."""
 
 Read = TypeVar("Read")
 
@@ -47,7 +57,7 @@ class Search(Struct, frozen=True):
 
 
 class TrialResult(Struct, frozen=True):
-    """Result of a trial of a recovery.
+    """Result of a trial of a recovery; what is unknown is None.
 
     Attributes:
         log: Path of its log.
@@ -55,9 +65,9 @@ class TrialResult(Struct, frozen=True):
         displacement: Forward displacement, m.
         steps: Number of control steps.
         ended_early: Whether the trial was stopped.
-        score: Score of the trial; None if unknown.
-        predicted_score: Score that was predicted before the trial; None if none was.
-        fell_at_step: Step at which the robot fell; None if it did not.
+        score: Score of the trial.
+        predicted_score: Score that was predicted before the trial.
+        fell_at_step: Step at which the robot fell.
         hypothesis: Best hypothesis at the time, in notation.
     """
 
@@ -78,15 +88,7 @@ class TrialResult(Struct, frozen=True):
 
 
 class ScoreResult(Struct, frozen=True):
-    """The score of a recovery.
-
-    Attributes:
-        name: Name of the score.
-        unit: Unit; "" without one.
-        before: Score before the failure; None if it is no number.
-        after: Score of the same controller after the failure.
-        recovered: Largest score of the trials since.
-    """
+    """The score of a recovery before and after the failure, with the same controller, and since."""
 
     name: str
     unit: str
@@ -102,13 +104,9 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     to ``detectable``; ``Calibration.to_dict`` that of ``calibration``.
 
     Attributes:
-        robot: Name of the robot.
         model: Digest of the self-model, ``self_model_digest``.
-        comparator: Name of the comparator.
-        comparator_reason: Reason for its choice.
+        comparator: Name of the comparator, for ``comparator_reason``.
         kinds: Names of the fault kinds that were searched.
-        seed: Seed of all random numbers.
-        calibration: The calibration; None without one.
         files: SHA-256 of each log, by its path.
         logs: Paths of the logs that a diagnosis of logs explains, in order.
         intact: Paths of its logs of the healthy robot.
@@ -144,16 +142,14 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     @property
     def explained(self) -> tuple[str, ...]:
         """Paths of the logs that the diagnosis explains, in order."""
-        return (self.logs or ()) + tuple(
-            trial.log for trial in self.trials or () if trial.stage != "before"
-        )
+        after = (trial.log for trial in self.trials or () if trial.stage != "before")
+        return (*(self.logs or ()), *after)
 
     @property
     def healthy(self) -> tuple[str, ...]:
         """Paths of the logs of the healthy robot."""
-        return (self.intact or ()) + tuple(
-            trial.log for trial in self.trials or () if trial.stage == "before"
-        )
+        before = (trial.log for trial in self.trials or () if trial.stage == "before")
+        return (*(self.intact or ()), *before)
 
 
 class LogsResult(DiagnosisResult, frozen=True, kw_only=True):
@@ -181,17 +177,12 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         truth: True faults, in notation.
         gap: Level of the reality gap.
         correct: Whether the last diagnosis is right.
-        score: The score.
         fell: Whether the robot fell in its best trial.
         physical_trials: Number of trials since the failure.
         case: Number of the failure in Table I; None for a failure that is not in it.
         structure: False; a key of version 0.1.
-        next_trial: Choice of each trial after the failing one.
-        repair: Name of the repair.
-        search: Name of its search.
         repertoire: Origin of the repertoire; None without one.
-        controller: Name of the controller design.
-        neurons: Number of hidden neurons.
+        controller: Name of the controller design, which has ``neurons`` hidden neurons.
         displacement: Forward displacement before and after the failure, and recovered, m.
         recovery: Recovered displacement as a share of that before; None if that is not positive.
         evaluations: Number of evaluations, by the EA, and of simulations.
@@ -219,15 +210,14 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
 
     def as_file(self, settings: Settings, files: dict[str, str]) -> dict[str, Any]:
         """Returns the content of ``result.json``, with settings and digests of the logs."""
-        whole = msgspec.structs.replace(self, settings=asdict(settings), files=files)
-        return as_json(whole)
+        return as_json(msgspec.structs.replace(self, settings=asdict(settings), files=files))
 
 
 class CalibrationResult(Struct, frozen=True):
     """The part of a calibration's JSON of which a self-model is made, ``Calibration.to_dict``.
 
-    With ``joints``, the fit of a robot with a fixed
-    base, the other values do not determine the self-model.
+    With ``joints``, the fit of a robot with a fixed base, the other values do not determine the
+    self-model.
     """
 
     root_mass: float
@@ -253,26 +243,97 @@ def as_json(result: Struct) -> dict[str, Any]:
     return found
 
 
-def converted(path: Path, values: object, kind: type[Read], what: str, remedy: str) -> Read:
-    """Returns JSON values as an object of a class.
+# ---------------------------------------------------------------- reading and writing
+
+
+def result_bytes(content: Mapping[str, Any]) -> bytes:
+    """Returns the bytes of a result file, with the installed versions and the digest."""
+    # The digest is that of the values as a reader parses them: JSON's keys are texts.
+    given = {**content, MADE_WITH: versions()}
+    values = parse_json(json.dumps(given, allow_nan=False).encode())
+    data = json.dumps({**values, DIGEST: _digest(values)}, indent=1, allow_nan=False).encode()
+    if len(data) > MAX_BYTES:
+        raise ValueError(f"expected a result of at most {MAX_BYTES} bytes as JSON, got {len(data)}")
+    return data
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Returns the installed version of each package that determines the bits of a result."""
+    return {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
+
+
+def read_result(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
+    """Returns the content of a result file, without versions and digest, which is checked.
 
     Args:
-        path: Their file, for the error.
-        values: The values.
-        kind: The class.
-        what: Expected content, for the error.
-        remedy: Remedy, for the error.
+        path: The file.
+        what: Expected content for the error message, such as "the definition of a run".
+        remedy: Remedy for the error message.
+
+    Raises:
+        InputError: The file cannot be read, is too large, no valid JSON, or has a wrong digest.
     """
-    try:
-        return msgspec.convert(values, kind)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
+    with _explained(path, what, remedy):
+        return verified(parse_json(read_file(path, what, MAX_BYTES)))
 
 
 def read_as(path: Path, kind: type[Read], what: str, remedy: str) -> Read:
-    """Returns the content of a result file, whose digest is checked; see ``converted``."""
-    content = renamed(read_result(path, what, remedy).content)
-    return converted(path, content, kind, what, remedy)
+    """Returns the content of a result file as an object of a class; see ``read_result``."""
+    return converted(path, renamed(read_result(path, what, remedy)), kind, what, remedy)
+
+
+def converted(path: Path, values: object, kind: type[Read], what: str, remedy: str) -> Read:
+    """Returns JSON values of a file as an object of a class; see ``read_result``."""
+    with _explained(path, what, remedy):
+        return msgspec.convert(values, kind)
+
+
+@contextmanager
+def _explained(path: Path, what: str, remedy: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{error}; {remedy}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
+
+
+def parse_json(data: bytes) -> Any:  # noqa: ANN401  # JSON
+    """Returns the values of a JSON document in UTF-8, with finite numbers and bounded nesting."""
+    try:
+        return json.loads(data.decode(), parse_float=_finite, parse_constant=_finite)
+    except RecursionError:
+        raise ValueError("its values are nested too deeply") from None
+
+
+def verified(values: Any) -> Mapping[str, Any]:  # noqa: ANN401  # JSON
+    """Returns the content of a parsed result file, after its digest was checked."""
+    if not isinstance(values, dict):
+        raise ValueError("it is no JSON object")  # noqa: TRY004  # one error for all damage
+    if not values.keys() & {MADE_WITH, DIGEST}:
+        return values
+    content = {key: value for key, value in values.items() if key != DIGEST}
+    if values.get(DIGEST) != _digest(content):
+        raise ValueError("its digest is missing or wrong, so it was altered or damaged")
+    if not isinstance(content.pop(MADE_WITH, None), dict):
+        raise ValueError("it lacks the versions that made it")  # noqa: TRY004  # as above
+    return content
+
+
+def _digest(values: Mapping[str, Any]) -> str:
+    try:
+        text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    except RecursionError:
+        raise ValueError("its values are nested too deeply") from None
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"it contains the number {text[:40]}, which is not finite")
+    return number
 
 
 def write_searches(folder: Path, searches: Sequence[Search]) -> None:
@@ -287,12 +348,9 @@ def read_searches(folder: Path) -> tuple[Search, ...]:
     if not path.exists():
         return ()
     what = "the progress of the searches of a run"
-    remedy = "move it away, and the report is made without it"
-    try:
+    with _explained(path, what, "move it away, and the report is made without it"):
         values = parse_json(read_file(path, what, MAX_BYTES))
-    except ValueError as error:
-        raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
-    return converted(path, values, tuple[Search, ...], what, remedy)
+        return msgspec.convert(values, tuple[Search, ...])
 
 
 def best_hypothesis(path: Path) -> str:
@@ -306,15 +364,11 @@ def best_hypothesis(path: Path) -> str:
         "a diagnosis: the result.json or diagnoses.json of a recovery, or the output of selfmodel "
         "diagnose --json"
     )
-    remedy = "name the hypothesis by --hypothesis"
-    try:
+    with _explained(path, what, "name the hypothesis by --hypothesis"):
         values = parse_json(read_file(path, what, MAX_BYTES))
-        found = values if isinstance(values, list) else verified(values).content
-    except ValueError as error:
-        raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
-    if isinstance(found, list):
-        return converted(path, found, _Journal, what, remedy)[-1].ranked[0].hypothesis
-    return converted(path, found, _Printed, what, remedy).diagnosis[0].hypothesis
+        if isinstance(values, list):
+            return msgspec.convert(values, _Journal)[-1].ranked[0].hypothesis
+        return msgspec.convert(verified(values), _Printed).diagnosis[0].hypothesis
 
 
 class _Candidate(Struct):

@@ -19,11 +19,13 @@ def robot_of(log: TrialLog) -> Robot:
     before this process compiles it.
 
     Raises:
-        LogError: The model is invalid, names other files, or is of another
-            robot than the messages.
+        LogError: The model is invalid, names other files, or is of another robot than the messages.
         WorkError: The child process ended for a reason other than the model.
     """
-    path = log.trial.path
+
+    def mismatch(what: str) -> SchemaMismatchError:
+        return SchemaMismatchError(log.trial.path, what, good=GOOD)
+
     try:
         checked = checked_model(log.mjcf, log.assets)
         check_compiles(checked.mjcf, checked.files, log.control_timestep)
@@ -32,24 +34,19 @@ def robot_of(log: TrialLog) -> Robot:
     except WorkError:  # a failure of this computer says nothing about the log
         raise
     except MUJOCO_ERRORS as error:
-        raise SchemaMismatchError(
-            path, f"its model cannot be loaded: {_line(error)}", good=GOOD
-        ) from error
+        reason = " ".join(str(error).split())
+        raise mismatch(f"its model cannot be loaded: {reason}") from error
     if robot.substeps > MAX_SUBSTEPS:
-        raise SchemaMismatchError(
-            path,
+        raise mismatch(
             f"its model takes {robot.substeps:.6g} physics steps for each of "
-            f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}",
-            good=GOOD,
+            f"{log.control_timestep} s, expected at most {MAX_SUBSTEPS}"
         )
     names = log.trial.trajectory.names
     if (robot.anatomy.names, robot.root) != (names, log.root):
-        what = describe_difference(robot.anatomy.names, names)
-        raise SchemaMismatchError(
-            path,
-            f"its model is of another robot than its messages: {what}; the base is {robot.root!r} "
-            f"in the model and {log.root!r} in the messages",
-            good=GOOD,
+        difference = describe_difference(robot.anatomy.names, names)
+        raise mismatch(
+            f"its model is of another robot than its messages: {difference}; the base is "
+            f"{robot.root!r} in the model and {log.root!r} in the messages"
         )
     return robot
 
@@ -80,11 +77,8 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
     first = logs[0]
     for other in logs[1:]:
         if _identity(other) != _identity(first):
-            what = (
-                "of different robots"
-                if other.trial.robot != first.trial.robot
-                else "of different models of the same name"
-            )
+            same = other.trial.robot == first.trial.robot
+            what = "of different models of the same name" if same else "of different robots"
             raise InputError(
                 f"the logs are {what}: {first.trial.path} is of {first.trial.robot!r}, "
                 f"{other.trial.path} of {other.trial.robot!r}; give logs of one robot"
@@ -93,14 +87,6 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:
-    return (
-        log.trial.robot,
-        log.mjcf,
-        dict(log.assets),
-        log.control_timestep,
-        log.trial.trajectory.names,
-    )
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())
+    trial = log.trial
+    names = trial.trajectory.names
+    return trial.robot, log.mjcf, dict(log.assets), log.control_timestep, names

@@ -24,7 +24,7 @@ from selfmodel.logs.inspection import read_info
 from selfmodel.logs.recordings.bags import read_in_child as read_bag
 from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.logs.recordings.tables import read_in_child as read_table
-from selfmodel.logs.result_files import read_result, result_bytes
+from selfmodel.logs.results import read_result, result_bytes
 from selfmodel.logs.salvage import salvageable_steps
 from selfmodel.robot.mjcf.settings import read_settings
 from selfmodel.robot.mjcf.untrusted import checked_model

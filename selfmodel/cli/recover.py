@@ -22,13 +22,13 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
 from selfmodel.logs.files import replace_file
-from selfmodel.logs.result_files import result_bytes
 from selfmodel.logs.results import (
     RESULT,
     RecoveryResult,
     ScoreResult,
     TrialResult,
     as_json as values_of,
+    result_bytes,
     write_searches,
 )
 from selfmodel.recovery.repertoire import self_model_digest

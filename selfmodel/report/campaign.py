@@ -18,7 +18,7 @@ from typing import Any
 
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, encodable, read_file
-from selfmodel.logs.result_files import parse_json
+from selfmodel.logs.results import parse_json
 from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Report, Section, Table
 from selfmodel.studies.statistics import proportion
 

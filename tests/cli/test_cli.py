@@ -16,7 +16,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import FolderJournal
-from selfmodel.logs.result_files import read_result, versions
+from selfmodel.logs.results import read_result, versions
 from selfmodel.robot.robot import Robot
 from tests.cli.conftest import SHORT
 from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
@@ -90,14 +90,15 @@ def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(
     folder, told = short
     found = read_result(folder / "run" / "result.json", "a result", "")
 
-    assert {key: found.content[key] for key in told} == told
-    assert found.content.keys() - told.keys() == {"settings", "files"}
-    assert found.made_with == versions()
-    assert found.content["files"] == {
+    assert {key: found[key] for key in told} == told
+    assert found.keys() - told.keys() == {"settings", "files"}
+    written = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
+    assert written["made_with"] == versions()
+    assert found["files"] == {
         f"trials/{Path(trial['log']).name}": file_digest(folder / trial["log"])
         for trial in told["trials"]
     }
-    assert found.content["settings"]["population"] == 8
+    assert found["settings"]["population"] == 8
 
 
 @pytest.mark.process

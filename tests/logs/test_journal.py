@@ -16,7 +16,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import CorruptError, SchemaMismatchError, read_truth
 from selfmodel.logs.journal import OPTIONS, FolderJournal, create_journal, is_calibrated
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.logs.result_files import result_bytes
+from selfmodel.logs.results import result_bytes
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trajectory import Sample

@@ -13,8 +13,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
 from selfmodel.files import file_digest
 from selfmodel.logs.journal import OPTIONS
-from selfmodel.logs.result_files import result_bytes
-from selfmodel.logs.results import as_json
+from selfmodel.logs.results import as_json, result_bytes
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.report.subject import DiagnosisFile, Subject, is_run, subject_of_logs, subject_of_run
 
