@@ -11,7 +11,7 @@ from selfmodel import plugins
 from selfmodel.comparators import PREFERENCE
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
-from selfmodel.diagnosis.choice import ComparatorChoice, best_comparator, given_comparator
+from selfmodel.diagnosis.choice import ComparatorChoice, chosen_comparator
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError
 from selfmodel.faults import KINDS, FaultKind
@@ -125,9 +125,9 @@ def comparator_choice(source: Comparator | str) -> ComparatorChoice:
         InputError: The name is unknown, or its object is no comparator.
     """
     if source == AUTO:
-        return partial(best_comparator, PREFERENCE)
+        return partial(chosen_comparator, PREFERENCE)
     given = plugins.comparator(source) if isinstance(source, str) else source
-    return partial(given_comparator, given, PREFERENCE)
+    return partial(chosen_comparator, PREFERENCE, given=given)
 
 
 def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:

@@ -75,57 +75,41 @@ ComparatorChoice = Callable[[Robot, Sequence[Trial]], ChosenComparator]
 """Returns a comparator that accepts all trials of a robot, or raises ``InputError``."""
 
 
-def best_comparator(
-    preference: Sequence[Comparator], robot: Robot, trials: Sequence[Trial]
+def chosen_comparator(
+    preference: Sequence[Comparator],
+    robot: Robot,
+    trials: Sequence[Trial],
+    *,
+    given: Comparator | None = None,
 ) -> ChosenComparator:
-    """Returns the first comparator that accepts all trials.
+    """Returns the given comparator, or the first of the preference that accepts all trials.
 
     Args:
         preference: At least one comparator, best first; the last needs the fewest signals.
         robot: The self-model.
         trials: Logged trials of the robot.
-
-    Raises:
-        InputError: No comparator accepts all trials; the message has the reasons of the last one
-            for each trial. Or a compared number is absurdly large.
-    """
-    reasons: list[str] = []
-    for comparator in preference:
-        refused = _refusals(comparator, robot, trials)
-        if not refused:
-            return ChosenComparator(comparator, "; ".join(reasons) or "the logs have all signals")
-        reasons += refused
-    raise InputError(
-        f"no comparator of selfmodel can judge these trials: {'; '.join(refused)}: leave these "
-        f"trials out"
-    )
-
-
-def given_comparator(
-    comparator: Comparator,
-    preference: Sequence[Comparator],
-    robot: Robot,
-    trials: Sequence[Trial],
-) -> ChosenComparator:
-    """Returns a comparator that the caller gave, if it accepts all trials.
-
-    Args:
-        comparator: The comparator.
-        preference: Comparators to name in the error, best first.
-        robot: The self-model.
-        trials: Logged trials of the robot.
+        given: The choice of the caller.
 
     Raises:
         InputError: The comparator does not accept all trials; the message has the reason for each
-            trial, and the first comparator of the preference that accepts all of them. Or the
+            trial, and the first comparator of the preference that accepts all of them. Or a
             comparator breaks its contract, or a compared number is absurdly large.
     """
-    refused = _refusals(comparator, robot, trials)
-    if not refused:
-        return ChosenComparator(comparator, "given")
+    reasons: list[str] = []
+    for comparator in preference if given is None else (given,):
+        refused = _refusals(comparator, robot, trials)
+        if not refused:
+            reason = "; ".join(reasons) or "the logs have all signals"
+            return ChosenComparator(comparator, reason if given is None else "given")
+        reasons += refused
+    problems = "; ".join(refused)
+    if given is None:
+        raise InputError(
+            f"no comparator of selfmodel can judge these trials: {problems}: leave these trials out"
+        )
     able = [other for other in preference if not _refusals(other, robot, trials)]
     remedy = f"give the comparator {able[0].name}, which can judge all trials, or " if able else ""
-    raise InputError(f"{'; '.join(refused)}: {remedy}leave these trials out")
+    raise InputError(f"{problems}: {remedy}leave these trials out")
 
 
 def _refusals(comparator: Comparator, robot: Robot, trials: Sequence[Trial]) -> list[str]:

@@ -9,26 +9,19 @@ differences of two hypotheses' losses, over all times afterwards.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Change, Diagnosis
 from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction, LossTable, Problem, Timeline
 from selfmodel.diagnosis.search import LocalSearch, evolved
-from selfmodel.diagnosis.significance import (
-    CHANGE_TOLERANCE,
-    MIN_PIECES,
-    MIN_Z,
-    MIN_Z_OF_CHANGE,
-    excess_over_healthy,
-    is_better,
-    paired_z,
-)
 from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -91,31 +84,23 @@ class DiagnosticSearch:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> Diagnosis:
-        """Returns the diagnosis of some trials.
+        """Returns the diagnosis of at least one trial.
 
-        Args:
-            trials: At least one trial.
-            seeds: Hypotheses of the initial population, in addition to random ones.
-            rng: Source of all random numbers.
-            on_generation: Callback, called after each generation.
+        ``seeds`` are hypotheses of the initial population, in addition to random ones.
         """
+        table, coarse_trials = surrogate = self.losses.surrogate(trials)
         problem = Problem(
             self.losses,
             self._space,
             trials,
-            surrogate=self.losses.surrogate(trials),
+            surrogate=surrogate,
             healthy_trials=self._healthy_trials,
             names=trial_names(trials),
             settings=self._settings,
         )
-        table, coarse_trials = problem.surrogate
+        distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
-            partial(table.distances, trials=coarse_trials),
-            self._space,
-            self._settings,
-            seeds,
-            rng,
-            on_generation=on_generation,
+            distances, self._space, self._settings, seeds, rng, on_generation=on_generation
         )
         self.evaluations += evaluations
         self._proposed.update(ranked)
@@ -167,12 +152,8 @@ class DiagnosticSearch:
         timeline = self.losses.timeline(trials)
         if timeline is None:
             return None
-        dated = partial(
-            change_at,
-            losses=problem.losses,
-            timeline=timeline,
-            names=[problem.names[trial.path] for trial in trials],
-        )
+        names = [problem.names[trial.path] for trial in trials]
+        dated = partial(change_at, losses=problem.losses, timeline=timeline, names=names)
         space = problem.space
         before = dict.fromkeys([INTACT, best, *space.with_one_less(best)])
         after = dict.fromkeys([best, *starts, *space.with_one_more(INTACT)])
@@ -183,8 +164,9 @@ class DiagnosticSearch:
         if problem.within(change.since) is None:
             return None
         change = self._with_refined_before(change, starts, problem)
-        healthy = change.until(trials) if change.before == INTACT else []
-        later = problem.within(change.since, healthy)
+        later = problem.within(
+            change.since, change.until(trials) if change.before == INTACT else ()
+        )
         if later is None:
             return None
         refined, compared = self._refined([change.after, *starts], later)
@@ -209,21 +191,17 @@ class DiagnosticSearch:
             return change
         if change.before == INTACT:
             healthy, (losses,) = earlier.reference, earlier.losses([INTACT])
-            if healthy is None or excess_over_healthy(losses, healthy) < MIN_Z:
+            if (
+                healthy is None
+                or significance.excess_over_healthy(losses, healthy) < significance.MIN_Z
+            ):
                 return change
         before, _ = self._refined([change.before, *starts], earlier)
         return replace(change, before=before)
 
 
-@dataclass(frozen=True)
-class Split:
-    """A change between two pieces of a timeline.
-
-    Attributes:
-        before: Hypothesis about the pieces before the change.
-        after: Hypothesis about the pieces from the change on.
-        piece: Index of the first piece after the change.
-    """
+class Split(NamedTuple):
+    """A change of a timeline: the hypotheses before and after it, and the first piece after it."""
 
     before: Hypothesis
     after: Hypothesis
@@ -238,19 +216,13 @@ def best_split(
 ) -> Split | None:
     """Returns the change between two hypotheses with the smallest total loss.
 
-    Args:
-        before: Hypotheses about the time before the change.
-        after: Hypotheses about the time after it.
-        coarse: Losses of the surrogate comparator, ``(n, pieces)``, which select the hypotheses.
-        losses: Losses of the comparator itself, which decide.
-
-    Returns:
-        None if the timeline is too short, or if every simulation diverged.
+    The losses of the surrogate comparator, ``coarse``, select the hypotheses; those of the
+    comparator itself decide. None if the timeline is too short, or if every simulation diverged.
     """
     pieces, few = (each(before[:1]).shape[1] for each in (losses, coarse))
-    least = max(2, round(MIN_PIECES * few / pieces))
+    least = max(2, round(significance.MIN_PIECES * few / pieces))
     ranked = dict.fromkeys(split.after for split in _splits(before, after, coarse, least))
-    splits = _splits(before, list(ranked)[:SHORTLIST], losses, MIN_PIECES)
+    splits = _splits(before, list(ranked)[:SHORTLIST], losses, significance.MIN_PIECES)
     return splits[0] if splits else None
 
 
@@ -259,21 +231,17 @@ def is_change(split: Split, single: Hypothesis, losses: LossFunction) -> bool:
 
     Three conditions hold: before the change, the first hypothesis is significantly better than the
     second; after it, the second is better than the first by ``MIN_Z_OF_CHANGE`` standard errors;
-    and with the change, all pieces together are predicted significantly better than without.
-
-    Args:
-        split: The change.
-        single: The best hypothesis without a change.
-        losses: Losses on the timeline, ``(n, pieces)``.
+    and with the change, all pieces together are predicted significantly better than by ``single``,
+    the best hypothesis without a change.
     """
     before, after, alone = losses([split.before, split.after, single])
     k = split.piece
     changed = np.concatenate([before[:k], after[k:]])
     return (
-        is_better(before[:k], after[:k])
-        and is_better(after[k:], before[k:])
-        and paired_z(before[k:], after[k:]) >= MIN_Z_OF_CHANGE
-        and is_better(changed, alone)
+        significance.is_better(before[:k], after[:k])
+        and significance.is_better(after[k:], before[k:])
+        and significance.paired_z(before[k:], after[k:]) >= significance.MIN_Z_OF_CHANGE
+        and significance.is_better(changed, alone)
     )
 
 
@@ -284,18 +252,14 @@ def change_at(
 
     The bounds are those of the pieces between which the change costs at most ``CHANGE_TOLERANCE``
     mean differences of a piece more than at the best place.
-
-    Args:
-        split: The change.
-        losses: Losses on the timeline, ``(n, pieces)``.
-        timeline: Times of the pieces.
-        names: Names of the trials.
     """
     before, after = losses([split.before, split.after])
     k = split.piece
     totals = _totals(before, after)
     typical = min((after - before)[:k].mean(), (before - after)[k:].mean())
-    possible = _run_around(totals <= totals[k] + CHANGE_TOLERANCE * max(float(typical), 0.0), k)
+    possible = _run_around(
+        totals <= totals[k] + significance.CHANGE_TOLERANCE * max(float(typical), 0.0), k
+    )
     index = int(timeline.trial[k])
     inside = np.flatnonzero(timeline.trial == index)
     first, last = np.clip(possible, inside[0], inside[-1]).tolist()

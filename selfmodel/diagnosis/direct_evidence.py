@@ -82,21 +82,17 @@ def direct_evidence(
 ) -> tuple[DirectEvidence, ...]:
     """Returns the evidence of each trial that needs no simulation.
 
-    Args:
-        trials: Trials of the robot; unknown values (NaN) are no evidence.
-        anatomy: The robot's parts.
-        names: Names of the trials, by path; see ``trial_names``.
+    Unknown values (NaN) are no evidence. The names of the trials are by path; see ``trial_names``.
     """
     return tuple(_evidence_of(trial, anatomy, names[trial.path]) for trial in trials)
 
 
-def _evidence_of(trial: Trial, anatomy: Anatomy, name: str) -> DirectEvidence:
-    trajectory = trial.trajectory
-    commands = _known(trajectory.names.motors, trajectory["commands"])
+def _evidence_of(trial: Trial, anatomy: Anatomy, trial_name: str) -> DirectEvidence:
+    trajectory, names = trial.trajectory, trial.trajectory.names
+    commands = _known(names.motors, trajectory["commands"])
     ranges = {motor: float(np.ptp(each)) if len(each) else 0.0 for motor, each in commands.items()}
-    readings = _known(trajectory.names.sensors, trajectory["sensors"])
-    angles = _known(trajectory.names.hinges, trajectory["joint_positions"])
     positions = trajectory["joint_positions"]
+    angles = _known(names.hinges, positions)
     noise = encoder_noise(np.where(np.isfinite(positions), positions, np.nan))
     tolerances = dict(zip(angles, np.hypot(PLAY, NOISE_RATIO * noise), strict=True))
     joints: list[JointEvidence] = []
@@ -112,10 +108,10 @@ def _evidence_of(trial: Trial, anatomy: Anatomy, name: str) -> DirectEvidence:
             without_effect += [motor for motor in joint.motors if ranges[motor] >= MIN_COMMANDED]
     constant = [
         ConstantSensor(sensor, float(known[0]))
-        for sensor, known in readings.items()
+        for sensor, known in _known(names.sensors, trajectory["sensors"]).items()
         if len(known) >= MIN_KNOWN and np.ptp(known) == 0
     ]
-    return DirectEvidence(name, tuple(joints), tuple(constant), tuple(without_effect))
+    return DirectEvidence(trial_name, tuple(joints), tuple(constant), tuple(without_effect))
 
 
 def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:

@@ -23,19 +23,9 @@ from functools import partial
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.losses import Problem
 from selfmodel.diagnosis.search import LocalSearch, with_fitted_severity
-from selfmodel.diagnosis.significance import (
-    MAX_LEFT_OF_JOINT,
-    MIN_EXCESS_OF_JOINT,
-    MIN_PIECES,
-    MIN_Z_OF_JOINT,
-    excess_over_healthy,
-    gain_exceeds_healthy_gain,
-    is_better,
-    joint_is_better,
-    known,
-)
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import Fault
 
@@ -76,10 +66,10 @@ def excesses(hypothesis: Hypothesis, problem: Problem) -> dict[str, float]:
     """
     excess = {}
     for joint in problem.space.anatomy.joints:
-        (one,) = known(problem.of_joint(joint.name, [hypothesis]))
-        (other,) = known(problem.of_joint(joint.name, [INTACT], healthy=True))
-        if min(len(one), len(other)) >= MIN_PIECES:
-            excess[joint.name] = excess_over_healthy(one, other)
+        (one,) = significance.known(problem.of_joint(joint.name, [hypothesis]))
+        (other,) = significance.known(problem.of_joint(joint.name, [INTACT], healthy=True))
+        if min(len(one), len(other)) >= significance.MIN_PIECES:
+            excess[joint.name] = significance.excess_over_healthy(one, other)
     return dict(sorted(excess.items(), key=lambda item: -item[1]))
 
 
@@ -89,7 +79,7 @@ def predicts_joints_worse(other: Hypothesis, best: Hypothesis, problem: Problem)
     The joints at which exactly one of the two has a fault are compared.
     """
     return any(
-        joint_is_better(*problem.of_joint(joint, [best, other]))
+        significance.joint_is_better(*problem.of_joint(joint, [best, other]))
         for joint in _joints_of(set(best.faults) ^ set(other.faults), problem)
     )
 
@@ -117,7 +107,9 @@ class _JointSearch:
             return candidate
         is_enough = (
             len(candidate) < len(current)
-            and not joint_is_better(*self._problem.of_joint(joint, [current, candidate]))
+            and not significance.joint_is_better(
+                *self._problem.of_joint(joint, [current, candidate])
+            )
             and not self._harms(candidate, current)
         )
         return candidate if is_enough else current
@@ -127,7 +119,9 @@ class _JointSearch:
         faulty = _joints_of(current.faults, self._problem)
         excess = excesses(current, self._problem)
         suspects = [
-            name for name, z in excess.items() if z >= MIN_EXCESS_OF_JOINT and name not in faulty
+            name
+            for name, z in excess.items()
+            if z >= significance.MIN_EXCESS_OF_JOINT and name not in faulty
         ]
         for joint in suspects[:JOINTS_TRIED]:
             levels = self._best_levels(current, joint)
@@ -143,8 +137,8 @@ class _JointSearch:
         """The hypothesis without the faults that neither the trials nor their joints require."""
         for fewer in self._space.with_one_less(hypothesis):
             removed = set(hypothesis.faults) - set(fewer.faults)
-            if not is_better(*self._losses([hypothesis, fewer])) and not any(
-                joint_is_better(*self._problem.of_joint(joint, [hypothesis, fewer]))
+            if not significance.is_better(*self._losses([hypothesis, fewer])) and not any(
+                significance.joint_is_better(*self._problem.of_joint(joint, [hypothesis, fewer]))
                 for joint in _joints_of(removed, self._problem)
             ):
                 return self.pruned(fewer)
@@ -157,11 +151,11 @@ class _JointSearch:
         if not self._is_better_at(joint, candidate, current):
             return False
         alone = self._space.canonical(_faults_at(joint, candidate))
-        damaged = known(self._problem.of_joint(joint, [candidate, current]))
-        healthy = known(self._problem.of_joint(joint, [alone, INTACT], healthy=True))
+        damaged = significance.known(self._problem.of_joint(joint, [candidate, current]))
+        healthy = significance.known(self._problem.of_joint(joint, [alone, INTACT], healthy=True))
         left = excesses(candidate, self._problem).get(joint, np.inf)
-        is_cause = left < min(MIN_Z_OF_JOINT, MAX_LEFT_OF_JOINT * excess)
-        return is_cause and gain_exceeds_healthy_gain(*damaged, *healthy)
+        is_cause = left < min(significance.MIN_Z_OF_JOINT, significance.MAX_LEFT_OF_JOINT * excess)
+        return is_cause and significance.gain_exceeds_healthy_gain(*damaged, *healthy)
 
     def _best_levels(self, current: Hypothesis, joint: str) -> list[Hypothesis]:
         """The hypothesis with each kind of fault of a joint at its best level, best first.
@@ -203,13 +197,13 @@ class _JointSearch:
 
     def _is_better_at(self, joint: str, one: Hypothesis, other: Hypothesis) -> bool:
         """Returns whether one predicts the joint better, and the trials not worse."""
-        is_better_there = joint_is_better(*self._problem.of_joint(joint, [one, other]))
+        is_better_there = significance.joint_is_better(*self._problem.of_joint(joint, [one, other]))
         return is_better_there and not self._harms(one, other)
 
     def _harms(self, one: Hypothesis, other: Hypothesis) -> bool:
         """Returns whether one predicts the trials worse than another, or than the start."""
         after, before, start = self._losses([one, other, self._start])
-        return is_better(before, after) or is_better(start, after)
+        return significance.is_better(before, after) or significance.is_better(start, after)
 
 
 def _faults_at(joint: str, hypothesis: Hypothesis) -> list[Fault]:

@@ -1,8 +1,10 @@
 """Losses of hypotheses on logged trials, and the problem that a diagnosis solves with them."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,32 +52,12 @@ MAX_JAM_SPREAD = 0.05
 """Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 
-@dataclass(frozen=True, eq=False)
-class Timeline:
-    """Times of the pieces of some trials, in the order of the trials.
-
-    Attributes:
-        trial: Index of the trial of each piece, ``(pieces,)``.
-        begin: First time of each piece, s since the start of its trial, ``(pieces,)``.
-        end: Last time of each piece, likewise.
-    """
+class Timeline(NamedTuple):
+    """Index of the trial of each piece, and its first and last time, s, ``(pieces,)`` each."""
 
     trial: IndexArray
     begin: FloatArray
     end: FloatArray
-
-
-@dataclass(eq=False)
-class _Column:
-    """A prepared trial, and the losses of the hypotheses that were simulated."""
-
-    prepared: PreparedTrial | PiecewiseTrial
-    known: dict[Hypothesis, Losses] = field(default_factory=dict)
-
-    @property
-    def piece_steps(self) -> IndexArray | None:
-        steps: IndexArray | None = getattr(self.prepared, "piece_steps", None)
-        return steps
 
 
 class LossTable:
@@ -96,14 +78,15 @@ class LossTable:
     def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
         self._simulator = simulator
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
-        self._columns: dict[Hashable, _Column] = {}
+        self._prepared: dict[Hashable, PreparedTrial | PiecewiseTrial] = {}
+        self._known: dict[tuple[Hashable, Hypothesis], Losses] = {}
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
         problems = []
         for trial in trials:
             try:
-                self._column(trial)
+                self._of(trial)
             except InputError as error:
                 problems.append(str(error))
         if problems:
@@ -119,11 +102,11 @@ class LossTable:
 
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the distances are means of losses, so that paired tests are possible."""
-        return all(isinstance(self._column(trial).prepared, PiecewiseTrial) for trial in trials)
+        return all(isinstance(self._of(trial), PiecewiseTrial) for trial in trials)
 
     def uses_segments(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the comparator compares short predictions on all trials."""
-        return all(isinstance(self._column(trial).prepared.request, Segments) for trial in trials)
+        return all(isinstance(self._of(trial).request, Segments) for trial in trials)
 
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the sum over the trials of the mean loss of each hypothesis, ``(n,)``.
@@ -179,7 +162,7 @@ class LossTable:
         """Returns the times of the columns of ``losses``; None if the comparator has no times."""
         times = []
         for part in map(whole, trials):
-            steps = self._column(part.trial).piece_steps
+            steps = self._piece_steps(part.trial)
             if steps is None:
                 return None
             times.append(part.trial.trajectory.time[steps][self._pieces(part)])
@@ -221,15 +204,20 @@ class LossTable:
         opening = replace(trial, trajectory=trial.trajectory.first(steps))
         return opening if self.accepts([opening]) else trial
 
-    def _column(self, trial: Trial) -> _Column:
-        if trial.content not in self._columns:
+    def _of(self, trial: Trial) -> PreparedTrial | PiecewiseTrial:
+        """Returns the prepared trial."""
+        if trial.content not in self._prepared:
             prepared = prepared_trial(self._comparator, self._simulator.robot, trial)
-            self._columns[trial.content] = _Column(prepared)
-        return self._columns[trial.content]
+            self._prepared[trial.content] = prepared
+        return self._prepared[trial.content]
+
+    def _piece_steps(self, trial: Trial) -> IndexArray | None:
+        steps: IndexArray | None = getattr(self._of(trial), "piece_steps", None)
+        return steps
 
     def _pieces(self, part: TrialPart) -> BoolArray | slice:
         """Returns the pieces of a trial that lie within a part of it."""
-        steps = self._column(part.trial).piece_steps
+        steps = self._piece_steps(part.trial)
         if part.is_whole or steps is None:
             return slice(None)
         times = part.trial.trajectory.time[steps]
@@ -243,55 +231,38 @@ class LossTable:
             yield self._rows(hypotheses, part.trial), self._pieces(part)
 
     def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[Losses]:
-        column = self._column(trial)
-        missing = list(dict.fromkeys(one for one in hypotheses if one not in column.known))
-        request, simulator = column.prepared.request, self._simulator
-        size = largest_batch(simulator.robot, request, trial.trajectory.steps)
+        known, content = self._known, trial.content
+        missing = list(dict.fromkeys(one for one in hypotheses if (content, one) not in known))
+        steps = trial.trajectory.steps
+        size = largest_batch(self._simulator.robot, self._of(trial).request, steps)
         for first in range(0, len(missing), size):
             batch = missing[first : first + size]
-            result = simulate(simulator, request, trial, batch)
-            losses = self._losses_of(column, trial, batch, result)
-            column.known.update((one, losses[row]) for row, one in enumerate(batch))
-        return [column.known[one] for one in hypotheses]
+            losses = self._simulated(batch, trial)
+            known.update(((content, one), losses[row]) for row, one in enumerate(batch))
+        return [known[content, one] for one in hypotheses]
 
-    def _losses_of(
-        self,
-        column: _Column,
-        trial: Trial,
-        hypotheses: Sequence[Hypothesis],
-        result: SimulationResult,
-    ) -> Losses:
+    def _simulated(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> Losses:
         """Returns the checked losses of simulations; infinite where one diverged."""
+        prepared, piece_steps = self._of(trial), self._piece_steps(trial)
+        result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
-        handling = (
-            {} if not diverged.any() else dict.fromkeys(("over", "invalid", "divide"), "ignore")
-        )
-        with np.errstate(**handling):  # type: ignore[arg-type]  # of a literal type
-            losses = _compared(column.prepared, result.trajectory)
-        total, by_hinge = losses.total, losses.by_hinge
+        with np.errstate(all="ignore") if diverged.any() else nullcontext():
+            losses = _compared(prepared, result.trajectory)
+        total, by_hinge, problem = losses.total, losses.by_hinge, ""
+        hinges = (*total.shape, len(trial.trajectory.names.hinges))
         if total.ndim != 2 or len(total) != len(hypotheses) or not total.shape[1]:
-            raise contract_error(
-                self._comparator, f"returned losses {total.shape} for {len(hypotheses)} simulations"
-            )
-        wrong = total[~((total >= 0) | diverged)]
-        if len(wrong):
-            raise contract_error(
-                self._comparator,
-                f"returned a distance that is not a number of at least 0: {wrong[0]}",
-            )
-        expected = (*total.shape, len(trial.trajectory.names.hinges))
-        if by_hinge is not None and by_hinge.shape != expected:
-            raise contract_error(
-                self._comparator,
-                f"returned losses of hinges {by_hinge.shape} in place of {expected}",
-            )
-        if column.piece_steps is not None:
-            total = total + contradiction_losses(hypotheses, trial.trajectory, column.piece_steps)
-        return Losses(
-            np.where(diverged, np.inf, total),
-            losses.by_signal,
-            None if by_hinge is None else np.where(diverged[:, np.newaxis], np.inf, by_hinge),
-        )
+            problem = f"returned losses {total.shape} for {len(hypotheses)} simulations"
+        elif len(wrong := total[~((total >= 0) | diverged)]):
+            problem = f"returned a distance that is not a number of at least 0: {wrong[0]}"
+        elif by_hinge is not None and by_hinge.shape != hinges:
+            problem = f"returned losses of hinges {by_hinge.shape} in place of {hinges}"
+        if problem:
+            raise contract_error(self._comparator, problem)
+        if piece_steps is not None:
+            total = total + contradiction_losses(hypotheses, trial.trajectory, piece_steps)
+        if by_hinge is not None:
+            by_hinge = np.where(diverged[:, np.newaxis], np.inf, by_hinge)
+        return Losses(np.where(diverged, np.inf, total), losses.by_signal, by_hinge)
 
 
 def simulate(
@@ -378,9 +349,7 @@ class Problem:
     ) -> "Problem | None":
         """Returns the problem of a part of the trials; None if the surrogate has too few pieces.
 
-        Args:
-            cut: Returns the parts of some trials.
-            healthy_trials: Healthy reference, if there are no trials of the healthy robot.
+        ``healthy_trials`` are the reference if there are no trials of the healthy robot.
         """
         table, coarse = self.surrogate[0], cut([whole(one).trial for one in self.surrogate[1]])
         if table.losses([INTACT], coarse).shape[1] < MIN_SURROGATE_PIECES:
@@ -433,23 +402,18 @@ class Problem:
         """Returns the losses of the motion of a joint on the trials to explain, ``(n, pieces)``.
 
         A loss is the mean over the known hinges of the joint, and NaN where all are unknown, as for
-        a hypothesis that detaches the joint.
-
-        Args:
-            joint: Name of the joint.
-            hypotheses: The hypotheses.
-            healthy: Whether the losses are those on healthy trials; without any there are no
-                pieces.
+        a hypothesis that detaches the joint. Without healthy trials there are no pieces of them.
         """
         trials = self._observed_comparable if healthy else self.trials
         by_hinge = self.table.by_hinge(hypotheses, trials) if trials else None
         if by_hinge is None:
             return np.empty((len(hypotheses), 0))
         anatomy = self.space.anatomy
-        losses = by_hinge[:, :, [anatomy.hinges.index(one) for one in anatomy.joint(joint).hinges]]
-        is_known = ~np.isnan(losses)
-        count = is_known.sum(axis=2)
-        total = np.where(is_known, losses, 0.0).sum(axis=2)
+        columns = [anatomy.hinges.index(one) for one in anatomy.joint(joint).hinges]
+        losses = by_hinge[:, :, columns]
+        known = ~np.isnan(losses)
+        count = known.sum(axis=2)
+        total = np.where(known, losses, 0.0).sum(axis=2)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
     @cached_property

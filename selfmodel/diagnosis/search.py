@@ -35,14 +35,8 @@ from itertools import combinations
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
-from selfmodel.diagnosis.significance import (
-    MIN_Z_OF_STEP,
-    NEGLIGIBLE_LOSS,
-    gain_is_model_error,
-    is_better,
-    paired_z,
-)
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
@@ -156,7 +150,7 @@ class LocalSearch:
         refits = {self.pruned(fitted(optimum, losses=self.coarse)) for optimum in local_optima}
         chosen = INTACT
         for hypothesis in sorted(refits, key=lambda one: (len(one), self.total_loss(one), one)):
-            if is_better(*self.losses([hypothesis, chosen])):
+            if significance.is_better(*self.losses([hypothesis, chosen])):
                 chosen = hypothesis
         best = self.pruned(fitted(chosen, losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
@@ -238,7 +232,7 @@ class LocalSearch:
         if len(one) <= len(current):
             return self.total_loss(one) < self.total_loss(current)
         further, fewer = self.losses([one, current])
-        return is_better(further, fewer, MIN_Z_OF_STEP)
+        return significance.is_better(further, fewer, significance.MIN_Z_OF_STEP)
 
     def _shortlist(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best hypotheses by the surrogate, sorted by the total loss of the comparator."""
@@ -249,7 +243,7 @@ class LocalSearch:
 
     def _is_required(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
         """Returns whether the gain of the extra faults is significant and no model error."""
-        return is_better(*self.losses([hypothesis, fewer])) and not is_model_error(
+        return significance.is_better(*self.losses([hypothesis, fewer])) and not is_model_error(
             hypothesis, fewer, self.problem
         )
 
@@ -267,7 +261,7 @@ def is_model_error(hypothesis: Hypothesis, fewer: Hypothesis, problem: Problem) 
     # Most faults worsen the healthy trials; their losses on the damaged trials are not needed.
     if healthy is None or not healthy[0].mean() < healthy[1].mean():
         return False
-    return gain_is_model_error(*problem.losses([hypothesis, fewer]), *healthy)
+    return significance.gain_is_model_error(*problem.losses([hypothesis, fewer]), *healthy)
 
 
 def any_fault_is_model_error(hypothesis: Hypothesis, problem: Problem) -> bool:
@@ -346,7 +340,7 @@ def with_mean_severities(
     current = hypothesis
     for index in range(len(hypothesis)):
         mean = _averaged(current, index, losses, space)
-        if len(mean) == len(current) and not is_better(*losses([current, mean])):
+        if len(mean) == len(current) and not significance.is_better(*losses([current, mean])):
             current = mean
     return current
 
@@ -372,9 +366,11 @@ def _averaged(
 def _weights(rows: FloatArray) -> FloatArray:
     """Weights of ascending severities, ``(n,)``; 0 from the first ruled-out one on either side."""
     best = int(np.argmin(rows.sum(axis=1)))
-    z = np.array([paired_z(row, rows[best]) if np.isfinite(row).all() else 0.0 for row in rows])
-    worse = rows.mean(axis=1) > rows[best].mean() + NEGLIGIBLE_LOSS
-    out = np.array([is_better(rows[best], row) for row in rows]) | (worse & (z <= 0))
+    z = np.array(
+        [significance.paired_z(row, rows[best]) if np.isfinite(row).all() else 0.0 for row in rows]
+    )
+    worse = rows.mean(axis=1) > rows[best].mean() + significance.NEGLIGIBLE_LOSS
+    out = np.array([significance.is_better(rows[best], row) for row in rows]) | (worse & (z <= 0))
     low = max(np.flatnonzero(out[:best]), default=-1)
     high = best + min(np.flatnonzero(out[best:]), default=len(out))
     weights: FloatArray = np.exp(-np.square(z) / 2)

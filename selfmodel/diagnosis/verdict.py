@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     DetectableSeverity,
@@ -28,21 +28,6 @@ from selfmodel.diagnosis.search import (
     any_fault_is_model_error,
     by_distance,
     with_fitted_severity,
-)
-from selfmodel.diagnosis.significance import (
-    FAULTY_RATIO,
-    LOSS_FLOOR,
-    LOSS_RATIO,
-    MIN_Z_ACROSS_TRIALS,
-    MIN_Z_OF_JOINT,
-    MIN_Z_OF_ONE_GAIT,
-    MIN_Z_OF_OTHER_GAITS,
-    NEGLIGIBLE_LOSS,
-    TEST,
-    excess_over_healthy,
-    gain_exceeds_healthy_gain,
-    is_better,
-    paired_z,
 )
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -71,11 +56,8 @@ def verdict_of(
 ) -> Verdict:
     """Returns the verdict about the best hypothesis of a diagnosis.
 
-    Args:
-        best: The best hypothesis.
-        fit: Its loss, compared with that of healthy trials.
-        alike: Hypotheses that are indistinguishable from the best.
-        unsearched: The best hypothesis with a fault of an unsearched kind, if it is better.
+    ``alike`` are the hypotheses that are indistinguishable from the best, ``unsearched`` is the
+    best one with a fault of an unsearched kind, if that is better.
     """
     if unsearched is not None or is_too_high(fit) or fit.joints:
         return "unexplained"
@@ -92,9 +74,9 @@ def is_too_high(fit: Fit) -> bool:
     """
     if fit.healthy_loss is None or fit.excess is None:
         return False
-    if fit.loss > LOSS_RATIO * fit.healthy_loss + LOSS_FLOOR:
+    if fit.loss > significance.LOSS_RATIO * fit.healthy_loss + significance.LOSS_FLOOR:
         return True
-    is_much = fit.loss > FAULTY_RATIO * fit.healthy_loss + LOSS_FLOOR
+    is_much = fit.loss > significance.FAULTY_RATIO * fit.healthy_loss + significance.LOSS_FLOOR
     return fit.excess > fit.threshold and (is_much or not fit.has_faults)
 
 
@@ -137,7 +119,7 @@ def diagnosis_of(
         intact_distance=totals[INTACT],
         indistinguishable=tuple(alike[:kept]),
         verdict=verdict,
-        test=TEST if problem.has_test else EQUAL_DISTANCES,
+        test=significance.TEST if problem.has_test else EQUAL_DISTANCES,
         unsearched=unsearched,
         undetectable=tuple(undetectable(best, problem)[:kept]) if problem.has_test else (),
         detectable=tuple(severities),
@@ -147,10 +129,7 @@ def diagnosis_of(
 
 
 def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
-    """Returns the diagnosis of trials on which the simulation of every hypothesis diverged.
-
-    The verdict is ``unexplained``: the trials do not support any of the hypotheses.
-    """
+    """Returns the diagnosis of trials on which the simulation of every hypothesis diverged."""
     logs = ", ".join(part.trial.path for part in problem.trials)
     kept = best_severities(ranked)[: problem.settings.kept]
     return Diagnosis(
@@ -177,25 +156,25 @@ def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
     rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))
     is_one_gait = have_one_gait(*rows)
     joints = excesses(INTACT, problem) if is_one_gait and not best else {}
-    reference = problem.reference
+    loss, intact_loss = float(losses.mean()), float(intact.mean())
+    healthy_loss = excess = left = None
+    if (reference := problem.reference) is not None:
+        healthy_loss = float(reference.mean())
+        excess = significance.excess_over_healthy(losses, reference)
+        if (beyond := intact_loss - healthy_loss) > 0:
+            left = min(max((loss - healthy_loss) / beyond, 0.0), 1.0)
     return Fit(
-        loss=float(losses.mean()),
-        intact_loss=float(intact.mean()),
-        healthy_loss=None if reference is None else float(reference.mean()),
-        excess=None if reference is None else excess_over_healthy(losses, reference),
-        threshold=MIN_Z_OF_ONE_GAIT if is_one_gait else MIN_Z_OF_OTHER_GAITS,
+        loss,
+        intact_loss,
+        healthy_loss,
+        excess,
+        threshold=significance.MIN_Z_OF_ONE_GAIT
+        if is_one_gait
+        else significance.MIN_Z_OF_OTHER_GAITS,
         has_faults=bool(best),
-        left=None if reference is None else _share_left(losses, intact, reference),
-        joints={joint: z for joint, z in joints.items() if z >= MIN_Z_OF_JOINT},
+        left=left,
+        joints={joint: z for joint, z in joints.items() if z >= significance.MIN_Z_OF_JOINT},
     )
-
-
-def _share_left(losses: FloatArray, intact: FloatArray, healthy: FloatArray) -> float | None:
-    """Returns the share of the empty hypothesis's loss beyond the reference that is left."""
-    beyond = float(intact.mean()) - float(healthy.mean())
-    if not beyond > 0:
-        return None
-    return min(max((float(losses.mean()) - float(healthy.mean())) / beyond, 0.0), 1.0)
 
 
 def _residual_of(best: Hypothesis, problem: Problem) -> Residual | None:
@@ -249,11 +228,8 @@ def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
     place of one of its faults, or are single faults; they have at most as many faults. The eight
     best by the surrogate are compared, with the severity of the other fault fitted. A neighbour is
     indistinguishable unless it is significantly worse, by the loss or by that of a joint at which
-    the two differ, or one of its faults corrects model error.
-
-    Returns:
-        Hypotheses sorted by total loss. Of those that differ in severities alone, the one with the
-        smallest loss.
+    the two differ, or one of its faults corrects model error. They are sorted by total loss; of
+    those that differ in severities alone, there is the one with the smallest loss.
     """
     space = problem.space
     neighbours = dict.fromkeys(
@@ -268,7 +244,7 @@ def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
         one
         for one, row in zip(candidates, rows, strict=True)
         if without_severities(one) != without_severities(best)
-        and not is_better(best_losses, row)
+        and not significance.is_better(best_losses, row)
         and not any_fault_is_model_error(one, problem)
         and not (problem.has_joints and predicts_joints_worse(one, best, problem))
     )
@@ -280,7 +256,7 @@ def _with_fitted_others(one: Hypothesis, best: Hypothesis, problem: Problem) -> 
     A neighbour that is far from the best by the surrogate stays as it is: no fit makes up for it.
     """
     best_losses, losses = problem.coarse([best, one])
-    if losses.mean() > LOSS_RATIO * best_losses.mean() + NEGLIGIBLE_LOSS:
+    if losses.mean() > significance.LOSS_RATIO * best_losses.mean() + significance.NEGLIGIBLE_LOSS:
         return one
     for fault in one.faults:
         if fault not in best.faults and fault in one.faults:
@@ -295,10 +271,8 @@ def undetectable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
     Added to the best hypothesis, an undetectable fault changes the loss significantly in neither
     direction. An example is a dead touch sensor in a foot that the gait never puts down. Kinds with
     severities are excluded: most have a severity that is too small to detect. Hypotheses that the
-    surrogate comparator distinguishes from the best are not simulated further.
-
-    Returns:
-        Hypotheses sorted by total loss.
+    surrogate comparator distinguishes from the best are not simulated further. The others are
+    sorted by total loss.
     """
     space = problem.space
     faults = [fault for fault in space.coarse_candidates if fault.kind.bounds is None]
@@ -310,8 +284,8 @@ def undetectable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
             one
             for one, row in zip(candidates, rows, strict=True)
             if np.isfinite(best_losses).all()
-            and not is_better(best_losses, row)
-            and not is_better(row, best_losses)
+            and not significance.is_better(best_losses, row)
+            and not significance.is_better(row, best_losses)
         ]
     return by_total_loss(candidates, problem.losses)
 
@@ -321,14 +295,14 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
 
     One fault of a built-in kind is added to the best hypothesis, or replaces all faults of the same
     part. The gain has to be significant, and significantly larger than the gain of the fault alone
-    on healthy trials; otherwise the fault corrects model error.
-
-    Returns:
-        The hypothesis with the lowest total loss that passes, with the best hypothesis of each
-        other kind that passes; None if there is none, or if there are no comparable healthy trials.
+    on healthy trials; otherwise the fault corrects model error. Of those that pass, the one with
+    the lowest total loss is returned, with the best hypothesis of each other kind; None if there is
+    none, or if there are no comparable healthy trials.
     """
     (best_losses,) = problem.losses([best])
-    is_exact = not np.isfinite(best_losses).all() or best_losses.mean() <= NEGLIGIBLE_LOSS
+    is_exact = (
+        not np.isfinite(best_losses).all() or best_losses.mean() <= significance.NEGLIGIBLE_LOSS
+    )
     if problem.healthy([INTACT]) is None or is_exact:
         return None
     faults = _with_unsearched(best, problem.space)
@@ -339,9 +313,11 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
         if healthy is None or fault.kind.name in better:
             continue
         # A reading that healthy trials predict better with the fault is predicted badly as such.
-        if not fault.kind.affects_dynamics and is_better(*healthy):
+        if not fault.kind.affects_dynamics and significance.is_better(*healthy):
             continue
-        if gain_exceeds_healthy_gain(problem.losses([candidate])[0], best_losses, *healthy):
+        if significance.gain_exceeds_healthy_gain(
+            problem.losses([candidate])[0], best_losses, *healthy
+        ):
             better[fault.kind.name] = candidate
     if not better:
         return None
@@ -371,7 +347,9 @@ def _largest_gains(
     """The most significant gains by the surrogate, sorted by total loss of the comparator."""
     best_losses, *rows = problem.coarse([best, *candidates])
     z = [
-        paired_z(best_losses, row) if np.isfinite([best_losses, row]).all() else -np.inf
+        significance.paired_z(best_losses, row)
+        if np.isfinite([best_losses, row]).all()
+        else -np.inf
         for row in rows
     ]
     few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST_SIZE]]
@@ -389,14 +367,6 @@ def detectable_severities(
     predicts the trials worse by ``MIN_Z_ACROSS_TRIALS`` standard errors: a diagnosis requires
     ``MIN_Z``, but the losses of a trial with the fault are not known. On the log of a real robot,
     weaknesses with ``MIN_Z`` were found in half of the cases.
-
-    Args:
-        best: The best hypothesis.
-        space: The hypotheses about the robot.
-        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
-
-    Returns:
-        In the order of the kinds and their parts.
     """
     faulty = {fault.part for fault in best.faults}
     faults = [
@@ -424,7 +394,7 @@ def detectable_severities(
         candidates = [space.canonical([*best.faults, fault]) for fault in tried]
         best_losses, *rows = losses([best, *candidates])
         for (i, middle), row in zip(middles.items(), rows, strict=True):
-            if is_better(best_losses, row, MIN_Z_ACROSS_TRIALS):
+            if significance.is_better(best_losses, row, significance.MIN_Z_ACROSS_TRIALS):
                 high[i] = middle
             else:
                 low[i] = middle + 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.comparators import COMPARATORS, PREFERENCE
-from selfmodel.diagnosis.choice import best_comparator, given_comparator, prepared_trial
+from selfmodel.diagnosis.choice import chosen_comparator, prepared_trial
 from selfmodel.diagnosis.comparator import PreparedTrial, TrialRefusedError
 from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot
@@ -53,7 +53,7 @@ def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Tr
 def test_the_best_comparator_is_the_first_that_the_trial_allows(
     lost: Sequence[Signal], expected: str, robot: Robot, trial: Trial
 ):
-    chosen = best_comparator(PREFERENCE, robot, [without(trial, lost)])
+    chosen = chosen_comparator(PREFERENCE, robot, [without(trial, lost)])
 
     assert chosen.comparator.name == expected
     assert all(signal in chosen.reason for signal in lost if signal in {*BASE, *VELOCITIES})
@@ -66,13 +66,13 @@ def test_a_given_comparator_is_refused_with_each_log_s_signal_and_with_one_that_
     blind, slow = without(trial, BASE, "a.mcap"), without(trial, VELOCITIES, "b.mcap")
     segments = COMPARATORS[SEGMENTS]
 
-    assert given_comparator(segments, PREFERENCE, robot, [trial]).comparator is segments
+    assert chosen_comparator(PREFERENCE, robot, [trial], given=segments).comparator is segments
     with pytest.raises(
         InputError,
         match=rf"a\.mcap: {SEGMENTS} needs base_position.*; b\.mcap: {SEGMENTS} needs "
         rf"joint_velocities.*: give the comparator {NOISY}, which can judge all",
     ):
-        given_comparator(segments, PREFERENCE, robot, [blind, trial, slow])
+        chosen_comparator(PREFERENCE, robot, [blind, trial, slow], given=segments)
 
 
 def test_trials_that_no_comparator_can_judge_are_refused_one_by_one(robot: Robot, trial: Trial):
@@ -80,9 +80,9 @@ def test_trials_that_no_comparator_can_judge_are_refused_one_by_one(robot: Robot
     message = r"0\.mcap: .* needs at least one of sensors.*; 1\.mcap: .*: leave these trials out"
 
     with pytest.raises(InputError, match=message):
-        best_comparator(PREFERENCE, robot, dark)
+        chosen_comparator(PREFERENCE, robot, dark)
     with pytest.raises(InputError, match=r"0\.mcap: .*; 1\.mcap: .*: leave these trials out"):
-        given_comparator(PREFERENCE[0], PREFERENCE, robot, dark)
+        chosen_comparator(PREFERENCE, robot, dark, given=PREFERENCE[0])
 
 
 @pytest.mark.parametrize("name", COMPARATORS)
@@ -97,7 +97,7 @@ def test_the_preferred_comparators_can_judge_all_that_any_other_can(
         prepared_trial(COMPARATORS[name], robot, rest)
     except TrialRefusedError:
         return
-    best_comparator(PREFERENCE, robot, [rest])
+    chosen_comparator(PREFERENCE, robot, [rest])
 
 
 def test_an_error_of_a_third_party_s_comparator_is_a_refusal(robot: Robot, trial: Trial):
@@ -110,4 +110,4 @@ def test_an_error_of_a_third_party_s_comparator_is_a_refusal(robot: Robot, trial
     with pytest.raises(TrialRefusedError, match="picky needs a smell"):
         prepared_trial(Picky(), robot, trial)
     with pytest.raises(InputError, match=f"picky needs a smell: give the comparator {SEGMENTS}"):
-        given_comparator(Picky(), PREFERENCE, robot, [trial])
+        chosen_comparator(PREFERENCE, robot, [trial], given=Picky())
