@@ -51,15 +51,13 @@ class PreparedTrial(Protocol):
     def distances(self, simulated: Trajectory, /) -> FloatArray:
         """Returns the distance of each simulation from the trial.
 
-        The result depends on the prepared trial and the argument alone; neither is changed.
-
-        Args:
-            simulated: The requested signals, with a leading axis of ``n`` hypotheses, and the
-                hinges that each hypothesis fixes; see ``Trajectory``.
+        The result depends on the prepared trial and the argument alone; neither is changed. The
+        argument has the requested signals, with a leading axis of ``n`` hypotheses, and the hinges
+        that each hypothesis fixes; see ``Trajectory``.
 
         Returns:
             ``(n,)`` finite numbers of at least 0, smaller is closer; exactly 0 for a simulation
-            that reproduces the trial, as ``selfmodel.diagnosis.shown`` returns.
+            that reproduces the trial, as ``selfmodel.testing.shown`` returns.
         """
         ...
 
@@ -80,10 +78,7 @@ class PiecewiseTrial(Protocol):
         ...
 
     def losses(self, simulated: Trajectory, /) -> "FloatArray | Losses":
-        """Returns the loss of each segment, window or step of the trial.
-
-        Args:
-            simulated: As for ``PreparedTrial.distances``.
+        """Returns the loss of each segment, window or step; see ``PreparedTrial.distances``.
 
         Returns:
             ``(n, pieces)`` finite numbers of at least 0, and 0 for a simulation that reproduces the
@@ -128,12 +123,8 @@ class Prepared:
 class TrialRefusedError(InputError):
     """A trial lacks signals or steps that a comparator needs.
 
-    Attributes:
-        reason: The trial, the requirement of the comparator and the content of the trial.
-
-    Args:
-        reason: As the attribute.
-        remedy: Advice, after a colon in the message.
+    The reason names the trial, the requirement of the comparator and the content of the trial; the
+    remedy is advice, after a colon in the message.
     """
 
     def __init__(self, reason: str, remedy: str = "") -> None:

@@ -27,11 +27,9 @@ simulation of every hypothesis diverged."""
 
 @dataclass(frozen=True)
 class Candidate:
-    """A hypothesis and its distance to the trials.
+    """A hypothesis in canonical form, and the sum of its distances from the trials.
 
-    Attributes:
-        hypothesis: In canonical form.
-        distance: Sum over the trials of the comparator's distance, in the comparator's unit.
+    The distance is in the comparator's unit.
     """
 
     hypothesis: Hypothesis
@@ -40,13 +38,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class UnsearchedFault:
-    """A hypothesis with one fault of an unsearched kind.
+    """A hypothesis with one fault of an unsearched kind, and the name of that kind.
 
-    Attributes:
-        hypothesis: The complete hypothesis, including the fault of the unsearched kind.
-        kind: Name of the unsearched kind.
-        others: The best hypothesis of each other unsearched kind that predicts the trials
-            significantly better too, by the kind's name.
+    ``others`` are the best hypotheses of each other unsearched kind that predicts the trials
+    significantly better too, by the kind's name.
     """
 
     hypothesis: Hypothesis
@@ -91,8 +86,7 @@ class Residual:
     Attributes:
         signals: Excess of the mean loss of each signal, largest first, at most three.
         trial: Name of the trial with the worst time.
-        begin: Beginning of the worst time, s since the start of that trial.
-        end: End of the worst time, s.
+        begin, end: The worst time, s since the start of that trial.
     """
 
     signals: Mapping[str, float]
@@ -108,9 +102,7 @@ class Change:
     Attributes:
         trial: Name of the trial in which the change occurred.
         index: Index of that trial among the trials of the diagnosis.
-        time: Time of the change, s since the start of that trial.
-        earliest: Lower bound of the time, s.
-        latest: Upper bound of the time, s.
+        time, earliest, latest: Time of the change and its bounds, s since the start of that trial.
         before: Best hypothesis about the time before the change.
         after: Hypothesis about the time after the change, with which the time was found.
     """
@@ -278,13 +270,10 @@ def renamed(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypothesis]) -> Diagnosis:
-    """Returns a diagnosis from its JSON values.
+    """Returns a diagnosis from the values of ``Diagnosis.to_dict``.
 
-    Args:
-        values: Result of ``Diagnosis.to_dict``, or of ``output_of`` with a number of ``trials``.
-            Those of selfmodel 0.1 lack some keys, and may have undetectable faults alone, without
-            the best hypothesis.
-        parse: Reads the notation of a hypothesis.
+    Or from those of ``output_of`` with a number of ``trials``. Those of selfmodel 0.1 lack some
+    keys, and may have undetectable faults alone, without the best hypothesis.
 
     Raises:
         ValueError: A value is invalid, or has another type.

@@ -34,11 +34,9 @@ JOINTS_TRIED, KINDS_FITTED = 3, 3
 
 
 def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
-    """Returns a hypothesis with its faults of single joints decided by the joints' own motion.
+    """Returns the best hypothesis of a search, its faults of joints decided by the joints' motion.
 
-    Args:
-        best: The best hypothesis by the total loss.
-        search: The search that found it; its problem has losses of joints.
+    The problem of the search has losses of joints.
     """
     joints = _JointSearch(best, search)
     current = best
@@ -53,16 +51,10 @@ def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
 
 
 def excesses(hypothesis: Hypothesis, problem: Problem) -> dict[str, float]:
-    """Returns the excess of each joint's loss over that on healthy trials, largest first.
+    """Returns the excess of each joint's loss over that of ``INTACT`` on healthy trials.
 
-    Args:
-        hypothesis: Hypothesis about the trials to explain; on the healthy trials, the empty one is
-            compared.
-        problem: The trials and their losses.
-
-    Returns:
-        Excess by the joint's name, standard errors, of the joints with at least ``MIN_PIECES``
-        known pieces in either; see ``significance.excess_over_healthy``.
+    It is in standard errors by the joint's name, largest first, of the joints with at least
+    ``MIN_PIECES`` known pieces in either; see ``significance.excess_over_healthy``.
     """
     excess = {}
     for joint in problem.space.anatomy.joints:

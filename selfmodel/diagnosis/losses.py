@@ -66,13 +66,6 @@ class LossTable:
     A trial is prepared once, and a hypothesis is simulated once for each trial: the total, the
     parts of signals and the losses of hinges are of one simulation. They are independent of the
     hypotheses computed before.
-
-    Args:
-        simulator: The self-model.
-        comparator: The distance between a simulation and a trial.
-
-    Raises:
-        InputError: The object is no comparator.
     """
 
     def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
@@ -177,9 +170,6 @@ class LossTable:
         surrogate (from ``MANY_TRIALS`` on, the surrogate of that one), or the comparator on the
         openings of the trials. A surrogate that refuses a trial, such as one with many late steps,
         is left out.
-
-        Args:
-            trials: Trials that the comparator accepts.
         """
         if not self.is_piecewise(trials):
             return self, trials
@@ -441,9 +431,7 @@ def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...
     without torque predicts a short segment better than the jam: each segment begins at the logged
     angle. The encoder contains the angle, whether the joint is jammed or not.
 
-    Returns:
-        Faults of the kind ``jam-angle``, in the order of the joints, without joints whose encoders
-        are unknown and joints whose hinges end at different angles.
+    There is none of a joint whose encoders are unknown, or whose hinges end at different angles.
     """
     trajectory = trials[-1].trajectory  # a fault may begin during the trials
     medians = median_of_known(trajectory["joint_positions"][round((1 - END) * trajectory.steps) :])

@@ -74,15 +74,8 @@ def evolved(
 ) -> tuple[list[Hypothesis], int]:
     """Returns the hypotheses that the diagnostic EA evaluated, best first, and their evaluations.
 
-    Fitness is minus the sum of the distances over all trials. Source: the paper, section III.
-
-    Args:
-        distances: Returns the distance of each hypothesis from all trials, ``(n,)``.
-        space: The hypotheses about the robot.
-        settings: Parameters of the EA.
-        seeds: Hypotheses of the initial population, in addition to random ones.
-        rng: Source of all random numbers.
-        on_generation: Callback, called after each generation.
+    Fitness is minus the distance from all trials, ``(n,)``. The seeds are in the initial
+    population, beside random hypotheses. Source: the paper, section III.
     """
     totals: dict[Hypothesis, float] = {}
 
@@ -111,11 +104,7 @@ def by_distance(totals: Mapping[Hypothesis, float]) -> list[Hypothesis]:
 class LocalSearch:
     """Descents and pruning on one problem; the algorithm is in the docstring of the module.
 
-    Args:
-        problem: The trials to explain, and the losses of hypotheses.
-
     Attributes:
-        problem: As the argument.
         compared: Hypotheses that were compared with the trials.
         proposed: Hypotheses that were compared by the surrogate.
     """
@@ -139,8 +128,7 @@ class LocalSearch:
     def refined(self, known: Iterable[Hypothesis]) -> Hypothesis:
         """Returns the best hypothesis in which every fault is required by the trials.
 
-        Args:
-            known: Hypotheses to start from, in addition to the best single faults and ``INTACT``.
+        The search starts from the known ones, the best single faults and ``INTACT``.
         """
         fitted = partial(with_fitted_severities, space=self._space)
         levels = partial(fitted, losses=self.coarse, zooms=0)
@@ -212,11 +200,10 @@ class LocalSearch:
 
     def _replaced(self, current: Hypothesis) -> list[Hypothesis]:
         """The hypotheses with a promising fault in the place of one fault."""
-        more = self._by_surrogate(self._space.with_one_more(current))
+        faults, more = current.faults, self._by_surrogate(self._space.with_one_more(current))
         singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
-        added = [fault for one in more for fault in one.faults if fault not in current.faults]
+        added = [fault for one in more for fault in one.faults if fault not in faults]
         promising = dict.fromkeys([*singles, *added[:PROMISING]])
-        faults = current.faults
         changed = [
             self._space.canonical([*faults[:i], *faults[i + 1 :], fault])
             for i in range(len(faults))
@@ -277,11 +264,7 @@ def with_fitted_severities(
 ) -> Hypothesis:
     """Returns the hypothesis with the severities of the lowest total loss, by coordinate descent.
 
-    Args:
-        hypothesis: In canonical form.
-        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
-        space: The hypotheses about the robot.
-        zooms: Number of grids between levels; 0 for the best levels.
+    ``zooms`` is the number of grids between levels; 0 for the best levels.
     """
     current = hypothesis
     for _ in range(MAX_ROUNDS):
@@ -331,11 +314,6 @@ def with_mean_severities(
     error worse than another, 0.31 had the lowest loss, and the mean is 0.36. A severity whose loss
     is z standard errors above the best, paired over the pieces, has the weight exp(-z^2 / 2).
     Severities beyond a ruled-out severity have no weight.
-
-    Args:
-        hypothesis: With fitted severities.
-        losses: Losses of hypotheses on the trials, ``(n, pieces)``.
-        space: The hypotheses about the robot.
     """
     current = hypothesis
     for index in range(len(hypothesis)):

@@ -87,8 +87,8 @@ def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
 
     Args:
         one: Losses of the first hypothesis, ``(pieces,)``; infinite where a simulation diverged.
-        other: Losses of the second hypothesis on the same pieces, likewise. A hypothesis that
-            diverged is never better; a finite one is better than a diverged one.
+        other: Losses of the second hypothesis on the same pieces. A hypothesis that diverged is
+            never better; a finite one is better than a diverged one.
         min_z: Standard errors of the paired difference that are required.
     """
     if not np.isfinite(one).all():
@@ -102,14 +102,9 @@ def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
 
 
 def joint_is_better(one: FloatArray, other: FloatArray) -> bool:
-    """Returns whether the losses of a joint are significantly smaller.
+    """Returns whether the first losses of a joint, ``(pieces,)``, are significantly smaller.
 
-    Args:
-        one: Losses of a hypothesis, ``(pieces,)``; NaN if unknown.
-        other: Losses of another hypothesis on the same pieces.
-
-    Returns:
-        False with fewer than ``MIN_PIECES`` pieces that are known in both.
+    False with fewer than ``MIN_PIECES`` pieces that are known (not NaN) in both.
     """
     smaller, larger = known(np.stack([one, other]))
     if len(smaller) < MIN_PIECES or not np.isfinite(smaller).all():
@@ -163,8 +158,7 @@ def gain_is_model_error(
 
     Three conditions hold: the healthy trials gain; the damaged trials gain by less than ``MIN_Z``
     standard errors more; and the test has the power to show a real fault, which would worsen the
-    healthy trials by as much as it improves the damaged ones. The arguments are those of
-    ``gain_exceeds_healthy_gain``.
+    healthy trials by as much as it improves the damaged ones.
     """
     if not _are_comparable(one, other, healthy_one, healthy_other):
         return False
@@ -189,14 +183,9 @@ def _gains(
 def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
     """Returns the excess of a mean loss over that of healthy trials, in standard errors.
 
-    Args:
-        losses: Losses of the best hypothesis, ``(pieces,)``.
-        healthy: Losses of the empty hypothesis on healthy trials, ``(healthy pieces,)``.
-
-    Returns:
-        Welch's statistic; 0 if the means differ by at most ``LOSS_FLOOR``, and infinite without
-        variance. With a single piece, or with infinite losses: infinite if the ratio of the means
-        is significant, else 0.
+    It is Welch's statistic; 0 if the means differ by at most ``LOSS_FLOOR``, and infinite without
+    variance. With a single piece, or with infinite losses: infinite if the ratio of the means is
+    significant, else 0.
     """
     if min(len(losses), len(healthy)) < 2 or not np.isfinite([losses.mean(), healthy.mean()]).all():
         larger = losses.mean() > LOSS_RATIO * healthy.mean() + LOSS_FLOOR
