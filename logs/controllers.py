@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controllers.controller import Controller, Design, checked_ranges
+from selfmodel.controllers.controller import PAPER_RANGE, Controller, Design
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
@@ -86,7 +86,7 @@ def controller_bytes(controller: Controller) -> bytes:
         number: np.array(getattr(design, number)),
         "genome": controller.genome,
     }
-    if design.ranges != checked_ranges(design.motors, ()):
+    if any(one != PAPER_RANGE for one in design.ranges):
         arrays["ranges"] = np.array(design.ranges)
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
@@ -111,7 +111,7 @@ def parse_controller(data: bytes, source: str) -> Controller:
         sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
         ranges = tuple((c, half) for c, half in arrays.get("ranges", np.empty((0, 2))).tolist())
         own = arrays[number].item()
-        return Controller(design(sensors, motors, own, ranges), arrays["genome"])
+        return Controller(design(sensors, motors, own, ranges=ranges), arrays["genome"])
 
 
 # ---------------------------------------------------------------- archives of arrays

@@ -7,10 +7,11 @@ names on the command line), and its row in ``selfmodel.logs.controllers.KINDS`` 
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence, Set as AbstractSet
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from selfmodel.errors import InputError
 
 TARGET_RANGE = np.pi / 4
 """Half range of the paper's motor targets about 0, rad."""
+
+PAPER_RANGE = (0.0, TARGET_RANGE)
+"""Command range of the paper's motors."""
 
 Ranges = tuple[tuple[float, float], ...]
 """Centre and half width of the command range per motor, in the motor's unit: rad for a position
@@ -42,44 +46,60 @@ class ControllerBatch(Protocol):
         """Writes the commands of the next control step, ``(n, motors)``, given ``readings``."""
 
 
-class Design(Protocol):
+@dataclass(frozen=True)
+class Design(ABC):
     """Structure of a controller: its inputs, its outputs, and the arithmetic between them.
 
-    A design is immutable, hashable and equal to every design of the same structure.
+    Attributes:
+        name: Name of the kind of design in options and controller files, such as ``network``.
+        sensors: Names of the inputs, in order.
+        motors: Names of the outputs, in order.
+        ranges: Command range of each motor; the paper's for all by default.
+
+    Raises:
+        ValueError: The number of ranges is not the number of motors, or a range is not finite or
+            has no positive width.
     """
 
-    @property
-    def name(self) -> str:
-        """Name of the kind of design in options and controller files, such as ``network``."""
+    name: ClassVar[str]
 
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs, in order."""
+    sensors: tuple[str, ...]
+    motors: tuple[str, ...]
+    ranges: Ranges = field(default=(), kw_only=True)
 
-    @property
-    def motors(self) -> tuple[str, ...]:
-        """Names of the outputs, in order."""
-
-    @property
-    def ranges(self) -> Ranges:
-        """Command range of each motor."""
+    def __post_init__(self) -> None:
+        motors, ranges = self.motors, self.ranges or (PAPER_RANGE,) * len(self.motors)
+        if len(ranges) != len(motors):
+            raise ValueError(f"{len(motors)} motors need a command range each, got {len(ranges)}")
+        for motor, (centre, half) in zip(motors, ranges, strict=True):
+            if not (math.isfinite(centre) and math.isfinite(half) and half > 0):
+                raise ValueError(
+                    f"the motor {motor} needs a finite command range of positive width, got "
+                    f"{centre} plus and minus {half}"
+                )
+        object.__setattr__(self, "ranges", ranges)
 
     @property
     def hidden(self) -> int:
         """Number of hidden neurons; 0 for a design without neurons."""
+        return 0
 
     @property
+    @abstractmethod
     def weights(self) -> int:
         """Length of a genome."""
 
     @property
+    @abstractmethod
     def description(self) -> str:
         """Sizes of the design as text, for error messages."""
 
-    def summary(self, genome: FloatArray) -> str:
+    @abstractmethod
+    def summary(self, genome: FloatArray, /) -> str:
         """Returns a short description of the controller with that genome, ``(weights,)``."""
 
-    def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> ControllerBatch:
+    @abstractmethod
+    def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]], /) -> ControllerBatch:
         """Returns the batch of the controllers of some genomes, in their initial state.
 
         Args:
@@ -136,21 +156,18 @@ def draw_genomes(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray
 
 
 def check_silent_neurons(design: Design, silent: AbstractSet[int]) -> None:
-    """Checks that a design has the hidden neurons that are to be silent, given by index.
-
-    Raises:
-        InputError: A neuron does not exist in the design.
-    """
+    """Raises ``InputError`` unless a design has the hidden neurons that are to be silent."""
     missing = [neuron for neuron in sorted(silent) if neuron >= design.hidden]
     if missing:
-        fault = f"neuron:{missing[0]}"
-        neurons, network = "which has no hidden neurons", "choose a network as the controller"
-        if design.hidden:
-            neurons = f"whose hidden neurons are 0 to {design.hidden - 1}"
-            network = "choose a larger network"
+        fault, last = f"neuron:{missing[0]}", design.hidden - 1
+        known = (
+            f"whose hidden neurons are 0 to {last}"
+            if design.hidden
+            else "which has no hidden neurons"
+        )
         raise InputError(
-            f"{fault} does not apply to {design.description}, {neurons}: leave {fault} out, or "
-            f"{network}"
+            f"{fault} does not apply to {design.description}, {known}: leave {fault} out, or "
+            f"choose a larger network"
         )
 
 
@@ -189,32 +206,8 @@ def make_batch(
     return design.batch(np.array([controller.genome for controller in controllers]), silent)
 
 
-def checked_ranges(motors: tuple[str, ...], ranges: Ranges) -> Ranges:
-    """Returns checked command ranges; the paper's range for every motor if ``ranges`` is empty.
-
-    Raises:
-        ValueError: The number of ranges is not the number of motors, or a range is not finite or
-            has no positive width.
-    """
-    if not ranges:
-        return ((0.0, TARGET_RANGE),) * len(motors)
-    if len(ranges) != len(motors):
-        raise ValueError(f"{len(motors)} motors need a command range each, got {len(ranges)}")
-    for motor, (centre, half) in zip(motors, ranges, strict=True):
-        if not (math.isfinite(centre) and math.isfinite(half) and half > 0):
-            raise ValueError(
-                f"the motor {motor} needs a finite command range of positive width, got "
-                f"{centre} plus and minus {half}"
-            )
-    return ranges
-
-
 class CommandScaler:
-    """Scales outputs in [-1, 1] to the command ranges of the motors.
-
-    Args:
-        ranges: Command range of each motor.
-    """
+    """Scales outputs in [-1, 1] to the command ranges of the motors."""
 
     def __init__(self, ranges: Ranges) -> None:
         self._half = np.array([half for _, half in ranges])

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandScaler, Ranges, checked_ranges
+from selfmodel.controllers.controller import CommandScaler, Design
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
@@ -36,34 +36,24 @@ MAX_TIMESTEP = 3600.0
 
 
 @dataclass(frozen=True)
-class Cpg:
-    """Design of a CPG.
-
-    Attributes:
-        sensors: Names of the inputs, in order.
-        motors: Names of the outputs, in order.
-        timestep: Control time step, s.
-        ranges: Command range of each motor; the paper's for all by default.
+class Cpg(Design):
+    """Design of a CPG for a control time step, s.
 
     Raises:
         ValueError: The time step is out of range, or the ranges do not fit the motors.
     """
 
     name: ClassVar[str] = "cpg"
-    hidden: ClassVar[int] = 0
 
-    sensors: tuple[str, ...]
-    motors: tuple[str, ...]
     timestep: float
-    ranges: Ranges = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0 < self.timestep <= MAX_TIMESTEP:
             raise ValueError(
                 f"the time step must be above 0 s and at most {MAX_TIMESTEP:g} s, "
                 f"got {self.timestep}"
             )
-        object.__setattr__(self, "ranges", checked_ranges(self.motors, self.ranges))
 
     @property
     def weights(self) -> int:
@@ -131,10 +121,6 @@ class CpgBatch:
     """The CPGs of many robots; a ``ControllerBatch``.
 
     Readings are constant between two commands, so the advance of the phase is exact.
-
-    Args:
-        cpg: Design of all controllers.
-        genomes: ``(n, weights)``.
     """
 
     def __init__(self, cpg: Cpg, genomes: FloatArray) -> None:

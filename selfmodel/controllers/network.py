@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandScaler, Ranges, checked_ranges
+from selfmodel.controllers.controller import CommandScaler, Design
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
@@ -17,29 +17,12 @@ MAX_HIDDEN_NEURONS = 100
 
 
 @dataclass(frozen=True)
-class Network:
-    """Design of a recurrent network with one hidden layer.
-
-    Attributes:
-        sensors: Names of the inputs, in order.
-        motors: Names of the outputs, in order.
-        hidden: Number of hidden neurons.
-        ranges: Command range of each motor; the paper's for all by default.
-
-    Raises:
-        ValueError: The number of ranges is not the number of motors, or a range is not finite or
-            has no positive width.
-    """
+class Network(Design):
+    """Design of a recurrent network with one hidden layer of ``hidden`` neurons."""
 
     name: ClassVar[str] = "network"
 
-    sensors: tuple[str, ...]
-    motors: tuple[str, ...]
     hidden: int = HIDDEN_NEURONS
-    ranges: Ranges = ()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges", checked_ranges(self.motors, self.ranges))
 
     @property
     def weights(self) -> int:
@@ -88,20 +71,17 @@ class Network:
 
 
 class NetworkBatch:
-    """The networks of many robots; a ``ControllerBatch``.
-
-    Args:
-        network: Design of all controllers.
-        genomes: ``(n, weights)``.
-        silent: Indices of the silent hidden neurons per robot; their activation is 0.
-    """
+    """The networks of many robots; a ``ControllerBatch``. The activation of silent neurons is 0."""
 
     def __init__(
         self, network: Network, genomes: FloatArray, silent: Sequence[AbstractSet[int]]
     ) -> None:
         self._to_hidden, self._to_motors = network.layers(genomes)
         self._scaler = CommandScaler(network.ranges)
-        self._working = _working_neurons(silent, network.hidden)
+        self._working = None
+        if any(silent):
+            silenced = [[neuron in own for neuron in range(network.hidden)] for own in silent]
+            self._working = 1.0 - np.array(silenced)
         sensors = len(network.sensors)
         # Sensors, hidden neurons and the bias in one row: the input of each layer is a slice.
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
@@ -120,13 +100,3 @@ class NetworkBatch:
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
         self._scaler.write(motors, targets)
-
-
-def _working_neurons(silent: Sequence[AbstractSet[int]], hidden: int) -> FloatArray | None:
-    """Returns 0 per silent neuron and 1 per working neuron, ``(n, hidden)``; None if all work."""
-    if not any(silent):
-        return None
-    working = np.ones((len(silent), hidden))
-    for row, neurons in zip(working, silent, strict=True):
-        row[sorted(neurons)] = 0.0
-    return working

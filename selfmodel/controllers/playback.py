@@ -38,13 +38,14 @@ class Playback:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Playback):
             return NotImplemented
-        return self.motors == other.motors and self._bytes() == other._bytes()
+        return self._key == other._key
 
     def __hash__(self) -> int:
-        return hash((self.motors, self._bytes()))
+        return hash(self._key)
 
-    def _bytes(self) -> tuple[tuple[int, ...], bytes]:
-        return self.commands.shape, self.commands.tobytes()
+    @property
+    def _key(self) -> tuple[tuple[str, ...], bytes]:
+        return self.motors, self.commands.tobytes()
 
     @property
     def summary(self) -> str:
@@ -53,13 +54,7 @@ class Playback:
 
 
 def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
-    """Returns the playback of a recording with missing commands.
-
-    A missing command is replaced by the command before it, which the motor held.
-
-    Args:
-        motors: Names of the motors, in order.
-        commands: ``(steps, motors)``, each in its motor's unit; NaN where missing.
+    """Returns the playback of a recording, with the command before each missing one, a NaN.
 
     Raises:
         ValueError: A command of the first step is missing.
@@ -68,12 +63,7 @@ def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
 
 
 class PlaybackBatch:
-    """The recorded commands of many robots; a ``ControllerBatch``.
-
-    Args:
-        playbacks: Playbacks, one per robot.
-        sensors: Number of sensors of a robot; the readings do not affect the commands.
-    """
+    """The recorded commands of many robots; a ``ControllerBatch`` that ignores its readings."""
 
     def __init__(self, playbacks: Sequence[Playback], sensors: int) -> None:
         self._commands = [playback.commands for playback in playbacks]

@@ -25,7 +25,7 @@ def network_for(robot: Robot, hidden: int | None = None) -> Network:
     if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
         raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
     names = robot.anatomy.names
-    return Network(names.sensors, names.motors, neurons, command_ranges(robot.model))
+    return Network(names.sensors, names.motors, neurons, ranges=command_ranges(robot.model))
 
 
 def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
@@ -44,7 +44,7 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
         )
     names = robot.anatomy.names
     ranges = command_ranges(robot.model)
-    return Cpg(names.sensors, names.motors, robot.control_timestep, ranges)
+    return Cpg(names.sensors, names.motors, robot.control_timestep, ranges=ranges)
 
 
 DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = MappingProxyType(

@@ -26,7 +26,7 @@ from selfmodel.trials.signals import SIGNALS
 from tests.helpers.drivers import random_controllers, random_cpgs
 
 RANGES = ((0.5, 0.25), (0.0, 1.0), (-2.0, 1.0))
-CPG = Cpg(("touch", "angle"), ("hip", "knee", "ankle"), 0.01, RANGES)
+CPG = Cpg(("touch", "angle"), ("hip", "knee", "ankle"), 0.01, ranges=RANGES)
 NETWORK = Network(tuple("abcdefgh"), tuple("ABCDEFGH"))
 DESIGNS = pytest.mark.parametrize("design", [CPG, NETWORK], ids=lambda own: own.name)
 
@@ -209,7 +209,7 @@ def test_a_batch_with_another_design_is_refused(quadruped: Robot):
 @DESIGNS
 def test_controllers_are_equal_when_their_genome_and_design_are(design: Design):
     genome = genomes(design)[0]
-    other = CPG if design is NETWORK else Cpg(CPG.sensors, CPG.motors, 0.02, CPG.ranges)
+    other = CPG if design is NETWORK else Cpg(CPG.sensors, CPG.motors, 0.02, ranges=CPG.ranges)
 
     assert len({Controller(design, genome), Controller(design, genome.copy())}) == 1
     assert Controller(design, genome) != Controller(design, -genome)
@@ -225,7 +225,10 @@ def test_controllers_are_equal_when_their_genome_and_design_are(design: Design):
         (lambda: Controller(CPG, np.full(12, np.nan)), r"must lie in \[-1, 1\]"),
         (lambda: Cpg((), ("hip",), 0.0), "at most 3600 s, got 0.0"),
         (lambda: Cpg((), ("hip",), math.nan), "at most 3600 s, got nan"),
-        (lambda: Cpg((), ("hip",), 0.1, ((0.0, 1.0),) * 2), "1 motors need a command range each"),
+        (
+            lambda: Cpg((), ("hip",), 0.1, ranges=((0.0, 1.0),) * 2),
+            "1 motors need a command range each",
+        ),
     ],
 )
 def test_a_genome_or_design_that_does_not_fit_is_refused(make: Callable[[], object], match: str):

@@ -54,10 +54,10 @@ def designs(draw: st.DrawFn) -> Design:
     """Networks and CPGs of any size, with the paper's command ranges or others."""
     sensors, motors = draw(PARTS), draw(PARTS)
     some = st.lists(RANGE, min_size=len(motors), max_size=len(motors)).map(tuple)
-    ranges = draw(st.just(()) | some)
+    own = st.just(()) | some
     return draw(
-        st.builds(Network, st.just(sensors), st.just(motors), st.integers(0, 4), st.just(ranges))
-        | st.builds(Cpg, st.just(sensors), st.just(motors), st.floats(1e-4, 1), st.just(ranges))
+        st.builds(Network, st.just(sensors), st.just(motors), st.integers(0, 4), ranges=own)
+        | st.builds(Cpg, st.just(sensors), st.just(motors), st.floats(1e-4, 1), ranges=own)
     )
 
 
@@ -70,7 +70,7 @@ def test_a_controller_comes_back_equal(design: Design, seed: int):
 
 
 def test_a_file_of_the_paper_s_ranges_has_the_bytes_that_it_always_had():
-    plain = Network(("touch", "angle"), ("hip", "knee"), 3, ((0.0, np.pi / 4),) * 2)
+    plain = Network(("touch", "angle"), ("hip", "knee"), 3, ranges=((0.0, np.pi / 4),) * 2)
     with zipfile.ZipFile(io.BytesIO(controller_bytes(controller()))) as file:
         names = [info.filename for info in file.infolist()]
     digest = hashlib.sha256(controller_bytes(controller())).hexdigest()
