@@ -13,14 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build, detached_bodies, jammed_bodies
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.robot.motion import (
-    DEFAULT_RGBA,
-    VISUAL_GROUPS,
-    body_poses,
-    opacity,
-    poses_of,
-    visible_geoms,
-)
+from selfmodel.robot import motion
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
 
@@ -37,31 +30,18 @@ CAMERA_DISTANCE = 2.7
 SMOOTHING = 0.5
 """Time over which the camera's path is averaged, s, so that it does not sway at each step."""
 
-LIGHT_DIRECTION = (0.2, 0.3, -0.93)
-"""Direction of the light of a model without directional lights, a unit vector."""
+HEADLIGHT = 0.45
+"""Intensity that is added to the camera's light for a model without a directional light."""
 
-LIGHT = (0.15, 0.45, 0.1)
-"""Ambient, diffuse and specular intensity of that light."""
-
-HIDDEN_GROUP = VISUAL_GROUPS
-"""Group of the geoms that are not drawn."""
-
-GROUND = (0.42, 0.51, 0.6, 1.0)
-"""Colour of ground without a colour, from which a grey robot differs."""
-
-OPAQUE = (0.6, 0.6, 0.6, 1.0)
-"""Colour of a transparent geom that is the only one of its body."""
+GROUND, OPAQUE = (0.42, 0.51, 0.6, 1.0), (0.6, 0.6, 0.6, 1.0)
+"""Colours of ground without a colour, and of a transparent geom that is the only one of a body."""
 
 DETACHED, JAMMED = (1.0, 1.0, 1.0, 0.4), (0.85, 0.15, 0.15, 1.0)
 """Colours of a detached body, and of one at a jammed joint: red, green, blue, opacity."""
 
-FONT_SIZE = 16
-"""Height of the font of captions, pixels."""
-
-LINE_LENGTH = 54
-"""Most characters of a line of a caption."""
-
 INK, ALARM, PAPER = (20, 24, 30), (190, 20, 20), (255, 255, 255, 150)
+FONT_SIZE, LINE_LENGTH = 16, 54
+"""Of captions: pixels, and most characters of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +87,7 @@ class Film:
 
     def gaze(self, shot: Shot) -> FloatArray:
         """Returns the target of the camera, the smoothed root body, ``(frames, 3)``, m."""
-        path = body_poses(self.model, shot.qpos)[:, self.root, :3]
+        path = motion.body_poses(self.model, shot.qpos)[:, self.root, :3]
         duration = self.time[-1] - self.time[0]
         share = SMOOTHING * (len(path) - 1) / duration if duration > 0 else 0.0
         reach = min(round(share / 2), len(path))
@@ -116,12 +96,17 @@ class Film:
         return np.stack([np.convolve(axis, window, mode="valid") for axis in padded.T], axis=1)
 
     @property
+    def own(self) -> BoolArray:
+        """Whether each geom is of the robot, ``(ngeom,)``."""
+        roots = self.model.body_rootid
+        return np.asarray(roots[self.model.geom_bodyid] == roots[self.root])
+
+    @property
     def size(self) -> float:
         """Radius of the robot around its root in the reference pose, m."""
-        model, data = self.model, self._standing()
-        own = model.body_rootid[model.geom_bodyid] == model.body_rootid[self.root]
-        distance = np.linalg.norm(data.geom_xpos[own] - data.xpos[self.root], axis=1)
-        return float((distance + model.geom_rbound[own]).max(initial=0.1))
+        data = self._standing()
+        distance = np.linalg.norm(data.geom_xpos[self.own] - data.xpos[self.root], axis=1)
+        return float((distance + self.model.geom_rbound[self.own]).max(initial=0.1))
 
     @property
     def azimuth(self) -> float:
@@ -178,7 +163,7 @@ def film_of(
     shots: list[Shot] = []
     missing: list[str] = []
     for title, trajectory in motions:
-        poses = poses_of(robot, model, trajectory)
+        poses = motion.poses_of(robot, model, trajectory)
         known = poses.forward[np.isfinite(poses.forward)]
         forward = poses.forward - (known[0] if len(known) else np.nan)
         shots.append(Shot(title, poses.qpos[steps], poses.held[steps], forward[steps]))
@@ -196,12 +181,7 @@ def film_of(
 
 
 def evenly(time: FloatArray, pictures: int) -> FloatArray:
-    """Returns distinct times of a trial, evenly spaced from its first step to its last.
-
-    Args:
-        time: Times of the steps, ``(steps,)``, s.
-        pictures: Number of times, at most the number of steps.
-    """
+    """Returns distinct times among those of the steps, from the first to the last."""
     return np.asarray(time[np.unique(np.linspace(0, len(time) - 1, pictures).astype(int))])
 
 
@@ -216,7 +196,6 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
     camera.azimuth, camera.elevation = film.azimuth, ELEVATION
     camera.distance = CAMERA_DISTANCE * film.size
     targets = [film.gaze(shot) for shot in film.shots]
-    lacks_light = not np.any(model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
         for frame in range(len(film.time)):
             pictures = []
@@ -228,34 +207,24 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
                 mujoco.mj_camlight(model, data)
                 camera.lookat[:] = target[frame]
                 renderer.update_scene(data, camera)
-                if lacks_light:
-                    _add_light(renderer.scene)
                 pictures.append(_captioned(renderer.render(), film, shot, frame))
             yield np.concatenate(pictures, axis=1)
-
-
-def _add_light(scene: mujoco.MjvScene) -> None:
-    """Adds light from above to a scene with the light of the camera and spotlights only."""
-    light = scene.lights[scene.nlight]
-    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    light.dir[:] = LIGHT_DIRECTION
-    light.ambient[:], light.diffuse[:], light.specular[:] = LIGHT
-    light.castshadow, light.headlight = 0, 0
-    scene.nlight += 1
 
 
 def painted(film: Film) -> mujoco.MjModel:
     """Returns a copy of the model in which the robot is seen, with its faulty bodies coloured."""
     model = copy.copy(film.model)
-    shown = visible_geoms(model)
-    model.geom_group[:] = np.where(shown, 0, HIDDEN_GROUP)
+    shown = motion.visible_geoms(model)
+    model.geom_group[:] = np.where(shown, 0, motion.VISUAL_GROUPS)
     plain = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_matid < 0)
-    plain &= (model.geom_rgba == DEFAULT_RGBA).all(axis=1)
+    plain &= (model.geom_rgba == motion.DEFAULT_RGBA).all(axis=1)
     model.geom_rgba[plain] = GROUND
-    unseen = shown & (opacity(model) == 0)
+    unseen = shown & (motion.opacity(model) == 0)
     model.geom_rgba[unseen], model.geom_matid[unseen] = OPAQUE, -1
     # On wide ground, shadows are grainy at any affordable size of the shadow map.
     model.light_castshadow[:] = 0
+    if not np.any(model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL):
+        model.vis.headlight.diffuse[:] += HEADLIGHT
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
     model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
     for bodies, colour in ((film.jammed, JAMMED), (film.detached, DETACHED)):
@@ -271,9 +240,10 @@ def _captioned(picture: NDArray[np.uint8], film: Film, shot: Shot, frame: int) -
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image, "RGBA")
     font = ImageFont.load_default(FONT_SIZE)
-    texts: list[tuple[float, str, tuple[int, int, int]]]
-    texts = [(6, "\n".join(textwrap.wrap(shot.title, LINE_LENGTH)), INK)]
-    texts.append((image.height - FONT_SIZE - 10, film.caption(shot, frame), INK))
+    texts = [
+        (6, "\n".join(textwrap.wrap(shot.title, LINE_LENGTH)), INK),
+        (image.height - FONT_SIZE - 10, film.caption(shot, frame), INK),
+    ]
     if shot.held[frame]:
         top = image.height - 2 * FONT_SIZE - 18
         texts.append((top, "not observed: last known pose", ALARM))

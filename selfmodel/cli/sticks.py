@@ -17,22 +17,21 @@ from selfmodel.cli.output import figure_text
 from selfmodel.robot.motion import shapes_of, stick_geoms
 
 CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-EDGES = [(i, j) for i in range(8) for j in range(i) if (CORNERS[i] == CORNERS[j]).sum() == 2]
-
+EDGES = np.array(
+    [(i, j) for i in range(8) for j in range(i) if (CORNERS[i] == CORNERS[j]).sum() == 2]
+)
 TURNS = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
 GRID = 0.5
 """Distance between the lines on the ground, m; at least a hundredth of a robot's size."""
 
+STYLES = {"detached": ("0.6", ":"), "whole": ("#20435f", "-"), "jammed": ("#c22020", "-")}
+"""Colour and style of the lines of a body."""
+
 
 def strip(film: Film, kind: str) -> bytes:
-    """Returns a figure file with a row per motion and a column per frame.
-
-    Args:
-        film: The film; every frame is drawn.
-        kind: File format, such as ``png``.
-    """
+    """Returns a figure file, such as ``png``, with a row per motion and a column per frame."""
     rows, columns = len(film.shots), len(film.time)
     figure = Figure(figsize=(1.9 * columns, 1.85 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)
@@ -69,68 +68,58 @@ class _Artist:
 
     def __init__(self, film: Film, shot: Shot) -> None:
         self.shot = shot
-        self._film = film
-        self._data = mujoco.MjData(film.model)
+        self._film, self._data = film, mujoco.MjData(film.model)
         self._targets, self._plane, self._reach = film.gaze(shot), film.plane, film.size
+        self._shapes = shapes_of(film.model, np.flatnonzero(film.own & stick_geoms(film.model)))
 
     def draw(self, axes: Axes, frame: int) -> None:
-        """Draws a frame with its caption below."""
+        """Draws a frame with its caption below: what is detached dotted, what is jammed red.
+
+        The lines are the axes of capsules and cylinders, the rims of spheres, and the edges of the
+        bounding boxes of other geoms; pale where the pose is that of another time.
+        """
         film, centre, reach = self._film, self._targets[frame], self._reach
         held = bool(self.shot.held[frame])
         self._data.qpos = self.shot.qpos[frame]
         mujoco.mj_kinematics(film.model, self._data)
         draw_ground(axes, film.normal, centre, self._plane, reach)
-        draw_robot(axes, film, self._data, centre, held=held)
+        lines = self._lines()
+        for name in filter(lines.get, STYLES):
+            colour, style = STYLES[name]
+            axes.add_collection(
+                LineCollection(
+                    list((np.concatenate(lines[name]) - centre) @ self._plane),
+                    colors=colour,
+                    linestyles=style,
+                    linewidths=1.5,
+                    alpha=0.35 if held else 1.0,
+                    capstyle="round",
+                )
+            )
         axes.set(xlim=(-1.3 * reach, 1.3 * reach), ylim=(-reach, reach), xticks=[], yticks=[])
         axes.set_aspect("equal")
         text = film.caption(self.shot, frame) + (", not observed" if held else "")
         axes.set_xlabel(text, fontsize=8, color="#b01818" if held else "black")
 
-
-def draw_robot(
-    axes: Axes, film: Film, data: mujoco.MjData, centre: FloatArray, *, held: bool
-) -> None:
-    """Draws a robot as lines: detached bodies dotted, jammed ones red, a held pose pale.
-
-    The lines are the axes of capsules and cylinders, the rims of spheres, and the edges of the
-    bounding boxes of other geoms.
-
-    Args:
-        axes: Where to draw.
-        film: Film of the robot.
-        data: State of the film's model.
-        centre: World point at the origin of the picture, ``(3,)``, m.
-        held: Whether the pose is that of another time.
-    """
-    model, plane = film.model, film.plane
-    own = model.body_rootid[model.geom_bodyid] == model.body_rootid[film.root]
-    lines: dict[str, list[FloatArray]] = {"detached": [], "whole": [], "jammed": []}
-    for shape in shapes_of(model, np.flatnonzero(own & stick_geoms(model))):
-        place, rotation = data.geom_xpos[shape.geom], data.geom_xmat[shape.geom].reshape(3, 3)
-        if shape.kind in ("capsule", "cylinder"):
-            half = rotation[:, 2] * shape.size[1]
-            ends = [np.stack([place - half, place + half])]
-        elif shape.kind == "sphere":
-            rim = place + shape.size[0] * CIRCLE @ plane.T
-            ends = [rim[[i - 1, i]] for i in range(len(rim))]
-        else:
-            middle, extent = model.geom_aabb[shape.geom].reshape(2, 3)
-            corners = place + (middle + CORNERS * extent) @ rotation.T
-            ends = [corners[[i, j]] for i, j in EDGES]
-        jammed = "jammed" if shape.body in film.jammed else "whole"
-        lines["detached" if shape.body in film.detached else jammed] += ends
-    styles = {"detached": ("0.6", ":"), "whole": ("#20435f", "-"), "jammed": ("#c22020", "-")}
-    for name, (colour, style) in styles.items():
-        axes.add_collection(
-            LineCollection(
-                list((np.array(lines[name]).reshape(-1, 2, 3) - centre) @ plane),
-                colors=colour,
-                linestyles=style,
-                linewidths=1.5,
-                alpha=0.35 if held else 1.0,
-                capstyle="round",
-            )
-        )
+    def _lines(self) -> dict[str, list[FloatArray]]:
+        """Returns the lines of the robot by style, each ``(lines, 2, 3)``, m."""
+        film, data = self._film, self._data
+        lines: dict[str, list[FloatArray]] = {}
+        for shape in self._shapes:
+            place, rotation = data.geom_xpos[shape.geom], data.geom_xmat[shape.geom].reshape(3, 3)
+            if shape.kind in ("capsule", "cylinder"):
+                half = rotation[:, 2] * shape.size[1]
+                ends = np.stack([place - half, place + half])[np.newaxis]
+            elif shape.kind == "sphere":
+                rim = place + shape.size[0] * CIRCLE @ self._plane.T
+                ends = np.stack([np.roll(rim, 1, axis=0), rim], axis=1)
+            else:
+                middle, extent = film.model.geom_aabb[shape.geom].reshape(2, 3)
+                ends = (place + (middle + CORNERS * extent) @ rotation.T)[EDGES]
+            style = "jammed" if shape.body in film.jammed else "whole"
+            style = "detached" if shape.body in film.detached else style
+            lines.setdefault(style, []).append(ends)
+        return lines
 
 
 def draw_ground(

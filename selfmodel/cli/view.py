@@ -22,30 +22,16 @@ from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.replay import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.files import replace_file
-from selfmodel.robot.motion import (
-    Shape,
-    bodies_of,
-    body_poses,
-    shapes_of,
-    triangles_of,
-    visible_geoms,
-)
+from selfmodel.robot import motion
 from selfmodel.simulation.trial_replay import Replay
 from selfmodel.trials.rotation import rotated
 
-APPLICATION = "selfmodel"
-
-HOST, PORT = "127.0.0.1", 9876
+HOST, PORT = "127.0.0.1", View.port
 """Address of the viewer: Rerun's own port, on this computer alone."""
 
-START_SECONDS = 60.0
-"""Longest wait until the viewer listens; a cold start from a slow disk takes some 10 s."""
-
-FLUSH_SECONDS = 60.0
-"""Longest wait until the viewer has the recording: a viewer that ended never has it."""
-
-TIMELINE = "trial time"
-"""Timeline of the recording: time since the start of the trial, s."""
+SECONDS = 60.0
+"""Longest wait until the viewer listens, some 10 s from a slow disk, and until it has all: a viewer
+that ended never has it."""
 
 LOGGED, SIMULATED = "logged", "simulated"
 """Names of the two bodies in paths of entities, such as ``/world/logged/torso``."""
@@ -60,20 +46,21 @@ JAMMED: Colour = (200, 40, 40, 255)
 
 def view(options: View) -> None:
     """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis."""
-    if options.out is None:
+    out = options.out
+    if out is None:
         check_display()
     else:
-        check_new_file(options.out, ".rrd")
+        check_new_file(out, ".rrd")
     import_rerun()  # a missing package is an error before any work is done
     given = replayed_log(options, options.hypothesis)
     found = given.drawable()
     if found.diverged:
         print_notes("note: the simulation diverged: with this hypothesis the model is unstable")
     written = None
-    if options.out is None:
+    if out is None:
         open_viewer(given, found, options.port)
     else:
-        written = write_recording(options.out, given, found)
+        written = write_recording(out, given, found)
     layout = layout_path()
     if options.as_json:
         facts = {
@@ -82,7 +69,7 @@ def view(options: View) -> None:
             "hypothesis": str(given.hypothesis),
             "steps": given.log.trial.trajectory.steps,
             "diverged": found.diverged,
-            "out": str(options.out) if options.out else None,
+            "out": str(out) if out else None,
             "bytes": written,
             "foxglove_layout": str(layout),
         }
@@ -90,9 +77,7 @@ def view(options: View) -> None:
         return
     body = f"{given.robot.name} as logged, and simulated as {given.hypothesis}, transparent"
     print_lines(
-        f"{options.out}: {body}; open it with `rerun {options.out}`."
-        if options.out
-        else f"Rerun shows {body}.",
+        f"{out}: {body}; open it with `rerun {out}`." if out else f"Rerun shows {body}.",
         f"In Foxglove or Lichtblick: open the local file {options.file}, then import the layout "
         f"{layout}.",
         "The layout's plots of legs are of the quadruped: other robots need their own indices.",
@@ -100,13 +85,8 @@ def view(options: View) -> None:
 
 
 def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
-    """Writes a trial and its simulation as a file of Rerun and returns its number of bytes.
-
-    Raises:
-        InputError: Rerun is not installed.
-        LogWriteError: The disk is full, or failed.
-    """
-    recording = import_rerun().RecordingStream(APPLICATION)
+    """Writes a trial and its simulation as a file of Rerun and returns its number of bytes."""
+    recording = import_rerun().RecordingStream("selfmodel")
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "recording.rrd"
         recording.save(part)
@@ -118,24 +98,19 @@ def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
 
 
 def open_viewer(given: ReplayedLog, found: Replay, port: int = PORT) -> None:
-    """Opens Rerun's viewer, in a process of its own, with a trial and its simulation.
-
-    A viewer that runs already shows the recording too. A new one is bound to this computer, which
-    ``rerun.spawn`` cannot do: a viewer of its own listens on all network interfaces.
+    """Shows a trial and its simulation in the viewer that has the port, or in a new one.
 
     Raises:
-        InputError: Rerun is not installed, or there is no display.
         WorkError: The viewer did not start, was closed before it had the recording, or another
             program has the port.
     """
-    check_display()
-    recording = import_rerun().RecordingStream(APPLICATION)
+    recording = import_rerun().RecordingStream("selfmodel")
     if not is_listening(port):
         _start_viewer(port)
     recording.connect_grpc(f"rerun+http://{HOST}:{port}/proxy")
     fill_recording(recording, given, found)
     try:
-        recording.flush(timeout_sec=FLUSH_SECONDS)
+        recording.flush(timeout_sec=SECONDS)
     except RuntimeError as error:
         raise WorkError(
             f"Rerun's viewer ended before it had the recording, or port {port} is that of another "
@@ -149,18 +124,12 @@ def _start_viewer(port: int) -> None:
     Raises:
         WorkError: It did not start.
     """
-    try:
-        viewer = subprocess.Popen(  # noqa: S603  # Rerun's own command
-            viewer_command(port),
-            stdin=subprocess.DEVNULL,
-            # A reader of this command's output waits for no viewer.
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise WorkError(f"Rerun's viewer did not start: {error.strerror}") from error
-    end = monotonic() + START_SECONDS
+    null = subprocess.DEVNULL  # a reader of this command's output waits for no viewer
+    command = viewer_command(port)
+    viewer = subprocess.Popen(  # noqa: S603  # Rerun's own command
+        command, stdin=null, stdout=null, stderr=null, start_new_session=True
+    )
+    end = monotonic() + SECONDS
     while not is_listening(port):
         if viewer.poll() is not None:
             raise WorkError(
@@ -170,12 +139,12 @@ def _start_viewer(port: int) -> None:
         if monotonic() > end:
             viewer.kill()
             viewer.wait()
-            raise WorkError(f"Rerun's viewer did not listen on port {port} in {START_SECONDS:g} s")
+            raise WorkError(f"Rerun's viewer did not listen on port {port} in {SECONDS:g} s")
         sleep(0.05)
 
 
 def viewer_command(port: int) -> list[str]:
-    """Returns the command of a viewer that listens on this computer alone."""
+    """Returns the command of a viewer that listens on this computer alone, unlike rerun.spawn's."""
     # -P: a folder such as rerun_cli in the current folder is not imported.
     command = [sys.executable, "-P", "-m", "rerun_cli", "--bind", HOST, "--port", str(port)]
     # As rerun.spawn has them: the share of the memory, and no welcome before the recording.
@@ -215,13 +184,7 @@ def check_display(environment: Mapping[str, str] = os.environ) -> None:
 
 
 def fill_recording(recording: Any, given: ReplayedLog, found: Replay) -> None:  # noqa: ANN401  # Rerun
-    """Sends both bodies, the joints and the errors of a trial to a recording, and its layout.
-
-    Args:
-        recording: The recording, a ``rerun.RecordingStream``.
-        given: The logged trial, and the hypothesis.
-        found: The simulation, compared with it.
-    """
+    """Sends both bodies, the joints and the errors of a trial to a ``rerun.RecordingStream``."""
     rr = import_rerun()
     logged = given.log.trial.trajectory
     motions = [(LOGGED, logged), (SIMULATED, found.simulated)]
@@ -234,7 +197,7 @@ def fill_recording(recording: Any, given: ReplayedLog, found: Replay) -> None:  
     )
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
-    times = [rr.TimeColumn(TIMELINE, duration=film.time)]
+    times = [rr.TimeColumn("trial time", duration=film.time)]
 
     def send_line(path: tuple[str, ...], values: FloatArray, colour: Colour | None = None) -> None:
         """Sends a number per step as a line of a plot; a missing number is a gap."""
@@ -258,18 +221,17 @@ def _send_body(recording: Any, film: Film, qpos: FloatArray, name: str, times: l
     """Sends the shapes of a body once, and its pose at every step."""
     rr = import_rerun()
     model = film.model
-    poses = body_poses(model, qpos)
+    poses = motion.body_poses(model, qpos)
     paths: dict[int, tuple[str, ...]] = {}
-    for body in bodies_of(model, model.body(film.root).name):
+    for body in motion.bodies_of(model, model.body(film.root).name):
         path = ("world", name, model.body(body).name or f"body_{body}")
         moved = rr.Transform3D.columns(
             translation=poses[:, body, :3], quaternion=xyzw(poses[:, body, 3:])
         )
         recording.send_columns(rr.new_entity_path(path), times, moved)
         paths[int(body)] = path
-    for shape in shapes_of(model, np.flatnonzero(visible_geoms(model))):
-        if shape.body not in paths:
-            continue
+    shown = motion.visible_geoms(model) & film.own
+    for shape in motion.shapes_of(model, np.flatnonzero(shown)):
         colour = JAMMED if shape.body in film.jammed else COLOURS[name]
         colour = DETACHED if shape.body in film.detached else colour
         drawn = archetype(model, shape, colour, transparent=name == SIMULATED)
@@ -277,19 +239,17 @@ def _send_body(recording: Any, film: Film, qpos: FloatArray, name: str, times: l
         recording.log(entity, drawn, static=True)
 
 
-def archetype(model: mujoco.MjModel, shape: Shape, colour: Colour, *, transparent: bool) -> Any:  # noqa: ANN401  # one of several archetypes
+def archetype(
+    model: mujoco.MjModel, shape: motion.Shape, colour: Colour, *, transparent: bool
+) -> Any:  # noqa: ANN401  # one of several archetypes
     """Returns a shape in the frame of its body as an archetype of Rerun.
 
-    Args:
-        model: Model of the shape.
-        shape: The shape.
-        colour: Its colour.
-        transparent: Whether faces are transparent and edges drawn; a mesh always has faces.
+    A transparent one has edges, but for a mesh, which always has faces.
     """
     rr = import_rerun()
     place, turn, size = shape.position, shape.quaternion, shape.size
     if shape.kind == "mesh":
-        vertices, faces = triangles_of(model, shape.mesh)
+        vertices, faces = motion.triangles_of(model, shape.mesh)
         return rr.Mesh3D(
             vertex_positions=rotated(vertices, turn) + place,
             triangle_indices=faces,

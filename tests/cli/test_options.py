@@ -10,7 +10,6 @@ import pytest
 from selfmodel import api, plugins
 from selfmodel.cli import commands, inputs
 from selfmodel.cli.groups import options, parameters_of
-from selfmodel.cli.view import PORT
 from selfmodel.recovery.map_elites import make_repertoire
 from selfmodel.settings import Settings
 from selfmodel.studies import plans
@@ -62,10 +61,6 @@ def test_a_default_of_a_command_is_that_of_the_library(
             assert expected in (value, PARSERS[name](value)), name
         elif isinstance(expected, bool | int | float | str) and value is not None:
             assert value == expected, name
-
-
-def test_the_port_of_the_viewer_is_one_default():
-    assert defaults(commands.View)["port"] == PORT
 
 
 def test_every_option_of_the_table_is_of_a_command():
