@@ -27,10 +27,10 @@ def robot_of(log: TrialLog) -> Robot:
         return SchemaMismatchError(log.trial.path, what, good=GOOD)
 
     try:
-        checked = checked_model(log.mjcf, log.assets)
-        check_compiles(checked.mjcf, checked.files, log.control_timestep)
+        mjcf, files = checked_model(log.mjcf, log.assets)
+        check_compiles(mjcf, files, log.control_timestep)
         with uncounted_warnings():
-            robot = Robot(log.trial.robot, checked.mjcf, log.control_timestep, checked.files)
+            robot = Robot(log.trial.robot, mjcf, log.control_timestep, files)
     except WorkError:  # a failure of this computer says nothing about the log
         raise
     except MUJOCO_ERRORS as error:

@@ -23,7 +23,7 @@ from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.designs import DESIGNS
-from selfmodel.robot.mjcf.load import adapt, check_compiles, load_mjcf
+from selfmodel.robot.mjcf.load import check_compiles, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
@@ -251,11 +251,6 @@ def robot_entry(name: str, settings: Sequence[str] = ()) -> Entry:
     # dm_control would load an OpenGL library.
     os.environ.setdefault("MUJOCO_GL", "disable")
     return entry(name)
-
-
-def notes_on(name: str, settings: Sequence[str]) -> tuple[str, ...]:
-    """Returns the changes that made an MJCF or URDF file a robot; see ``robot_entry``."""
-    return adapt(Path(name), _settings(name, settings)).notes
 
 
 def _settings(name: str, given: Sequence[str]) -> MjcfSettings:

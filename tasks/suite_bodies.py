@@ -19,7 +19,7 @@ from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.anatomy import added_steps
-from selfmodel.robot.mjcf.load import adapt_text, robot_from
+from selfmodel.robot.mjcf.load import adapt_text
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.untrusted import InMemory, parse_xml
 from selfmodel.robot.mjcf.work import read_mjcf
@@ -112,8 +112,7 @@ def robot(domain: str, task: str) -> Robot:
     if domain == "swimmer":
         keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmer_keyframe(_links(task)))
     settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
-    named = name(domain, task)
-    return robot_from(adapt_text(named, text, assets, settings), named)
+    return adapt_text(name(domain, task), text, assets, settings)
 
 
 def specification(domain: str, task: str) -> mujoco.MjSpec:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from selfmodel.arguments import is_model, notes_on, robot_entry
+from selfmodel.arguments import is_model, robot_entry
 from selfmodel.cli.commands import Robots
 from selfmodel.cli.output import print_json, print_lines
 from selfmodel.cli.tables import folding, print_tables
@@ -23,9 +23,8 @@ def robots(options: Robots) -> None:
         else:
             _print_all(every)
         return
-    settings = options.model_settings or ()
-    entry = robot_entry(options.robot, settings)
-    notes = notes_on(options.robot, settings) if is_model(options.robot) else ()
+    entry = robot_entry(options.robot, options.model_settings or ())
+    notes = entry.robot().notes if is_model(options.robot) else ()
     facts = {**_facts(entry), **_parts(entry.robot()), "notes": list(notes)}
     if options.as_json:
         print_json(facts)

@@ -49,6 +49,7 @@ class Robot:
         mjcf: The MJCF as one XML text without includes; ``assets`` contains its files.
         control_timestep: Time between two commands, s.
         assets: Contents of the files that the MJCF names, such as meshes, by file name.
+        notes: What was changed about the user's file to make it the MJCF, one sentence each.
         model: The compiled model.
         anatomy: Joints, sensors and motors.
         root: Name of the root body, whose displacement is the displacement of the robot; a robot
@@ -59,6 +60,7 @@ class Robot:
     mjcf: str
     control_timestep: float
     assets: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    notes: tuple[str, ...] = field(default=(), repr=False)
     model: mujoco.MjModel = field(init=False, repr=False)
     anatomy: Anatomy = field(init=False, repr=False)
     root: str = field(init=False)

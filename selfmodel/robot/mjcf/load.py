@@ -8,7 +8,7 @@ that a log with both contains the robot.
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,32 +18,12 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.isolation import Message, run_isolated
-from selfmodel.robot.mjcf.equipment import (
-    add_command_ranges,
-    add_sensors,
-    add_servos,
-    limit_reach,
-)
-from selfmodel.robot.mjcf.meshes import drop_textures, reduce_meshes, replace_missing_meshes
-from selfmodel.robot.mjcf.pose import (
-    add_ground,
-    bake_keyframe,
-    carry_hinges,
-    fix_base,
-    free_base,
-    turn_forward,
-)
+from selfmodel.robot.mjcf import equipment, meshes, pose, structure
 from selfmodel.robot.mjcf.settings import (
     MAX_CONTROL_TIMESTEP,
     MjcfSettings,
     checked_settings,
     read_settings,
-)
-from selfmodel.robot.mjcf.structure import (
-    drop_large_reservations,
-    expand,
-    name_parts,
-    remove_hidden_state,
 )
 from selfmodel.robot.mjcf.untrusted import (
     MAX_TEXT,
@@ -66,30 +46,14 @@ MAX_SUBSTEPS = 1000
 _MODULE = "selfmodel.robot.mjcf.load"
 
 
-@dataclass(frozen=True, eq=False)
-class AdaptedMjcf:
-    """An MJCF after adaptation to the requirements of a robot.
-
-    Attributes:
-        name: Name of the robot.
-        mjcf: The MJCF as one XML text without includes; ``assets`` contains its files.
-        control_timestep: Time between two commands, s.
-        assets: Contents of the files that the text names, by name.
-        notes: Descriptions of the changes to the user's text, one sentence each.
-    """
-
-    name: str
-    mjcf: str
-    control_timestep: float
-    assets: Mapping[str, bytes]
-    notes: tuple[str, ...]
-
-
 def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     """Returns the robot that an MJCF or URDF file describes; see docs/reference/mjcf.md.
 
+    A child process reads and compiles it.
+
     Args:
-        path: The file, which is read only. It may name the files that ``adapt`` describes.
+        path: The file, which is read only. It may include and name files of its folder, of the
+            folder above in a usual layout, and of the folder ``assets`` of the settings.
         settings: Properties that the file does not contain; None for the settings of the TOML file
             of the same name.
 
@@ -99,45 +63,12 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     file = Path(path)
     # Settings made in Python have not been validated.
     checked = read_settings(file) if settings is None else checked_settings(asdict(settings))
-    adapted = adapt(file, checked)
-    return robot_from(adapted, str(file))
-
-
-def robot_from(adapted: AdaptedMjcf, source: str) -> Robot:
-    """Returns the robot of an adapted MJCF.
-
-    Args:
-        adapted: Adapted MJCF, as returned by ``adapt`` or ``adapt_text``.
-        source: The name of the MJCF in an error message.
-
-    Raises:
-        InputError: The adapted model is no valid robot.
-    """
+    data = read_file(file, "an MJCF or URDF file", MAX_TEXT)
+    request = Message({"path": str(file), "settings": asdict(checked)}, {"file": data})
     try:
-        return Robot(adapted.name, adapted.mjcf, adapted.control_timestep, adapted.assets)
+        return _robot(run_isolated(f"{_MODULE}:adapt_message", request, what="the model"))
     except ValueError as error:
-        raise InputError(f"{source}: {' '.join(str(error).split())}") from error
-
-
-def adapt(path: Path, settings: MjcfSettings) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a file, which a child process reads and compiles.
-
-    Args:
-        path: The file, which may include and name files of its folder, of the folder above in a
-            usual layout (``root_around``), and of the folder ``assets`` of the settings.
-        settings: Properties that the file does not contain.
-
-    Raises:
-        InputError: The file cannot be a robot; the message has the reason and the remedy.
-    """
-    data = read_file(path, "an MJCF or URDF file", MAX_TEXT)
-    request = Message({"path": str(path), "settings": asdict(settings)}, {"file": data})
-    try:
-        answer = run_isolated(f"{_MODULE}:adapt_message", request, what="the model")
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    notes = tuple(answer.header["notes"])
-    return AdaptedMjcf(**{**answer.header, "notes": notes, "assets": answer.buffers})
+        raise _named(str(file), error) from error
 
 
 def adapt_message(request: Message) -> Message:
@@ -156,15 +87,13 @@ def adapt_message(request: Message) -> Message:
         )
     else:
         work = read_mjcf(root, files, settings, path.name)
-    adapted = _adapted(encodable(path.stem), work)
-    header = {name: value for name, value in vars(adapted).items() if name != "assets"}
-    return Message(header, adapted.assets)
+    return _adapted(encodable(path.stem), work)
 
 
 def adapt_text(
     name: str, mjcf: str, files: Mapping[str, bytes | str], settings: MjcfSettings
-) -> AdaptedMjcf:
-    """Returns the adapted MJCF of a trusted text in memory, which this process compiles.
+) -> Robot:
+    """Returns the robot of a trusted MJCF in memory, which this process compiles.
 
     Args:
         name: Name of the robot.
@@ -176,47 +105,57 @@ def adapt_text(
         InputError: The text cannot be a robot; the message has the reason and the remedy.
     """
     try:
-        return _adapted(name, read_mjcf(parse_xml(mjcf), InMemory(files), settings))
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from error
+        return _robot(_adapted(name, read_mjcf(parse_xml(mjcf), InMemory(files), settings)))
+    except ValueError as error:
+        raise _named(name, error) from error
 
 
-def _adapted(name: str, work: Work) -> AdaptedMjcf:
-    """Returns the adapted MJCF; the steps are in an order in which each finds what it needs."""
+def _robot(adapted: Message) -> Robot:
+    notes = tuple(adapted.header["notes"])
+    return Robot(**{**adapted.header, "notes": notes}, assets=adapted.buffers)
+
+
+def _named(source: str, error: ValueError) -> InputError:
+    return InputError(f"{source}: {' '.join(str(error).split())}")
+
+
+def _adapted(name: str, work: Work) -> Message:
+    """Returns the robot's attributes; the steps are in an order in which each finds its needs."""
     try:
         named_files(work.root, work.assets)  # before MuJoCo compiles the model
     except InputError as error:
         raise InputError(
             f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
         ) from error
-    drop_large_reservations(work)
-    expand(work)
-    name_parts(work)
+    settings = work.settings
+    structure.drop_large_reservations(work)
+    structure.expand(work)
+    structure.name_parts(work)
     for body in work.bodies():
         if body.attrib.pop("mocap", "false") == "true":
             work.notes.append(f"the mocap body {body.get('name')} is static")
-    if work.settings.base == "free":
-        free_base(work)
-    drop_textures(work)
-    carry_hinges(work)
-    replace_missing_meshes(work)
-    reduce_meshes(work)
+    if settings.base == "free":
+        pose.free_base(work)
+    meshes.drop_textures(work)
+    pose.carry_hinges(work)
+    meshes.replace_missing_meshes(work)
+    meshes.reduce_meshes(work)
     check_usable(work.model)
     timestep = _control_timestep(work)
-    remove_hidden_state(work)
-    bake_keyframe(work)
-    turn_forward(work)
-    if work.settings.base == "fixed":
-        fix_base(work)
-    add_ground(work)
-    add_sensors(work)
-    if work.settings.kp or work.settings.kd:
-        add_servos(work)
-    if work.settings.reach:
-        limit_reach(work)
-    add_command_ranges(work)
-    files = named_files(work.root, work.assets)
-    return AdaptedMjcf(name, work.text, timestep, files, tuple(work.notes))
+    structure.remove_hidden_state(work)
+    pose.bake_keyframe(work)
+    pose.turn_forward(work)
+    if settings.base == "fixed":
+        pose.fix_base(work)
+    pose.add_ground(work)
+    equipment.add_sensors(work)
+    if settings.kp or settings.kd:
+        equipment.add_servos(work)
+    if settings.reach:
+        equipment.limit_reach(work)
+    equipment.add_command_ranges(work)
+    attributes = {"name": name, "mjcf": work.text, "control_timestep": timestep}
+    return Message({**attributes, "notes": work.notes}, named_files(work.root, work.assets))
 
 
 def _control_timestep(work: Work) -> float:
@@ -248,16 +187,7 @@ def _control_timestep(work: Work) -> float:
 
 
 def check_compiles(mjcf: str, assets: Mapping[str, bytes], control_timestep: float) -> None:
-    """Checks that a robot's model can be compiled and stepped; once for each of the last models.
-
-    Args:
-        mjcf: The MJCF as one text without includes.
-        assets: Contents of the files that the MJCF names, by name.
-        control_timestep: Time between two commands, s.
-
-    Raises:
-        InputError: The model cannot be compiled, or is no valid robot.
-    """
+    """Raises ``InputError`` unless a robot's model compiles and steps; the last models are kept."""
     _check(mjcf, tuple(assets.items()), control_timestep)
 
 

@@ -6,12 +6,10 @@ time of the model are limited by the child process that compiles it first.
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from errno import ELOOP
-from os.path import realpath
 from pathlib import Path, PurePosixPath
-from posixpath import basename, normpath
-from types import MappingProxyType
+from posixpath import basename, expanduser, isdir, normpath, realpath
 from xml.etree import ElementTree as ET  # _PlainTree refuses document types and deep trees
 
 from selfmodel.errors import InputError
@@ -26,15 +24,13 @@ MAX_FILE = 128 * 2**20
 MAX_DEPTH = 200
 """Largest number of XML elements within each other."""
 
-REFUSED_ELEMENTS: Mapping[str, str] = MappingProxyType(
-    {
-        "include": "reads another file",
-        "attach": "reads another model",
-        "model": "reads another model",
-        "plugin": "runs other code",
-        "extension": "runs other code",
-    }
-)
+REFUSED_ELEMENTS: Mapping[str, str] = {
+    "include": "reads another file",
+    "attach": "reads another model",
+    "model": "reads another model",
+    "plugin": "runs other code",
+    "extension": "runs other code",
+}
 """Elements that a model in a log may not have, and their effects."""
 
 ASSET_ENDINGS = (".stl", ".obj", ".msh", ".png", ".ktx", ".skn", ".bin")
@@ -81,22 +77,11 @@ class _PlainTree(ET.TreeBuilder):
         return super().end(tag)
 
 
-@dataclass(frozen=True)
-class CheckedModel:
-    """A model that names attached files only.
+def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> tuple[str, dict[str, bytes]]:
+    """Returns the model of a log and the attachments that it names, after all checks.
 
-    Attributes:
-        mjcf: The MJCF, serialised from the checked elements: constructs that another parser might
-            read differently, such as entities, are removed.
-        files: Contents of the files that the model names, by name.
-    """
-
-    mjcf: str
-    files: Mapping[str, bytes]
-
-
-def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
-    """Returns the model of a log with the attachments that it names, after all checks.
+    The text is serialised from the checked elements: constructs that another parser might read
+    differently, such as entities, are removed.
 
     Raises:
         InputError: The model is no XML, is nested too deeply, or names other files; the message
@@ -106,15 +91,11 @@ def checked_model(mjcf: str, attached: Mapping[str, bytes]) -> CheckedModel:
         raise InputError(f"the model has {len(mjcf)} characters, more than {MAX_TEXT}")
     root = parse_xml(mjcf)
     files = named_files(root, attached)
-    return CheckedModel(ET.tostring(root, encoding="unicode"), MappingProxyType(files))
+    return ET.tostring(root, encoding="unicode"), files
 
 
 def named_files(root: ET.Element, attached: Mapping[str, bytes]) -> dict[str, bytes]:
     """Returns the files that a model names, after a check that a log can contain the model.
-
-    Args:
-        root: The ``<mujoco>`` element.
-        attached: Contents of files by name.
 
     Raises:
         InputError: The model is no MJCF, reads other models, runs other code, or names a file that
@@ -125,12 +106,11 @@ def named_files(root: ET.Element, attached: Mapping[str, bytes]) -> dict[str, by
     files: dict[str, bytes] = {}
     folder = ""
     for element in root.iter():
-        if element.tag in REFUSED_ELEMENTS:
+        if effect := REFUSED_ELEMENTS.get(element.tag):
             named = element.get("file") or element.get("plugin") or element.get("name")
             raise InputError(
-                f"the model has <{element.tag}>{f' ({named!r})' if named else ''}, which "
-                f"{REFUSED_ELEMENTS[element.tag]}: expected a model without <{element.tag}> in a "
-                f"log"
+                f"the model has <{element.tag}>{f' ({named!r})' if named else ''}, which {effect}: "
+                f"expected a model without <{element.tag}> in a log"
             )
         for attribute, text in filter(lambda item: item[1], element.items()):
             if attribute.startswith("file"):
@@ -187,12 +167,12 @@ class Folder:
     Attributes:
         path: Folder of the MJCF.
         root: Folder around all files of the robot; see ``root_around``.
-        assets: Further folder with files that the MJCF names; None for none.
+        assets: Further folder with files that the MJCF names; "" for none.
     """
 
     path: Path
     root: Path
-    assets: Path | None = None
+    assets: str = ""
 
     def has(self, name: str) -> bool:
         """Returns whether the file exists."""
@@ -212,59 +192,39 @@ class Folder:
         place = self._find(name)
         if place is not None:
             return read_file(place, what, limit)
-        if any(map(_is_loop, self._places(name))):
+        if _is_path(name) and self._may_read(realpath(self.path / name)):
             raise InputError(
-                f"the MJCF names {what}, which is a loop of links: replace the link by the file"
-            )
-        if self._may_read(self.path / name):
-            raise InputError(
-                f"the MJCF names {what}, which is no file in {self.path}: put the file there, or "
-                f"{_REMEDY}"
+                f"the MJCF names {what}, which is no file in {self.path}, or a loop of links: put "
+                f"the file there, or {_REMEDY}"
             )
         raise InputError(
             f"the MJCF names {what} outside its own folder, {name!r}: put the file into "
             f"{self.root}, or {_REMEDY}"
         )
 
+    def _find(self, name: str) -> Path | None:
+        for place in self._places(name):
+            with suppress(OSError):  # missing, a loop of links, or a name that is too long
+                if self._may_read(realpath(place, strict=True)) and place.is_file():
+                    return place
+        return None
+
     def _places(self, name: str) -> Iterator[Path]:
-        if len(name) > _MAX_NAME:
+        if not _is_path(name):
             return
         yield self.path / name
-        if self.assets is not None:
+        if self.assets:
             parts = [part for part in PurePosixPath(name).parts if part not in ("..", "/", "//")]
             for start in range(len(parts)):
-                yield self.assets.joinpath(*parts[start:])
+                yield Path(self.assets, *parts[start:])
 
-    def _find(self, name: str) -> Path | None:
-        return next(filter(self._is_file, self._places(name)), None)
-
-    def _is_file(self, place: Path) -> bool:
-        try:
-            return self._may_read(place) and place.is_file()
-        except OSError:  # a name that is too long for the file system
-            return False
-
-    def _may_read(self, place: Path) -> bool:
-        folders = [folder for folder in (self.root, self.assets) if folder is not None]
-        try:
-            return any(_real(place).is_relative_to(_real(folder)) for folder in folders)
-        except ValueError:  # a path with a zero byte
-            return False
+    def _may_read(self, real: str) -> bool:
+        folders = [self.root, self.assets] if self.assets else [self.root]
+        return any(Path(real).is_relative_to(realpath(folder)) for folder in folders)
 
 
-def _real(path: Path) -> Path:
-    """Returns where a path leads to; a loop of links leads to itself (``resolve`` raises)."""
-    return Path(realpath(path))
-
-
-def _is_loop(place: Path) -> bool:
-    try:
-        place.stat()
-    except OSError as error:
-        return error.errno == ELOOP
-    except ValueError:  # a path with a zero byte
-        return False
-    return False
+def _is_path(name: str) -> bool:
+    return len(name) <= _MAX_NAME and "\0" not in name
 
 
 def robot_folder(folder: Path, assets: str = "") -> Folder:
@@ -273,16 +233,9 @@ def robot_folder(folder: Path, assets: str = "") -> Folder:
     Raises:
         InputError: The further folder ``assets`` is given and does not exist.
     """
-    if assets and not _is_folder(assets):
+    if assets and not isdir(assets):
         raise InputError(f"assets needs a folder with files of the robot, got {assets!r}")
-    return Folder(folder, root_around(folder), Path(assets) if assets else None)
-
-
-def _is_folder(path: str) -> bool:
-    try:
-        return Path(path).is_dir()
-    except OSError:  # a name that is too long for the file system
-        return False
+    return Folder(folder, root_around(folder), assets)
 
 
 def root_around(folder: Path) -> Path:
@@ -292,20 +245,15 @@ def root_around(folder: Path) -> Path:
     such as ``mjcf``, or there is a folder such as ``meshes`` beside it. It is never the home folder
     or a folder around that.
     """
-    above = _real(folder).parent
-    usual = _real(folder).name in _MODEL_FOLDERS or any(
-        (above / name).is_dir() for name in _ASSET_FOLDERS
-    )
-    return above if usual and not is_around_home(above) else folder
+    real = Path(realpath(folder))
+    usual = real.name in _MODEL_FOLDERS or any(isdir(real.parent / name) for name in _ASSET_FOLDERS)
+    return real.parent if usual and not is_around_home(real.parent) else folder
 
 
 def is_around_home(folder: Path) -> bool:
     """Returns whether a folder is the home folder, or contains the home folder."""
-    try:
-        home = Path.home()
-    except RuntimeError:  # the user has no home folder
-        return folder == folder.parent
-    return folder == folder.parent or _real(home).is_relative_to(folder)
+    home = Path(realpath(expanduser("~")))
+    return folder == folder.parent or home.is_relative_to(folder)
 
 
 @dataclass(frozen=True)

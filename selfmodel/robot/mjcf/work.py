@@ -5,7 +5,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
-from posixpath import dirname, join, normpath
+from posixpath import basename, dirname, join, normpath, splitext
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
@@ -90,12 +90,10 @@ class Work:
         orientations: FloatArray,
         references: Collection[tuple[int, float]] = (),
     ) -> None:
-        """Writes the frames and references that differ from those of the model.
+        """Writes the frames of bodies and references of joints that differ from the model's.
 
-        Args:
-            positions: Position of each body in its parent's frame, ``(bodies, 3)`` m.
-            orientations: Orientation of each body in its parent's frame, ``(bodies, 4)``, w x y z.
-            references: New reference of joints by their ids, m or rad.
+        They are ``(bodies, 3)`` m and ``(bodies, 4)``, w x y z, in the frames of the parents; and
+        the reference of a joint by its id, m or rad.
         """
         model, elements = self.model, self.named_bodies()
         for body in range(1, model.nbody):
@@ -117,14 +115,10 @@ class Work:
 
 
 class UniqueNames:
-    """Unique names for the parts of one kind.
-
-    Args:
-        names: Names in use.
-    """
+    """Unique names for the parts of one kind, given the names in use."""
 
     def __init__(self, names: Iterable[str | None]) -> None:
-        self._names = {name for name in names if name}
+        self._names = set(names)
         self._numbers: dict[str, int] = {}
 
     def new(self, base: str) -> str:
@@ -142,17 +136,6 @@ def format_numbers(values: np.ndarray) -> str:
     # MuJoCo cannot read subnormal numbers.
     normal = np.where(np.abs(values) < np.finfo(np.float64).tiny, 0.0, values)
     return " ".join(repr(float(value)) for value in normal)
-
-
-def plain_name(path: str, taken: Collection[str]) -> str:
-    """Returns a unique name for an attachment of a log: no folders, no special characters."""
-    name = re.sub(r"[^A-Za-z0-9_.-]", "_", PurePosixPath(path).name).lstrip(".-") or "file"
-    stem, dot, ending = name.rpartition(".")
-    number = 2
-    while name in taken:
-        name = f"{stem}_{number}{dot}{ending}"
-        number += 1
-    return name
 
 
 def read_mjcf(
@@ -180,13 +163,9 @@ def read_mjcf(
 
 
 def _include(parent: ET.Element, files: Files, folder: str, included: set[str]) -> None:
-    """Replaces each ``<include>`` by the content of its file, recursively.
+    """Replaces each ``<include>`` by the content of its file, recursively, in place.
 
-    Args:
-        parent: Element whose descendants are replaced, in place.
-        files: Source of the files.
-        folder: Folder of the file that contains ``parent``.
-        included: Paths of the files that are included already; extended.
+    ``folder`` is that of the file that contains ``parent``; ``included`` files are added.
     """
     for index, child in reversed(list(enumerate(parent))):
         if child.tag != "include":
@@ -232,15 +211,15 @@ def _read_assets(work: Work, files: Files) -> None:
 
 
 def add_asset(work: Work, files: Files, path: str, element: str) -> str:
-    """Reads a file into the assets, and returns its name there.
-
-    Raises:
-        InputError: The file is missing, outside the folder, or too large with the others.
-    """
+    """Reads a file into the assets, and returns its name there."""
     data = files.read(path, f"the file of a {element}", MAX_FILE)
     if sum(map(len, work.assets.values())) + len(data) > MAX_FILE:
         raise InputError(f"the files of the model have over {MAX_FILE} bytes: simplify them")
-    name = plain_name(path, work.assets)
+    # An attachment of a log: no folders, no special characters.
+    stem, ending = splitext(re.sub(r"[^A-Za-z0-9_.-]", "_", basename(path)).lstrip(".-") or "file")
+    name, number = stem + ending, 2
+    while name in work.assets:
+        name, number = f"{stem}_{number}{ending}", number + 1
     work.assets[name] = data
     return name
 

@@ -3,7 +3,7 @@
 from functools import lru_cache
 from importlib.resources import files
 
-from selfmodel.robot.mjcf.load import adapt_text, robot_from
+from selfmodel.robot.mjcf.load import adapt_text
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 
@@ -50,7 +50,7 @@ def arm_mjcf(base: str = PEDESTAL) -> str:
 
 def robot_of(mjcf: str, **settings: object) -> Robot:
     """Returns the robot of an MJCF under settings."""
-    return robot_from(adapt_text("robot", mjcf, {}, MjcfSettings(**settings)), "robot")
+    return adapt_text("robot", mjcf, {}, MjcfSettings(**settings))
 
 
 @lru_cache

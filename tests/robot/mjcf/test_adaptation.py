@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.robot.actuators import command_ranges
-from selfmodel.robot.mjcf.load import adapt, load_mjcf
+from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from tests.helpers.exactness import remove_warm_start
 from tests.robot.mjcf.awkward import GROUND, LEGS, MOTORS, TORSO, mjcf
@@ -144,7 +144,7 @@ def test_special_characters_are_replaced_in_names_and_references(tmp_path: Path)
 
     assert robot.anatomy.hinges == ("le_ft_hip", "right_hip")
     assert robot.model.nexclude == 1
-    assert any("le+ft_hip" in note for note in adapt(tmp_path / "robot.xml", MjcfSettings()).notes)
+    assert any("le+ft_hip" in note for note in robot.notes)
 
 
 def test_the_settings_choose_the_sensors(tmp_path: Path):

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf import untrusted
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, read_settings
 from selfmodel.robot.mjcf.untrusted import Folder, robot_folder, root_around
@@ -53,7 +52,7 @@ def test_the_home_folder_and_those_around_it_belong_to_no_package(
     home = tmp_path / "users" / "me"
     put(home / above / "meshes" / "trunk.stl")
     put(home / above / "mjcf" / "robot.xml")
-    monkeypatch.setattr(untrusted.Path, "home", lambda: home)
+    monkeypatch.setenv("HOME", str(home))
 
     folder = home / above / "mjcf"
 

@@ -17,7 +17,7 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.mjcf import load
-from selfmodel.robot.mjcf.load import AdaptedMjcf, adapt, adapt_message, load_mjcf, robot_from
+from selfmodel.robot.mjcf.load import adapt_message, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.structure import MIN_ITERATIONS, expand
 from selfmodel.robot.mjcf.work import Work
@@ -108,14 +108,10 @@ WARM_START = int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
-def adapted(folder: Path, more: str) -> AdaptedMjcf:
+def adapted(folder: Path, more: str) -> Robot:
     path = folder / "robot.xml"
     path.write_text(mjcf(more=more), encoding="utf-8")
-    return adapt(path, MjcfSettings())
-
-
-def options(copy: AdaptedMjcf) -> mujoco.MjOption:
-    return mujoco.MjModel.from_xml_string(copy.mjcf, dict(copy.assets)).opt
+    return load_mjcf(path)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +124,7 @@ def options(copy: AdaptedMjcf) -> mujoco.MjOption:
 )
 def test_warm_start_and_sleep_are_off_and_a_note_says_so(more: str, tmp_path: Path):
     copy = adapted(tmp_path, more)
-    found = options(copy)
+    found = copy.model.opt
 
     assert found.disableflags & WARM_START
     assert not found.enableflags & SLEEP
@@ -141,7 +137,7 @@ def test_warm_start_and_sleep_are_off_and_a_note_says_so(more: str, tmp_path: Pa
 def test_the_iterations_of_a_solver_that_stops_early_are_raised(tmp_path: Path):
     more = '<option iterations="7"/><option iterations="1" ls_iterations="5"/>'
     copy = adapted(tmp_path, more)
-    found = options(copy)
+    found = copy.model.opt
 
     assert (found.iterations, found.ls_iterations) == tuple(MIN_ITERATIONS.values())
     assert any("iterations from 1 to 100, ls_iterations from 5 to 50" in n for n in copy.notes)
@@ -150,7 +146,7 @@ def test_the_iterations_of_a_solver_that_stops_early_are_raised(tmp_path: Path):
 def test_a_file_without_hidden_state_keeps_its_options(tmp_path: Path):
     copy = adapted(tmp_path, '<option iterations="1"><flag warmstart="disable"/></option>')
 
-    assert options(copy).iterations == 1
+    assert copy.model.opt.iterations == 1
     assert not any("warm start" in note for note in copy.notes)
 
 
@@ -166,13 +162,12 @@ def path_of(robot: Robot, stride: float) -> np.ndarray:
 def test_a_go1_of_one_iteration_moves_as_with_its_warm_start(stride: float, tmp_path: Path):
     path = tmp_path / "go1.xml"
     path.write_text(go1(), encoding="utf-8")
-    copy = adapt(path, MjcfSettings())
-    original = copy.mjcf.replace('warmstart="disable"', 'warmstart="enable"')
+    ours = load_mjcf(path)
+    original = ours.mjcf.replace('warmstart="disable"', 'warmstart="enable"')
     for name, least in MIN_ITERATIONS.items():
         own = {"iterations": 1, "ls_iterations": 5}[name]
         original = original.replace(f' {name}="{least}"', f' {name}="{own}"')
-    theirs = robot_from(AdaptedMjcf("go1", original, 0.012, {}, ()), "go1.xml")
-    ours = robot_from(copy, "go1.xml")
+    theirs = Robot("go1", original, 0.012)
     before, after = (path_of(robot, stride) for robot in (theirs, ours))
 
     assert theirs.model.opt.iterations == 1

@@ -9,7 +9,7 @@ import pytest
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.mjcf import meshes
-from selfmodel.robot.mjcf.load import adapt, adapt_text, load_mjcf, robot_from
+from selfmodel.robot.mjcf.load import adapt_text, load_mjcf
 from selfmodel.robot.mjcf.meshes import DRAWN_POINTS, directions
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
@@ -31,8 +31,8 @@ def adapted(
     monkeypatch.setattr(meshes, "MAX_ASSET_BYTES", limit)
     files = {f"../meshes/{f.name}": f.read_bytes() for f in (folder / "go" / "meshes").iterdir()}
     text = (folder / "go" / "xml" / "go.xml").read_text(encoding="utf-8")
-    found = adapt_text("go", text, files, MjcfSettings())
-    return robot_from(found, "go"), found.notes
+    robot = adapt_text("go", text, files, MjcfSettings())
+    return robot, robot.notes
 
 
 def points(model: mujoco.MjModel, geom: int) -> np.ndarray:
@@ -166,8 +166,7 @@ def test_a_robot_without_the_files_of_its_visual_meshes_moves_the_same(tmp_path:
     bare = load_mjcf(file)
 
     assert np.array_equal(motion(whole), motion(bare))
-    notes = adapt(file, MjcfSettings()).notes
-    assert any("3 visual meshes have no file" in note for note in notes)
+    assert any("3 visual meshes have no file" in note for note in bare.notes)
 
 
 def test_each_body_is_drawn_as_the_box_of_its_inertia(tmp_path: Path):

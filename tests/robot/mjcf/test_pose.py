@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.errors import InputError
-from selfmodel.robot.mjcf.load import adapt, load_mjcf
+from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.pose import STAND_CLEARANCE
 from selfmodel.robot.mjcf.settings import MjcfSettings, checked_settings
 from tests.helpers.robots.arms import PEDESTAL, arm_mjcf, robot_of
@@ -93,7 +93,7 @@ def test_a_robot_starts_in_the_usual_keyframe_or_the_first(
     )
     path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
 
-    notes = adapt(path, MjcfSettings()).notes
+    notes = load_mjcf(path).notes
 
     assert f"the initial pose is the keyframe {chosen}" in notes
 
