@@ -18,11 +18,8 @@ _SCALAR_JOINTS = (_HINGE, int(mujoco.mjtJoint.mjJNT_SLIDE))
 _WRAPPED_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
 _WRAPPED_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 _WRAPPED_GEOM = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
-_SETTLES_AT_COMMAND = (
-    int(mujoco.mjtDyn.mjDYN_NONE),
-    int(mujoco.mjtDyn.mjDYN_FILTER),
-    int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
-)
+_DYN = mujoco.mjtDyn
+_SETTLES_AT_COMMAND = (int(_DYN.mjDYN_NONE), int(_DYN.mjDYN_FILTER), int(_DYN.mjDYN_FILTEREXACT))
 """Activation dynamics with the command as their steady state."""
 
 
@@ -95,10 +92,13 @@ def tendon_joints(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
 
 def tendon_bodies(model: mujoco.MjModel, tendon: int) -> frozenset[int]:
     """Returns the ids of the bodies on the path of a tendon, all required for its effect."""
-    joints = model.jnt_bodyid[_wrapped(model, tendon, (_WRAPPED_JOINT,))]
-    sites = model.site_bodyid[_wrapped(model, tendon, (_WRAPPED_SITE,))]
-    geoms = model.geom_bodyid[_wrapped(model, tendon, _WRAPPED_GEOM)]
-    return frozenset(np.concatenate([joints, sites, geoms]).tolist())
+    owners = (
+        (model.jnt_bodyid, (_WRAPPED_JOINT,)),
+        (model.site_bodyid, (_WRAPPED_SITE,)),
+        (model.geom_bodyid, _WRAPPED_GEOM),
+    )
+    bodies = [owner[_wrapped(model, tendon, kinds)] for owner, kinds in owners]
+    return frozenset(np.concatenate(bodies).tolist())
 
 
 def _path(model: mujoco.MjModel, tendon: int) -> slice:
@@ -154,7 +154,7 @@ def _range(model: mujoco.MjModel, motor: int) -> Range | None:
     biased = model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_AFFINE
     if (
         not gain
-        or int(model.actuator_dyntype[motor]) not in _SETTLES_AT_COMMAND
+        or model.actuator_dyntype[motor] not in _SETTLES_AT_COMMAND
         or model.actuator_gaintype[motor] != mujoco.mjtGain.mjGAIN_FIXED
         or not (biased or model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_NONE)
     ):

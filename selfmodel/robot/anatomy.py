@@ -121,10 +121,6 @@ _DELAY_TOLERANCE = 1e-4
 def control_delay(model: "MjModel", substeps: int) -> float:
     """Returns the control delay of a model, in control steps; see ``as_delay``.
 
-    Args:
-        model: A compiled model.
-        substeps: Physics steps per control step.
-
     Raises:
         ValueError: The custom numeric is not from 0 to ``MAX_CONTROL_DELAY``, not a whole number of
             physics steps, or not a whole number of control steps in a model with activations.
@@ -141,12 +137,7 @@ def control_delay(model: "MjModel", substeps: int) -> float:
 
 
 def as_delay(parts: int, substeps: int) -> float:
-    """Returns a control delay in control steps; an ``int`` if it is a whole number of them.
-
-    Args:
-        parts: The control delay in physics steps.
-        substeps: Physics steps per control step.
-    """
+    """Returns a delay in physics steps in control steps; an ``int`` if they are whole."""
     return parts // substeps if parts % substeps == 0 else parts / substeps
 
 
@@ -158,16 +149,12 @@ def split_delay(delay: float, substeps: int) -> tuple[int, int]:
 def added_steps(delay: float, added: float) -> int:
     """Returns the whole control steps by which a control delay grows under a fault.
 
-    Args:
-        delay: Control delay of the healthy robot, in control steps.
-        added: Severity of the fault, in control steps; rounded, and limited so that the sum is at
-            most ``MAX_CONTROL_DELAY``.
+    The severity of the fault is rounded, so that the sum is at most ``MAX_CONTROL_DELAY``.
     """
     return min(round(added), math.floor(MAX_CONTROL_DELAY - delay))
 
 
 def custom_numeric(model: "MjModel", name: str) -> float | None:
     """Returns the first value of a custom numeric; None if the model does not contain it."""
-    if name not in (model.numeric(i).name for i in range(model.nnumeric)):
-        return None
-    return float(model.numeric(name).data[0])
+    values = (model.numeric(i) for i in range(model.nnumeric))
+    return next((float(value.data[0]) for value in values if value.name == name), None)

@@ -1,7 +1,8 @@
 """Reads the anatomy of a robot, and its root body, from its compiled model."""
 
 import math
-from itertools import takewhile
+from collections import Counter
+from os.path import commonprefix
 
 import mujoco
 import numpy as np
@@ -11,11 +12,9 @@ from selfmodel.robot.actuators import ancestors, has_feedback, motor_bodies, mot
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
 from selfmodel.trials.rotation import product, rotated
 
-_FREE, _SLIDE, _HINGE = (
-    int(mujoco.mjtJoint.mjJNT_FREE),
-    int(mujoco.mjtJoint.mjJNT_SLIDE),
-    int(mujoco.mjtJoint.mjJNT_HINGE),
-)
+_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def driven_joints(model: mujoco.MjModel) -> frozenset[int]:
@@ -38,14 +37,9 @@ def joint_limits(model: mujoco.MjModel, hinge: int) -> tuple[float, float]:
 
 
 def reference_pose(model: mujoco.MjModel, body: int) -> tuple[FloatArray, FloatArray]:
-    """Returns position and orientation of a body of static bodies in the reference configuration.
+    """Returns the reference pose in the world of a body whose ancestors are static.
 
-    Args:
-        model: A compiled MJCF.
-        body: Id of a body whose ancestors are static.
-
-    Returns:
-        Position, ``(3,)`` m, and orientation, ``(4,)``, w x y z, in the world.
+    It is a position, ``(3,)`` m, and an orientation, ``(4,)``, w x y z.
     """
     position, orientation = model.body_pos[body].copy(), model.body_quat[body].copy()
     for parent in ancestors(model, body)[1:]:
@@ -56,15 +50,11 @@ def reference_pose(model: mujoco.MjModel, body: int) -> tuple[FloatArray, FloatA
 
 
 def read_anatomy(model: mujoco.MjModel, root: int) -> Anatomy:
-    """Returns the anatomy of a robot: its named parts.
+    """Returns the named parts of a robot, of a model that ``check_model`` accepts.
 
     The hinges of one body form one joint if a motor moves at least one of them. The joint has the
     common prefix of their names, or else the name of the body. Touch sensors and joint position
-    sensors are the inputs of the controller.
-
-    Args:
-        model: A compiled MJCF that ``check_model`` accepts.
-        root: Id of the root body, whose joints belong to no limb.
+    sensors are the inputs of the controller. The joints of the root body belong to no limb.
 
     Raises:
         ValueError: Two joints would have the same name.
@@ -130,11 +120,9 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
         body: _common_prefix([model.joint(j).name for j in group]) or own[body]
         for body, group in groups.items()
     }
-    shared = list(prefixes.values())
-    names = {
-        body: name if shared.count(name) == 1 else own[body] for body, name in prefixes.items()
-    }
-    repeated = {name for name in names.values() if list(names.values()).count(name) > 1}
+    shared = Counter(prefixes.values())
+    names = {body: name if shared[name] == 1 else own[body] for body, name in prefixes.items()}
+    repeated = [name for name, count in Counter(names.values()).items() if count > 1]
     if repeated:
         raise ValueError(
             f"expected a different name for each joint, got two joints with the name "
@@ -145,8 +133,7 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
 
 
 def _common_prefix(names: list[str]) -> str:
-    same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-    return "".join(letters[0] for letters in same).rstrip("_")
+    return commonprefix(names).rstrip("_")  # noqa: RUF071  # of names, not of paths
 
 
 def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:
@@ -170,10 +157,6 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
     The root body is the body with a free joint or with slide joints. Without such a body the base
     is fixed, and the root body is the static body that carries all driven joints: of several, the
     one nearest to the joints.
-
-    Args:
-        model: A compiled MJCF.
-        driven: Ids of the joints that motors move.
 
     Raises:
         ValueError: The model has several floating bases; or none, and slide joints on a body of the
@@ -213,10 +196,6 @@ def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
 
     They have a free joint; or else they are bodies of the world with independent slide joints and
     then at most one hinge, and no motor moves them.
-
-    Args:
-        model: A compiled MJCF.
-        driven: Ids of the joints that motors move.
     """
     free: list[int] = model.jnt_bodyid[model.jnt_type == _FREE].tolist()
     if free:
@@ -236,12 +215,7 @@ def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
 def common_carrier(model: mujoco.MjModel, joints: frozenset[int]) -> int:
     """Returns the id of the static body nearest to some joints that carries all of them.
 
-    Args:
-        model: A compiled MJCF.
-        joints: Ids of at least one joint.
-
-    Returns:
-        The id of the body; 0, the world, if no other static body carries all the joints.
+    It is 0, the world, if no other static body does.
     """
     chains = [
         {0}.union(b for b in ancestors(model, int(body))[1:] if not model.body_weldid[b])

@@ -122,7 +122,7 @@ def _lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geoms: IndexArray)
 def penetration_depths(
     robot: Robot, positions: FloatArray, lost: Collection[int] = ()
 ) -> FloatArray:
-    """Returns the largest depth to which two bodies of a robot penetrate each other, per pose.
+    """Returns the largest depth to which two bodies of a robot penetrate each other, per pose, m.
 
     All bodies are compared, whether or not contacts of the two are simulated, but for two that are
     rigidly connected, that are neighbours in the kinematic tree, or that penetrate each other in
@@ -134,9 +134,6 @@ def penetration_depths(
         robot: The robot.
         positions: Angles of its hinges, rad, ``(poses, hinges)``.
         lost: Ids of bodies that are not compared.
-
-    Returns:
-        Depths, m, ``(poses,)``; 0 without a penetration.
     """
     model = _collision_model(robot)
     if lost:
@@ -202,12 +199,7 @@ def _solid_geoms(robot: Robot) -> BoolArray:
 
 
 def _adjacent(model: mujoco.MjModel, solid: BoolArray) -> Iterator[tuple[int, int]]:
-    """Yields the bodies that are rigidly connected or neighbours; bodies without a shape are none.
-
-    Args:
-        model: Model of the robot.
-        solid: Whether each geom is of the shape of the robot, ``(ngeom,)``.
-    """
+    """Yields the bodies with a shape that are rigidly connected or neighbours."""
     bodies = sorted(set(model.geom_bodyid[solid].tolist()))
     group: list[int] = model.body_weldid.tolist()
     shaped = {group[body] for body in bodies}

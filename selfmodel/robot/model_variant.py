@@ -82,21 +82,12 @@ class ModelVariant:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, anatomy: Anatomy, seed: int = 0) -> "ModelVariant":
-        """Returns the variant of a nominal model: a copy, with unmodified readings.
-
-        Args:
-            model: A compiled model of the robot.
-            anatomy: The robot's parts.
-            seed: Seed of the random parts of faults.
-        """
-        sensors = len(anatomy.sensors)
+        """Returns the variant of a nominal model: a copy, with unmodified readings."""
+        gain, offset, bias, noise = np.array([[1.0], [0.0], [0.0], [0.0]]).repeat(
+            len(anatomy.sensors), axis=1
+        )
         return cls(
-            model=copy.copy(model),
-            gain=np.ones(sensors),
-            offset=np.zeros(sensors),
-            bias=np.zeros(sensors),
-            noise=np.zeros(sensors),
-            added_delay=np.zeros(1),
+            *(copy.copy(model), gain, offset, bias, noise, np.zeros(1)),
             encoder_offset=np.zeros(len(anatomy.hinges)),
             seed=seed,
         )
@@ -122,7 +113,7 @@ class ModelVariant:
             if body in tendon_bodies(model, tendon):
                 _slacken(model, tendon)
         for constraint in range(model.neq):
-            if body in _constrained_bodies(model, constraint):
+            if body in _constrained(model, constraint)[1]:
                 model.eq_active0[constraint] = 0
         # Contact masks do not affect explicit contact pairs.
         paired = geoms[model.pair_geom1] | geoms[model.pair_geom2]
@@ -153,7 +144,7 @@ class ModelVariant:
             if tendon_joints(model, tendon) <= welded:
                 _slacken(model, tendon)
         for constraint in range(model.neq):
-            joints = _constrained_joints(model, constraint)
+            joints, _ = _constrained(model, constraint)
             if joints and joints <= welded:
                 model.eq_active0[constraint] = 0
         for motor in range(model.nu):
@@ -167,15 +158,10 @@ class ModelVariant:
         self.model.actuator_biasprm[motor] = 0.0
 
     def weaken_motors(self, motors: Sequence[int], factor: float) -> None:
-        """Scales the forces and the force limits of motors.
-
-        Args:
-            motors: Ids of the motors.
-            factor: Factor of the force, from 0 to 1.
-        """
-        self.model.actuator_gainprm[motors] *= factor
-        self.model.actuator_biasprm[motors] *= factor
-        self.model.actuator_forcerange[motors] *= factor
+        """Scales the forces and the force limits of motors, given by id."""
+        model = self.model
+        for forces in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
+            forces[motors] *= factor
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
@@ -233,14 +219,10 @@ class ModelVariant:
         model.pair_friction[paired, :2] *= factor
 
     def load_body(self, name: str, fraction: float, forward: float) -> None:
-        """Adds a point mass to the root body of a robot.
+        """Adds a point mass, a fraction of the mass of the healthy robot, to the root body.
 
-        Args:
-            name: Name of the root body.
-            fraction: The mass, as a fraction of the mass of the healthy robot.
-            forward: Place of the mass along the forward direction of the initial pose: 0 is the
-                centre of mass of the body, 1 and -1 are its ends, by the box of even density with
-                the mass and inertia of the body.
+        Its place is along the forward direction of the initial pose: 0 is the centre of mass of the
+        body, 1 and -1 are its ends, by the box of even density with its mass and inertia.
         """
         body = self.model.body(name)
         # Of the model before the faults: ``mj_setConst`` is called after all of them.
@@ -282,12 +264,7 @@ class ModelVariant:
         self.offset[sensor] *= factor
 
     def shift_reading(self, sensor: int, shift: float) -> None:
-        """Adds a constant to what a sensor measures; its gain applies to the constant too.
-
-        Args:
-            sensor: Column of the sensor.
-            shift: The constant, in units of the nominal reading.
-        """
+        """Adds a constant to what a sensor measures; its gain applies to the constant too."""
         self.offset[sensor] += self.gain[sensor] * shift
 
     def fix_reading(self, sensor: int, value: float) -> None:
@@ -325,17 +302,9 @@ def turned_by_hinge(
     anchor: FloatArray,
     angle: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns the frame of a body after a rotation about one of its hinges.
+    """Returns the frame of a body after a rotation about one of its hinges, rad.
 
-    Args:
-        position: Position of the body in its parent's frame, ``(3,)`` m.
-        orientation: Orientation of the body in its parent's frame, ``(4,)``, w x y z.
-        axis: Axis of the hinge in the body frame, ``(3,)``.
-        anchor: Position of the hinge in the body frame, ``(3,)`` m.
-        angle: Angle of the rotation, rad.
-
-    Returns:
-        The new position, ``(3,)``, and the new orientation, ``(4,)``.
+    The frame of the body is in that of its parent, axis and anchor of the hinge in the body's.
     """
     rotation, rotated = np.empty(4), np.empty(4)
     mujoco.mju_axisAngle2Quat(rotation, axis, angle)
@@ -360,13 +329,10 @@ def _matrix(quaternion: FloatArray) -> FloatArray:
 
 
 def _add_point_mass(body: mujoco.MjModel, mass: float, offset: FloatArray) -> None:
-    """Adds a point mass to a body, which is edited in place.
+    """Adds a point mass, kg, to a body, which is edited in place.
 
-    Args:
-        body: View of the body in its model.
-        mass: The mass, kg.
-        offset: Position of the mass relative to the body's centre of mass, in the frame of the
-            body, ``(3,)``, m; with zeros, the inertia is unchanged to the bit.
+    Its offset is from the body's centre of mass, in the frame of the body, ``(3,)``, m; with zeros,
+    the inertia is unchanged to the bit.
     """
     before = float(body.mass[0])
     body.mass = before + mass
@@ -412,21 +378,14 @@ def _weight(mix: float, other: float) -> float:
     """Returns the weight of a geom in a mean, given the ``solmix`` of both geoms."""
     if mix >= _MIN_MIX and other >= _MIN_MIX:
         return mix / (mix + other)
-    if mix < _MIN_MIX and other < _MIN_MIX:
-        return 0.5
-    return float(mix >= _MIN_MIX)
+    return 0.5 + 0.5 * ((mix >= _MIN_MIX) - (other >= _MIN_MIX))
 
 
 def _rebase_equality(model: mujoco.MjModel, joint: int, shift: float) -> None:
     """Rewrites joint equality constraints for a new reference angle; their effect is unchanged.
 
     A joint equality constraint relates the angles from the references of both joints, by a
-    polynomial of the second joint's angle.
-
-    Args:
-        model: The model, edited in place.
-        joint: Id of the joint whose reference has changed.
-        shift: New minus old reference angle, rad.
+    polynomial of the second joint's angle. ``shift`` is the new minus the old reference, rad.
     """
     for constraint in np.flatnonzero(model.eq_type == _EQ_JOINT):
         if model.eq_obj2id[constraint] == joint:
@@ -447,29 +406,16 @@ def _slacken(model: mujoco.MjModel, tendon: int) -> None:
         force[tendon] = 0.0
 
 
-def _constrained(model: mujoco.MjModel, constraint: int) -> tuple[int, list[int]]:
-    """Returns the type of an equality constraint and the ids of its objects."""
-    objects = (int(model.eq_obj1id[constraint]), int(model.eq_obj2id[constraint]))
-    return int(model.eq_type[constraint]), [number for number in objects if number >= 0]
-
-
-def _constrained_joints(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
-    """Returns the ids of the joints of a joint or tendon equality constraint, or none."""
-    kind, objects = _constrained(model, constraint)
-    if kind == _EQ_JOINT:
-        return frozenset(objects)
+def _constrained(model: mujoco.MjModel, constraint: int) -> tuple[frozenset[int], frozenset[int]]:
+    """Returns the joints that an equality constraint couples, if any, and the bodies involved."""
+    ends = model.eq_obj1id[constraint], model.eq_obj2id[constraint]
+    objects = [int(number) for number in ends if number >= 0]
+    kind, nothing = int(model.eq_type[constraint]), frozenset[int]()
     if kind == _EQ_TENDON:
-        return frozenset[int]().union(*(tendon_joints(model, o) for o in objects))
-    return frozenset()
-
-
-def _constrained_bodies(model: mujoco.MjModel, constraint: int) -> frozenset[int]:
-    """Returns the ids of the bodies that an equality constraint involves."""
-    kind, objects = _constrained(model, constraint)
-    if kind == _EQ_TENDON:
-        return frozenset[int]().union(*(tendon_bodies(model, o) for o in objects))
+        bodies = nothing.union(*(tendon_bodies(model, one) for one in objects))
+        return nothing.union(*(tendon_joints(model, one) for one in objects)), bodies
     if kind == _EQ_JOINT:
-        return frozenset(model.jnt_bodyid[objects].tolist())
+        return frozenset(objects), frozenset(model.jnt_bodyid[objects].tolist())
     if int(model.eq_objtype[constraint]) == _SITE:
-        return frozenset(model.site_bodyid[objects].tolist())
-    return frozenset(objects)
+        objects = model.site_bodyid[objects].tolist()
+    return nothing, frozenset(objects)

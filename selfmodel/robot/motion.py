@@ -108,14 +108,9 @@ def positions_of(
 
 
 def body_poses(model: mujoco.MjModel, qpos: FloatArray) -> FloatArray:
-    """Returns the pose of each body in the world, by forward kinematics.
+    """Returns the poses of the bodies along positions of a model, ``(steps, nq)``.
 
-    Args:
-        model: The model.
-        qpos: Its positions, ``(steps, nq)``.
-
-    Returns:
-        Position x y z, m, and quaternion w x y z of each body, ``(steps, nbody, 7)``.
+    They are positions x y z, m, and quaternions w x y z in the world, ``(steps, nbody, 7)``.
     """
     data = mujoco.MjData(model)
     poses = np.empty((len(qpos), model.nbody, 7))

@@ -73,14 +73,7 @@ def uncounted_warnings() -> Iterator[None]:
 
 @contextmanager
 def mujoco_errors_as_input_errors(task: str) -> Iterator[None]:
-    """Converts MuJoCo's exceptions to ``InputError``.
-
-    Args:
-        task: Task that MuJoCo fails at, such as ``"load the model"``, for the message.
-
-    Raises:
-        InputError: MuJoCo raised an exception.
-    """
+    """Converts MuJoCo's exceptions at a task, such as ``"load the model"``, to ``InputError``."""
     configure()
     try:
         yield
@@ -107,10 +100,6 @@ def loading_a_model() -> Iterator[None]:
 
 
 def compile_model(mjcf: str, assets: dict[str, bytes]) -> mujoco.MjModel:
-    """Returns the compiled model of an MJCF.
-
-    Raises:
-        InputError: MuJoCo cannot compile the MJCF.
-    """
+    """Returns the compiled model of an MJCF, or raises ``InputError``."""
     with loading_a_model():
         return mujoco.MjModel.from_xml_string(mjcf, assets)

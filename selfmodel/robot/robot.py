@@ -126,8 +126,8 @@ class Robot:
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _UNSUPPORTED_JOINTS = {
-    int(mujoco.mjtJoint.mjJNT_SLIDE): "is a slide joint",
-    int(mujoco.mjtJoint.mjJNT_BALL): "is a ball joint",
+    int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
+    int(mujoco.mjtJoint.mjJNT_BALL): "ball",
 }
 _DYN, _GAIN, _BIAS = mujoco.mjtDyn, mujoco.mjtGain, mujoco.mjtBias
 _SUPPORTED = {
@@ -157,10 +157,6 @@ _ITERATIONS = (
 def check_model(model: mujoco.MjModel, root: int) -> None:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
 
-    Args:
-        model: A compiled MJCF.
-        root: Id of the root body.
-
     Raises:
         ValueError: The model has an unsupported part, or a number that is not finite or absurdly
             large; the message contains the name of the part.
@@ -179,8 +175,8 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
         kind = int(model.jnt_type[j])
         if j not in base_joints and kind in _UNSUPPORTED_JOINTS:
             raise ValueError(
-                f"the model's joint {_label(model.joint(j))} {_UNSUPPORTED_JOINTS[kind]}: expected "
-                f"hinges only, except between the world and the root body"
+                f"the model's joint {_label(model.joint(j))} is a {_UNSUPPORTED_JOINTS[kind]} "
+                f"joint: expected hinges only, except between the world and the root body"
             )
     if model.nflex or model.nplugin:
         raise ValueError(

@@ -6,7 +6,6 @@ walkers of the dm_control suite; or it is fixed to the world, such as that of an
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -28,6 +27,9 @@ Bind = Callable[[str], FloatArray]
 Reader = Callable[[], FloatArray]
 """Returns the current value of a signal, ``(n, width)``; the value may be a view of the state."""
 
+SignalSource = Callable[[Bind], Reader]
+"""Returns a function that reads a signal from the bound state."""
+
 StateWriter = Callable[[Mapping[Signal, FloatArray]], None]
 """Writes signals, ``(n, width)`` each, into the state; absent signals, and joints whose value is
 NaN, keep their values."""
@@ -40,72 +42,48 @@ BASE_SIGNALS: tuple[Signal, ...] = (
 )
 """Signals of the base."""
 
+Columns = slice | list[int]
 
-@dataclass(frozen=True, eq=False)
-class StateField:
-    """A signal that MuJoCo's state contains: columns of a field of MjData.
 
-    Attributes:
-        field: Name of the field, such as ``qpos``.
-        columns: Columns of the field.
-        shift: Signal minus field, ``(n, width)``; None for no difference.
-    """
+def _field(name: str, chosen: Columns, shift: FloatArray | None = None) -> SignalSource:
+    """Returns the source of a signal in columns of a field, plus ``shift``, ``(n, width)``."""
 
-    field: str
-    columns: slice | list[int]
-    shift: FloatArray | None = None
-
-    def reader(self, bind: Bind) -> Reader:
-        """Returns a function that reads the signal from the bound state."""
-        values, chosen, shift = bind(self.field), self.columns, self.shift
+    def bound(bind: Bind) -> Reader:
+        values = bind(name)
         if shift is None:
             return lambda: values[:, chosen]
         return lambda: values[:, chosen] + shift
 
+    return bound
 
-@dataclass(frozen=True)
-class DerivedSignal:
-    """A signal that is computed from positions and velocities.
 
-    Attributes:
-        compute: Function from ``qpos``, ``(n, nq)``, and ``qvel``, ``(n, nv)``, to the signal,
-            ``(n, width)``.
-    """
+def _derived(compute: Callable[[FloatArray, FloatArray], FloatArray]) -> SignalSource:
+    """Returns the source of a signal that is computed from ``qpos`` and ``qvel``."""
 
-    compute: Callable[[FloatArray, FloatArray], FloatArray]
-
-    def reader(self, bind: Bind) -> Reader:
-        """Returns a function that computes the signal from the bound state."""
+    def bound(bind: Bind) -> Reader:
         qpos, qvel = bind("qpos"), bind("qvel")
-        return lambda: self.compute(qpos, qvel)
+        return lambda: compute(qpos, qvel)
 
-
-SignalSource = StateField | DerivedSignal
-"""Where the value of a signal is in MuJoCo's state."""
+    return bound
 
 
 class FreeBase:
-    """A floating base with a free joint.
-
-    Args:
-        position: Index of the first component of the pose in ``qpos``.
-        velocity: Index of the first component of the velocity in ``qvel``.
-    """
+    """A floating base with a free joint, at an index in ``qpos`` and one in ``qvel``."""
 
     def __init__(self, position: int, velocity: int) -> None:
-        self.fields: dict[Signal, SignalSource] = {
-            "base_position": StateField("qpos", slice(position, position + 3)),
-            "base_orientation": StateField("qpos", slice(position + 3, position + 7)),
-            "base_linear_velocity": StateField("qvel", slice(velocity, velocity + 3)),
-            "base_angular_velocity": StateField("qvel", slice(velocity + 3, velocity + 6)),
+        self._places: dict[Signal, tuple[str, slice]] = {
+            "base_position": ("qpos", slice(position, position + 3)),
+            "base_orientation": ("qpos", slice(position + 3, position + 7)),
+            "base_linear_velocity": ("qvel", slice(velocity, velocity + 3)),
+            "base_angular_velocity": ("qvel", slice(velocity + 3, velocity + 6)),
         }
+        self.fields = {signal: _field(*place) for signal, place in self._places.items()}
 
     def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
         """Writes signals of the base, ``(n, width)``, into the state; absent ones keep theirs."""
-        for signal, field in self.fields.items():
-            if signal in base and isinstance(field, StateField):
-                array = qpos if field.field == "qpos" else qvel
-                array[:, field.columns] = base[signal]
+        for signal, (name, chosen) in self._places.items():
+            if signal in base:
+                (qpos if name == "qpos" else qvel)[:, chosen] = base[signal]
 
 
 class FixedBase:
@@ -120,22 +98,19 @@ class FixedBase:
     def __init__(self, models: Sequence[mujoco.MjModel], body: int) -> None:
         # One model serves many rows of a batch of segments.
         poses = {key: reference_pose(m, body) for key, m in {id(m): m for m in models}.items()}
-        positions, orientations = (
-            np.array(rows) for rows in zip(*(poses[id(model)] for model in models), strict=True)
-        )
-        self.fields: dict[Signal, SignalSource] = {
-            "base_position": _constant(positions),
-            "base_orientation": _constant(orientations),
-            "base_linear_velocity": _constant(np.zeros((1, 3))),
-            "base_angular_velocity": _constant(np.zeros((1, 3))),
+        positions, orientations = zip(*(poses[id(model)] for model in models), strict=True)
+        constants = np.array(positions), np.array(orientations), *np.zeros((2, 1, 3))
+        self.fields = {
+            signal: _derived(_constant(rows))
+            for signal, rows in zip(BASE_SIGNALS, constants, strict=True)
         }
 
     def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
         """Leaves the state unchanged: signals of a fixed base are not part of it."""
 
 
-def _constant(rows: FloatArray) -> DerivedSignal:
-    return DerivedSignal(lambda qpos, _qvel: np.broadcast_to(rows, (len(qpos), rows.shape[1])))
+def _constant(rows: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    return lambda qpos, _qvel: np.broadcast_to(rows, (len(qpos), rows.shape[1]))
 
 
 class SlidingBase:
@@ -163,12 +138,8 @@ class SlidingBase:
         self._axes = model.jnt_axis[slides]
         self._axis = model.jnt_axis[joints[-1]].copy() if turns else np.array([0.0, 0.0, 1.0])
         self._anchor = model.jnt_pos[joints[-1]].copy() if turns else np.zeros(3)
-        self.fields: dict[Signal, SignalSource] = {
-            "base_position": DerivedSignal(self._positions),
-            "base_orientation": DerivedSignal(self._orientations),
-            "base_linear_velocity": DerivedSignal(self._velocities),
-            "base_angular_velocity": DerivedSignal(self._rates),
-        }
+        derived = self._positions, self._orientations, self._velocities, self._rates
+        self.fields = dict(zip(BASE_SIGNALS, map(_derived, derived), strict=True))
 
     def write(self, qpos: FloatArray, qvel: FloatArray, base: Mapping[Signal, FloatArray]) -> None:
         """Writes signals of the base, ``(n, width)``, into the state; absent ones keep theirs.
@@ -276,9 +247,12 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
     """
     models = models or (robot.model,)
     motors = columns([int(models[0].actuator(name).id) for name in robot.anatomy.motors])
+    positions, velocities = _joint_columns(robot, models[0])
     return {
-        "commands": StateField("ctrl", motors),
-        **_joint_fields(robot, models[0]),
+        "commands": _field("ctrl", motors),
+        "joint_positions": _field("qpos", positions),
+        "joint_velocities": _field("qvel", velocities),
+        "joint_efforts": _field("qfrc_actuator", velocities),
         **read_base(models, robot.root).fields,
     }
 
@@ -293,8 +267,8 @@ def observed_fields(robot: Robot, variants: Sequence[ModelVariant]) -> dict[Sign
     fields = signal_fields(robot, *(variant.model for variant in variants))
     offsets = np.array([variant.encoder_offset for variant in variants])
     if offsets.any():
-        joints = _joint_fields(robot, variants[0].model)["joint_positions"]
-        fields["joint_positions"] = dataclasses.replace(joints, shift=offsets)
+        positions, _ = _joint_columns(robot, variants[0].model)
+        fields["joint_positions"] = _field("qpos", positions, offsets)
     return fields
 
 
@@ -308,13 +282,17 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
     """
     models = models or (robot.model,)
     qpos, qvel = bind("qpos"), bind("qvel")
-    base, joints = read_base(models, robot.root), _joint_fields(robot, models[0])
+    positions, velocities = _joint_columns(robot, models[0])
+    base = read_base(models, robot.root)
+    joints: dict[Signal, tuple[FloatArray, Columns]] = {
+        "joint_positions": (qpos, positions),
+        "joint_velocities": (qvel, velocities),
+    }
 
     def write(state: Mapping[Signal, FloatArray]) -> None:
-        arrays: dict[Signal, FloatArray] = {"joint_positions": qpos, "joint_velocities": qvel}
-        for signal, array in arrays.items():
+        for signal, (array, hinges) in joints.items():
             if signal in state:
-                hinges, values = joints[signal].columns, state[signal]
+                values = state[signal]
                 unknown = np.isnan(values)
                 known = np.where(unknown, array[:, hinges], values) if unknown.any() else values
                 array[:, hinges] = known
@@ -323,15 +301,11 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
     return write
 
 
-def _joint_fields(robot: Robot, model: mujoco.MjModel) -> dict[Signal, StateField]:
+def _joint_columns(robot: Robot, model: mujoco.MjModel) -> tuple[Columns, Columns]:
+    """Returns the columns of a robot's hinges in ``qpos`` and in ``qvel``."""
     hinges = [model.joint(name) for name in robot.anatomy.hinges]
     positions = columns([int(hinge.qposadr[0]) for hinge in hinges])
-    velocities = columns([int(hinge.dofadr[0]) for hinge in hinges])
-    return {
-        "joint_positions": StateField("qpos", positions),
-        "joint_velocities": StateField("qvel", velocities),
-        "joint_efforts": StateField("qfrc_actuator", velocities),
-    }
+    return positions, columns([int(hinge.dofadr[0]) for hinge in hinges])
 
 
 def bind_data(data: mujoco.MjData) -> Bind:
@@ -346,17 +320,13 @@ def bind_data(data: mujoco.MjData) -> Bind:
 
 def current_value(field: SignalSource, data: mujoco.MjData) -> FloatArray:
     """Returns a copy of the current value of a signal of a single robot, ``(width,)``."""
-    return np.array(field.reader(bind_data(data))()[0])
+    return np.array(field(bind_data(data))()[0])
 
 
 def with_known_base(robot: Robot, trajectory: Trajectory) -> Trajectory:
     """Returns a trajectory with its robot's physics steps, and a known base if the base is fixed.
 
     Values that were observed are unchanged.
-
-    Args:
-        robot: The robot of the trajectory.
-        trajectory: Trajectory of one run.
     """
     if trajectory.substeps != robot.substeps:
         trajectory = dataclasses.replace(trajectory, substeps=robot.substeps)
@@ -366,9 +336,8 @@ def with_known_base(robot: Robot, trajectory: Trajectory) -> Trajectory:
     known = dict[Signal, FloatArray]()
     for signal in BASE_SIGNALS:
         constant = current_value(fields[signal], data)
-        observed = trajectory.signals.get(
-            signal, np.full((trajectory.steps, len(constant)), np.nan)
-        )
+        unknown = np.full((trajectory.steps, len(constant)), np.nan)
+        observed = trajectory.signals.get(signal, unknown)
         known[signal] = np.where(np.isnan(observed), constant, observed)
     return dataclasses.replace(trajectory, signals={**trajectory.signals, **known})
 
@@ -404,8 +373,10 @@ class SensorReader:
         variants: Sequence[ModelVariant],
         copies: int = 1,
     ) -> None:
-        touches = [sensor for sensor in anatomy.sensors if sensor.kind == "touch"]
-        angles = [sensor for sensor in anatomy.sensors if sensor.kind == "angle"]
+        touches, angles = (
+            [sensor for sensor in anatomy.sensors if sensor.kind == kind]
+            for kind in ("touch", "angle")
+        )
         self._touches = len(touches)
         self._touch = columns([int(model.sensor(sensor.name).adr[0]) for sensor in touches])
         self._angle = columns([int(model.joint(sensor.hinge).qposadr[0]) for sensor in angles])

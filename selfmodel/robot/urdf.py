@@ -89,15 +89,8 @@ _COUNTS: Mapping[str, int] = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba":
 def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
     """Returns the work on the MJCF of a URDF, with position servos and a keyframe.
 
-    Args:
-        root: The ``<robot>`` element.
-        files: Source of the files that the URDF names.
-        settings: Settings with the gains and the pose. With ``base="free"`` the root has a free
-            joint and there is a ground, with ``base="fixed"`` neither; without ``base`` the base is
-            fixed if the root link is named ``world``.
-
-    Raises:
-        InputError: The URDF cannot be a robot; the message has the reason and the remedy.
+    With ``base="free"`` the root has a free joint and there is a ground, with ``base="fixed"``
+    neither; without ``base`` the base is fixed if the root link is named ``world``.
     """
     work = Work(ET.Element("mujoco", {"model": root.get("name") or "robot"}), settings)
     urdf = _checked(root, work)
@@ -162,37 +155,48 @@ def _checked(root: ET.Element, work: Work) -> ET.Element:
 
 def _check_tree(root: ET.Element) -> str:
     """Checks that the links and joints of a URDF form one tree, and returns the root link."""
-    children: dict[str, list[str]] = {name: [] for name in _names(root, "link")}
+    links = _names(root, "link")
     _names(root, "joint")
-    if not children:
+    if not links:
         raise InputError("the URDF has no <link>: expected the links of a robot")
+    parents = _parents(root, links)
+    for link in links:
+        chain = [link]
+        while chain[-1] in parents:
+            chain.append(parents[chain[-1]])
+            if chain[-1] in chain[:-1]:
+                raise InputError(f"the joints form a circle, which carries the link {quoted(link)}")
+            if len(chain) > MAX_LINK_DEPTH:
+                raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")
+    roots = [name for name in links if name not in parents]
+    if len(roots) > 1:
+        raise InputError(
+            f"expected one link without a parent, the root of the robot, got "
+            f"{', '.join(map(quoted, roots[:5]))}: keep the robot, and connect its links by joints"
+        )
+    return roots[0]
+
+
+def _parents(root: ET.Element, links: Collection[str]) -> dict[str, str]:
+    """Returns the parent of each link that a joint carries."""
     parents: dict[str, str] = {}
     for joint in root.findall("joint"):
-        parent, child = _ends(joint, children)
+        name = quoted(joint.get("name"))
+        for end in ("parent", "child"):
+            if _link_of(joint, end) not in links:
+                raise InputError(
+                    f"the <{end}> of the joint {name} is the link {quoted(_link_of(joint, end))}, "
+                    f"which the URDF does not have"
+                )
+        parent, child = _link_of(joint, "parent"), _link_of(joint, "child")
         if child in parents:
             raise InputError(
                 f"the link {quoted(child)} has two parents, {quoted(parents[child])} and "
                 f"{quoted(parent)}: expected a tree, so remove one of the joints "
-                f"(the second is {quoted(joint.get('name'))})"
+                f"(the second is {name})"
             )
         parents[child] = parent
-        children[parent].append(child)
-    roots = [name for name in children if name not in parents]
-    if len(roots) != 1:
-        names = ", ".join(map(quoted, roots[:5])) or "none (the joints form a circle)"
-        raise InputError(
-            f"expected one link without a parent, the root of the robot, got {names}: keep the "
-            f"robot, and connect its links by joints"
-        )
-    level, reached = roots, set(roots)
-    for _ in range(MAX_LINK_DEPTH):
-        level = [child for link in level for child in children[link]]
-        reached.update(level)
-    if level:
-        raise InputError(f"the URDF has more than {MAX_LINK_DEPTH} links in one chain")
-    if lost := [name for name in children if name not in reached]:
-        raise InputError(f"the joints form a circle, which carries the link {quoted(lost[0])}")
-    return roots[0]
+    return parents
 
 
 def _names(root: ET.Element, tag: str) -> Counter[str]:
@@ -203,17 +207,6 @@ def _names(root: ET.Element, tag: str) -> Counter[str]:
                 f"expected a different name for each <{tag}>, got {quoted(name)} {count} times"
             )
     return names
-
-
-def _ends(joint: ET.Element, links: Collection[str]) -> tuple[str, str]:
-    """Returns the parent and the child of a joint, two links of the URDF."""
-    for end in ("parent", "child"):
-        if _link_of(joint, end) not in links:
-            raise InputError(
-                f"the <{end}> of the joint {quoted(joint.get('name'))} is the link "
-                f"{quoted(_link_of(joint, end))}, which the URDF does not have"
-            )
-    return _link_of(joint, "parent"), _link_of(joint, "child")
 
 
 def _link_of(joint: ET.Element, end: str) -> str:

@@ -37,14 +37,9 @@ def mesh_elements(spec: mujoco.MjSpec) -> list[ET.Element]:
     return [
         ET.Element(
             "mesh",
-            {
-                "name": mesh.name,
-                "file": mesh.file,
-                "scale": format_numbers(mesh.scale),
-                "inertia": "shell",
-            },
+            {"name": m.name, "file": m.file, "scale": format_numbers(m.scale), "inertia": "shell"},
         )
-        for mesh in spec.meshes
+        for m in spec.meshes
     ]
 
 
@@ -185,12 +180,9 @@ def _joint(joint: mujoco.MjsJoint, frame: Frame) -> ET.Element:
 
 
 def _geom(geom: mujoco.MjsGeom, frame: Frame, *, seen: bool) -> ET.Element:
-    """Returns a geom as MJCF.
+    """Returns a geom as MJCF, in an element in which its body has a frame.
 
-    Args:
-        geom: The geom.
-        frame: Frame of its body in the element that gets the geom.
-        seen: Whether the link has visuals, so that its collisions are not drawn.
+    If the link is ``seen``, by its visuals, its collisions are not drawn.
     """
     kind, sizes = _GEOMS[geom.type]
     place = _joined(frame, (np.array(geom.pos), np.array(geom.quat)))

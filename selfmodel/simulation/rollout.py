@@ -161,9 +161,7 @@ def live_signals(
     """
     state = observed_fields(robot, variants)
     return {
-        signal: state[signal].reader(bind)
-        for signal in record
-        if signal not in ("sensors", "commands")
+        signal: state[signal](bind) for signal in record if signal not in ("sensors", "commands")
     }
 
 

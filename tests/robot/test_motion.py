@@ -28,7 +28,7 @@ def moved(robot: Robot) -> Trajectory:
 def told(robot: Robot, poses: Poses, signal: Signal) -> np.ndarray:
     """A signal of the state that the poses make up."""
     state = {"qpos": poses.qpos, "qvel": np.zeros((len(poses.qpos), robot.model.nv))}
-    return signal_fields(robot)[signal].reader(state.__getitem__)()
+    return signal_fields(robot)[signal](state.__getitem__)()
 
 
 MOVED = moved(ROBOTS["quadruped"].robot())

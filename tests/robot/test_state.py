@@ -163,8 +163,8 @@ def test_a_row_has_the_same_bits_in_any_batch(rows: int):
     state["qvel"] = rng.normal(size=(17, robot.model.nv))
     for signal in BASE:
         place = signal_fields(robot)[signal]
-        whole = place.reader(state.__getitem__)()
-        part = place.reader({name: rows_[17 - rows :] for name, rows_ in state.items()}.__getitem__)
+        whole = place(state.__getitem__)()
+        part = place({name: rows_[17 - rows :] for name, rows_ in state.items()}.__getitem__)
         np.testing.assert_array_equal(part(), whole[17 - rows :])
 
 

@@ -1,6 +1,8 @@
 """Motors and sensors of an MJCF: position servos, command ranges, angle and touch sensors."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
+from itertools import product
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
@@ -44,14 +46,10 @@ def add_servos(work: Work) -> None:
     A torque motor has a torque proportional to its command. The torque of the servo is
     kp (command - angle) - kd (angular velocity), within the same limits. Its command range is the
     range of the hinge, or ``reach`` on both sides of the initial pose for a hinge without a range.
-
-    Raises:
-        InputError: A gain is for no hinge with a torque motor, a hinge has one gain only, or the
-            commands of a hinge have no range.
     """
     model, settings = work.model, work.settings
     check_patterns({**settings.kp, **settings.kd}, _hinges(model))
-    converted: dict[tuple[float, float], int] = {}
+    converted = Counter[tuple[float, float]]()
     for motor, element in enumerate(work.children("actuator")):
         dynamic = int(model.actuator_dyntype[motor]) != int(mujoco.mjtDyn.mjDYN_NONE)
         if dynamic or not _drives_hinge(model, motor, _NO_BIAS):
@@ -67,6 +65,7 @@ def add_servos(work: Work) -> None:
                 f"both, such as kp = 40 and kd = 1"
             )
         travel = _travel(model, joint, value_of(settings.reach, name))
+        element.tag = "general"
         element.attrib = {
             "name": element.get("name", ""),
             "joint": name,
@@ -80,8 +79,7 @@ def add_servos(work: Work) -> None:
             "ctrlrange": format_numbers(travel),
             **_torque_limits(model, motor),
         }
-        element.tag = "general"
-        converted[kp, kd] = converted.get((kp, kd), 0) + 1
+        converted[kp, kd] += 1
     if not converted:
         raise InputError(
             "expected a motor with a torque as its command for kp and kd, got none: the motors of "
@@ -128,24 +126,18 @@ def limit_reach(work: Work) -> None:
 
     The new range is the part of the old range within the reach of the angle of the hinge in the
     initial pose, or of the end of the old range that is closest to this angle.
-
-    Raises:
-        InputError: A reach is for no hinge with a position servo.
     """
     model = work.model
     check_patterns(work.settings.reach, _hinges(model))
-    limited: dict[float, int] = {}
+    limited = Counter[float]()
     for motor, element in enumerate(work.children("actuator")):
+        joint = int(model.actuator_trnid[motor, 0])
         # Of a position servo, the command is the angle of the hinge, rad.
         stiffness = model.actuator_biasprm[motor, 1]
-        if (
-            not _drives_hinge(model, motor, _AFFINE)
-            or model.actuator_gear[motor, 0] != 1.0
-            or not stiffness
-            or stiffness != -model.actuator_gainprm[motor, 0]
-        ):
+        measures_angle = model.actuator_gear[motor, 0] == 1.0
+        is_servo = stiffness and stiffness == -model.actuator_gainprm[motor, 0]
+        if not (_drives_hinge(model, motor, _AFFINE) and measures_angle and is_servo):
             continue
-        joint = int(model.actuator_trnid[motor, 0])
         reach = value_of(work.settings.reach, model.joint(joint).name)
         if reach is None:
             continue
@@ -156,7 +148,7 @@ def limit_reach(work: Work) -> None:
         element.attrib.update(ctrlrange=format_numbers(ends), ctrllimited="true")
         if element.tag in _INHERITING:
             element.set("inheritrange", "0")  # MuJoCo refuses both ranges, also if one is a default
-        limited[reach] = limited.get(reach, 0) + 1
+        limited[reach] += 1
     if not limited:
         raise InputError(
             "expected a position servo of a hinge for reach, got none: set kp=40 and kd=1 to "
@@ -170,11 +162,7 @@ def limit_reach(work: Work) -> None:
 
 
 def add_command_ranges(work: Work) -> None:
-    """Adds the ``ctrlrange`` of the settings to each motor without a command range.
-
-    Raises:
-        InputError: A motor has no command range, and the settings contain no command range.
-    """
+    """Adds the ``ctrlrange`` of the settings to each motor without a command range."""
     model, ctrlrange = work.model, work.settings.ctrlrange
     if ctrlrange is not None:
         for motor, element in enumerate(work.children("actuator")):
@@ -190,11 +178,7 @@ def add_command_ranges(work: Work) -> None:
 
 
 def add_sensors(work: Work) -> None:
-    """Adds the missing angle and touch sensors, and removes sensors that measure no driven limb.
-
-    Raises:
-        InputError: The settings name a joint or body that the model does not have.
-    """
+    """Adds the missing angle and touch sensors, and removes sensors that measure no driven limb."""
     model = work.model
     driven = [j for j in sorted(driven_joints(model)) if model.jnt_type[j] == _HINGE]
     hinges = [model.joint(j).name for j in driven]
@@ -211,8 +195,7 @@ def add_sensors(work: Work) -> None:
                 )
     given = work.children("sensor")
     measured = {sensor.get("joint") for sensor in given if sensor.tag == "jointpos"}
-    wanted = work.settings.angle
-    joints = _chosen("joint with a motor", wanted, hinges, hinges, measured)
+    joints = _chosen("joint with a motor", work.settings.angle, hinges, hinges, measured)
     felt = {site_bodies[str(sensor.get("site"))] for sensor in given if sensor.tag == "touch"}
     limbs = _limbs_to_feel(work, felt)
     sensors = work.section("sensor")
@@ -230,11 +213,9 @@ def add_sensors(work: Work) -> None:
 
 
 def _limbs_to_feel(work: Work, felt: Collection[int]) -> list[str]:
-    """Returns the names of the bodies that get a touch sensor, by default the end of each limb.
+    """Returns the bodies that get a touch sensor, by default the end of each limb.
 
-    Args:
-        work: The MJCF.
-        felt: Ids of the bodies with a touch sensor.
+    ``felt`` are the ids of the bodies with one.
     """
     model = work.model
     if not contacts_enabled(model):
@@ -260,7 +241,7 @@ def _chosen(
     has: Collection[str | None],
 ) -> list[str]:
     """Returns the wanted names, or the default names, except names of parts with a sensor."""
-    names = default if wanted is None else list(wanted)
+    names = default if wanted is None else wanted
     for name in names:
         if name not in known:
             raise unknown_name(kind, name, known)
@@ -274,9 +255,9 @@ def _touch_site(model: mujoco.MjModel, body: int) -> dict[str, str]:
         if model.geom_bodyid[geom] != body:
             continue
         center, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-        for signs in np.ndindex(2, 2, 2):
-            within = center + (2 * np.array(signs) - 1) * (half + model.geom_margin[geom])
+        for signs in product((-1, 1), repeat=3):
             corner = np.empty(3)
+            within = center + np.array(signs) * (half + model.geom_margin[geom])
             mujoco.mju_rotVecQuat(corner, within, model.geom_quat[geom])
             corners.append(model.geom_pos[geom] + corner)
     lowest, highest = np.min(corners, axis=0), np.max(corners, axis=0)

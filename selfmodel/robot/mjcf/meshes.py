@@ -84,9 +84,6 @@ def reduce_meshes(work: Work) -> None:
 
     Meshes that are only drawn come first; then those with contacts, which MuJoCo computes with the
     convex hulls. The bodies keep the masses that the meshes gave them.
-
-    Raises:
-        InputError: The remaining files are too large.
     """
     if _asset_bytes(work) <= MAX_ASSET_BYTES:
         return
@@ -190,11 +187,7 @@ def _write_hull(element: ET.Element, points: FloatArray, digits: int) -> None:
 
 
 def replace_missing_meshes(work: Work) -> None:
-    """Replaces the meshes without files that have no effect on the motion.
-
-    Raises:
-        InputError: A mesh has contacts, or gives a body its mass.
-    """
+    """Replaces the meshes without files that have no effect on the motion."""
     if not work.missing:
         return
     model = work.model

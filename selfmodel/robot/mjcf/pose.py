@@ -52,11 +52,7 @@ _OTHER_KEYFRAME = (
 
 
 def free_base(work: Work) -> None:
-    """Gives the root body of a fixed robot a free joint; a floating base stays as it is.
-
-    Raises:
-        InputError: No body of the world carries all driven joints, or that body has a joint.
-    """
+    """Gives the root body of a fixed robot a free joint; a floating base stays as it is."""
     model = work.model
     driven = driven_joints(model)
     if not driven or floating_bodies(model, driven):
@@ -97,11 +93,7 @@ def carry_hinges(work: Work) -> None:
 
 
 def bake_keyframe(work: Work) -> None:
-    """Makes the initial keyframe the reference pose, and removes all keyframes.
-
-    Raises:
-        InputError: The keyframe does not exist, or an equality constraint would change.
-    """
+    """Makes the initial keyframe the reference pose, and removes all keyframes."""
     model = work.model
     number = _keyframe(model, work.settings.keyframe)
     qpos = np.array(model.qpos0 if number is None else model.key_qpos[number])
@@ -192,11 +184,7 @@ def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
 
 
 def turn_forward(work: Work) -> None:
-    """Rotates a floating robot until its forward direction is the world's x axis.
-
-    Raises:
-        InputError: The robot has no free joint, or the rotation would change its world.
-    """
+    """Rotates a floating robot until its forward direction is the world's x axis."""
     forward = work.settings.forward
     angle = -math.radians(FORWARD_DIRECTIONS[forward])
     if not angle:
@@ -319,9 +307,6 @@ def add_ground(work: Work) -> None:
     """Adds a plane under the lowest point of a robot that could touch no static geom.
 
     Models without contacts, models of swimmers and robots with a fixed base get no ground.
-
-    Raises:
-        InputError: No geom of the robot could touch a ground.
     """
     model = work.model
     swims = model.opt.density or model.opt.viscosity
@@ -360,12 +345,7 @@ def add_ground(work: Work) -> None:
 
 
 def lowest_point(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m.
-
-    Args:
-        model: A model with geoms that can touch the plane.
-        data: Positions of the geoms.
-    """
+    """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m."""
     return min(
         float(mujoco.mj_geomDistance(model, data, 0, geom, _MAX_DISTANCE, None))
         for geom in ground_contact_geoms(model)

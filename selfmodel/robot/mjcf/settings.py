@@ -91,11 +91,7 @@ def value_of(values: JointValues, joint: str) -> float | None:
 
 
 def check_patterns(values: JointValues, joints: Sequence[str]) -> None:
-    """Checks that each name or pattern fits a joint.
-
-    Raises:
-        InputError: A name or pattern fits none.
-    """
+    """Checks that each name or pattern fits a joint."""
     for pattern in values:
         if not any(fnmatchcase(joint, pattern) for joint in joints):
             raise unknown_name("joint", pattern, list(joints))
@@ -104,13 +100,8 @@ def check_patterns(values: JointValues, joints: Sequence[str]) -> None:
 def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSettings:
     """Returns the settings of an MJCF or URDF file: of the TOML file of the same name.
 
-    Args:
-        path: The MJCF or URDF file.
-        extra: Settings that override those of the file. Folders are relative to the working folder;
-            in the file, to the folder of the file.
-
-    Raises:
-        InputError: A setting is unknown or invalid, or the file cannot be read.
+    Those of ``extra`` take precedence. Its folders are relative to the working folder; those in the
+    file, to the folder of the file.
     """
     file = path.with_suffix(".toml")
     loaded: dict[str, Any] = {}
@@ -145,11 +136,7 @@ def _folder_of(file: Path, assets: object) -> str:
 
 
 def parse_setting(text: str) -> dict[str, Any]:
-    """Returns the setting in a text such as ``forward=-x`` or ``touch=["left_foot"]``.
-
-    Raises:
-        InputError: The text has no key or no value.
-    """
+    """Returns the setting in a text such as ``forward=-x`` or ``touch=["left_foot"]``."""
     key, equals, value = text.partition("=")
     if not equals or not value.strip():
         raise InputError(f"expected a setting such as forward=-x, got {text!r}")
@@ -187,10 +174,7 @@ _MAX_QUOTED = 200
 
 
 def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
-    """Returns validated settings.
-
-    Args:
-        given: Values by setting; None counts as absent.
+    """Returns validated settings of values by name; None counts as absent.
 
     Raises:
         InputError: A setting is unknown or invalid; the message has its name and the valid values.
