@@ -219,7 +219,7 @@ class Folder:
                 yield Path(self.assets, *parts[start:])
 
     def _may_read(self, real: str) -> bool:
-        folders = [self.root, self.assets] if self.assets else [self.root]
+        folders = filter(None, (str(self.root), self.assets))
         return any(Path(real).is_relative_to(realpath(folder)) for folder in folders)
 
 
