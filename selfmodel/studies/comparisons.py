@@ -2,27 +2,17 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-from selfmodel.studies.statistics import (
-    NORMAL,
-    TAIL,
-    UNKNOWN,
-    Interval,
-    exact_mcnemar,
-    holm,
-    paired_interval,
-    paired_proportion_interval,
-    seed_test,
-    sign_flip_test,
-)
+from selfmodel.studies import statistics
+from selfmodel.studies.statistics import NORMAL, TAIL, UNKNOWN, Interval
 
 LEVEL = 0.05
 """Largest probability of any false "better" in a table."""
@@ -68,15 +58,13 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
     """
     rows: list[dict[str, Any]] = []
     for table, measure, runs in _tables(outcomes):
-        seeds = runs.index.get_level_values("seed").to_numpy()
-        values = {method: runs[method].to_numpy(dtype=float) for method in runs}
-        pairs = [
-            {"table": table, **_compared((one, other), values, seeds, measure, seed)}
-            for one, other in itertools.combinations(values, 2)
-            if np.isfinite(values[one] + values[other]).any()
-        ]
-        over_runs = holm([pair["p_runs"] for pair in pairs])
-        over_both = holm([max(pair["p_runs"], pair["p_seeds"]) for pair in pairs])
+        pairs = []
+        for pair in itertools.combinations(runs.columns, 2):
+            both = runs[list(pair)].dropna().astype(float)
+            if len(both):
+                pairs.append({"table": table, **_compared(both, measure, seed)})
+        over_runs = statistics.holm([pair["p_runs"] for pair in pairs])
+        over_both = statistics.holm([max(pair["p_runs"], pair["p_seeds"]) for pair in pairs])
         for pair, p_runs, p in zip(pairs, over_runs, over_both, strict=True):
             pair |= {"p_runs_holm": p_runs, "p_seeds": pair.pop("p_seeds"), "p_holm": p}
             pair["better"] = pair["first"] if p < LEVEL else None
@@ -92,10 +80,7 @@ def marginal_means(outcomes: pd.DataFrame) -> pd.DataFrame:
 
     The cells have equal weights. Of shares, the interval contains Wilson's, for the effective
     number of independent runs. All intervals contain Student's over the means of the seeds, unless
-    a seed lacks a cell.
-
-    Assumptions: the cells are fixed and equally important; a cell mean does not depend on which
-    seeds a method has. Paired differences need neither, and are preferable.
+    a seed lacks a cell. Paired differences assume less, and are preferable.
 
     Source: S. R. Searle, F. M. Speed and G. A. Milliken, *Population Marginal Means in the Linear
     Model*, The American Statistician 34 (1980).
@@ -179,46 +164,32 @@ def _tables(outcomes: pd.DataFrame) -> Iterator[tuple[tuple[str, ...], str, pd.D
         yield table, str(measure), runs
 
 
-def _compared(
-    pair: tuple[str, str],
-    values: Mapping[str, FloatArray],
-    seeds: IndexArray,
-    measure: str,
-    seed: int,
-) -> dict[str, Any]:
-    """Returns the comparison of two methods on the runs that both have, not corrected.
-
-    Args:
-        pair: Names of the methods.
-        values: Value of each run by method, ``(runs,)``; NaN for none.
-        seeds: Seed of each run.
-        measure: ``share`` or ``number``.
-        seed: Seed of all random numbers.
-    """
-    common = np.isfinite(values[pair[0]] + values[pair[1]])
-    means = {name: float(np.mean(values[name][common])) for name in pair}
-    first, second = sorted(pair, key=lambda name: -means[name])  # stable: by name if equal
-    differences = (values[first] - values[second])[common]
-    only_first, only_second = int((differences > 0).sum()), int((differences < 0).sum())
-    runs, rng = (differences.tolist(), seeds[common].tolist()), np.random.default_rng(seed)
+def _compared(runs: pd.DataFrame, measure: str, seed: int) -> dict[str, Any]:
+    """Returns the comparison of two methods, the columns, on runs that both have, not corrected."""
+    means = {str(name): float(np.mean(runs[name].to_numpy())) for name in runs}
+    first, second = sorted(means, key=lambda name: -means[name])  # stable: by name if equal
+    found = (runs[first] - runs[second]).tolist()
+    seeds = runs.index.get_level_values("seed").tolist()
+    only_first, only_second = sum(one > 0 for one in found), sum(one < 0 for one in found)
+    rng = np.random.default_rng(seed)
     if measure == "share":
-        interval = paired_proportion_interval(*runs, rng)
-        p = exact_mcnemar(only_first, only_second)
+        interval = statistics.paired_proportion_interval(found, seeds, rng)
+        p = statistics.exact_mcnemar(only_first, only_second)
     else:
-        interval = paired_interval(*runs, rng)
-        p = sign_flip_test(runs[0], rng)
+        interval = statistics.paired_interval(found, seeds, rng)
+        p = statistics.sign_flip_test(found, rng)
     return {
         "first": first,
         "second": second,
-        "n": len(differences),
-        "seeds": len(set(runs[1])),
+        "n": len(found),
+        "seeds": len(set(seeds)),
         "first_mean": means[first],
         "second_mean": means[second],
         **ends("difference", interval),
         "only_first": only_first,
         "only_second": only_second,
         "p_runs": p,
-        "p_seeds": seed_test(*runs),
+        "p_seeds": statistics.seed_test(found, seeds),
     }
 
 

@@ -57,19 +57,14 @@ def figure_style() -> Iterator[None]:
         yield
 
 
+@figure_style()
 def files_of(name: str, figure: Figure) -> dict[str, bytes]:
-    """Returns a figure as PNG, PDF and SVG, the same bytes in every call.
-
-    Args:
-        name: Name of the files without an extension.
-        figure: The figure.
-    """
+    """Returns a figure as PNG, PDF and SVG of a name, the same bytes in every call."""
     files = {}
-    with figure_style():
-        for suffix, date in (("png", None), ("pdf", "CreationDate"), ("svg", "Date")):
-            data = io.BytesIO()
-            figure.savefig(data, format=suffix, metadata={date: None} if date else None)
-            files[f"{name}.{suffix}"] = data.getvalue()
+    for suffix, date in (("png", None), ("pdf", "CreationDate"), ("svg", "Date")):
+        data = io.BytesIO()
+        figure.savefig(data, format=suffix, metadata={date: None} if date else None)
+        files[f"{name}.{suffix}"] = data.getvalue()
     return files
 
 
@@ -93,25 +88,23 @@ def by_gap(scores: Sequence[Row]) -> Figure:
     robots, gaps, comparators = (
         sorted({score[name] for score in scores}) for name in ("robot", "gap", "comparator")
     )
-    counts = {
-        name: counts_text(one["runs"] for one in scores if one["comparator"] == name)
-        for name in comparators
-    }
     ends = _first_and_last(scores)
-    figure, panels = _panels(
-        len(robots) * len(ends), len(ends), size=(4.2, 3.2), margin=(1, 0.8), share=True
-    )
-    lines = grouped(scores, "robot", "trials", "comparator")
+    counts = len(robots) * len(ends), len(ends)
+    figure, panels = _panels(*counts, size=(4.2, 3.2), margin=(1, 0.8), share=True)
     spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
     for axes, (robot, trials) in zip(panels, itertools.product(robots, ends), strict=True):
         for number, name in enumerate(comparators):  # the same look in panels without all of them
+            own = [one for one in scores if one["comparator"] == name]
+            shift = spread * (number - (len(comparators) - 1) / 2)
             points = [
-                (score["gap"] + spread * (number - (len(comparators) - 1) / 2), score["correct"])
-                for score in lines.get((robot, trials, name), [])
+                (one["gap"] + shift, share.estimate, share.low, share.high)
+                for one in own
+                if (one["robot"], one["trials"]) == (robot, trials)
+                for share in [one["correct"]]
             ]
             if points:
-                ends_of = [(x, one.estimate, one.low, one.high) for x, one in points]
-                _errorbars(axes, ends_of, number, label=f"{name} ({counts[name]})")
+                label = f"{name} ({counts_text(one['runs'] for one in own)})"
+                _errorbars(axes, points, number, label=label)
         axes.set(title=f"{robot}, {counted_trials(trials)}", ylim=(-0.03, 1.03), xticks=gaps)
         axes.grid(axis="y")
     for axes in panels[-len(ends) :]:
@@ -132,8 +125,9 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
     gaps, cases, comparators = (
         sorted(frame[name].unique()) for name in ("gap", "failure", "comparator")
     )
-    counts = frame.groupby(["comparator", "gap", "failure"]).size()
-    labels = [f"{name} ({counts_text(counts[name])})" for name in comparators]
+    squares = frame.groupby(["gap", "comparator", "failure"])["correct"]
+    counts = squares.size().groupby("comparator")
+    labels = [f"{name} ({counts_text(counts.get_group(name))})" for name in comparators]
     figure, panels = _panels(
         len(gaps),
         size=(0.4 + 0.42 * len(cases), 0.8 + 0.36 * len(comparators)),
@@ -141,9 +135,7 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
         share="y",
     )
     for axes, gap in zip(panels, gaps, strict=True):
-        shares = frame[frame["gap"] == gap].pivot_table(
-            index="comparator", columns="failure", values="correct", aggfunc="mean"
-        )
+        shares = squares.mean()[gap].unstack()  # noqa: PD010  # nothing to aggregate
         values = shares.reindex(index=comparators, columns=cases).to_numpy(dtype=float)
         axes.imshow(values, vmin=0, vmax=1, cmap="viridis", aspect="auto")
         for (i, j), share in np.ndenumerate(values):
@@ -161,10 +153,9 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
 
 def of_comparisons(comparisons: pd.DataFrame) -> dict[str, bytes]:
     """Returns the files of a figure of paired differences per robot, over all conditions."""
-    shown = whole(comparisons)
-    files: dict[str, bytes] = {}
+    shown, files = whole(comparisons), dict[str, bytes]()
     if len(shown):
-        for robot, own in shown.groupby(shown["table"].map(lambda table: table[0]), sort=False):
+        for robot, own in shown.groupby(shown["table"].str[0], sort=False):
             files |= files_of(f"differences-{robot_key(robot)}", paired_differences(own))
     return files
 
@@ -174,10 +165,8 @@ def paired_differences(comparisons: pd.DataFrame) -> Figure:
     """Returns the mean paired difference of every pair of methods, a panel per table.
 
     A filled marker is a difference that the corrected tests call better; the intervals are not
-    corrected. The labels have the number n of runs that both methods have.
-
-    Args:
-        comparisons: Comparisons of one or several tables; at least one.
+    corrected. The labels have the number n of runs that both methods have. There is one comparison
+    at least.
     """
     tables = comparisons.sort_values("difference", kind="stable").groupby("table", sort=False)
     minus = "\N{MINUS SIGN}"
@@ -194,9 +183,8 @@ def paired_differences(comparisons: pd.DataFrame) -> Figure:
         axes.axvline(0, color="0.3", linewidth=0.8)
         for place, row in enumerate(rows.itertuples()):
             colour = COLOURS[0] if row.better else "0.55"
-            axes.plot(
-                [row.difference_low, row.difference_high], [place] * 2, color=colour, linewidth=1.2
-            )
+            line = row.difference_low, row.difference_high
+            axes.plot(line, [place] * 2, color=colour, linewidth=1.2)
             face = colour if row.better else "white"
             style: Style = {"marker": "o", "markersize": 4.5, "markerfacecolor": face}
             axes.plot([row.difference], [place], color=colour, **style)
@@ -226,9 +214,7 @@ def by_trial(
         grey: Cases by robot that the paper did not restore.
         restored: Function of the trials of a recovery to the values of its line.
     """
-    robots, comparators = (
-        list(dict.fromkeys(trial[name] for trial in trials)) for name in ("robot", "comparator")
-    )
+    robots, comparators = (_distinct(trials, name) for name in ("robot", "comparator"))
     cases = sorted({trial["case"] for trial in trials})
     lines: dict[tuple[Any, ...], list[list[float]]] = {}
     for key, one in grouped(trials, "robot", "case", "comparator", "seed").items():
@@ -273,23 +259,20 @@ def by_cost(costs: Sequence[Row], band: str, reported: tuple[float, float, str])
         band: The way that is drawn as a line with a band.
         reported: Trials, restored function, and label of the paper's own number.
     """
-    robots, ways = (list(dict.fromkeys(cost[name] for cost in costs)) for name in ("robot", "way"))
+    robots, ways = (_distinct(costs, name) for name in ("robot", "way"))
     others = [way for way in ways if way != band]
-    lines = grouped(costs, "robot", "way")
+    lines = {
+        key: pd.DataFrame(own)[["physical_trials", "recovery", "low", "high"]]
+        for key, own in grouped(costs, "robot", "way").items()
+    }
     figure, panels = _panels(len(robots), len(robots), size=(4.4, 4.0), margin=(0.8, 0), share="y")
     for axes, robot in zip(panels, robots, strict=True):
         for number, way in enumerate(others):
+            points = lines[robot, way].to_numpy() if (robot, way) in lines else np.empty((0, 4))
             shift = 1 + 0.06 * (number - (len(others) - 1) / 2)
-            points = [
-                (shift * cost["physical_trials"], cost["recovery"], cost["low"], cost["high"])
-                for cost in lines.get((robot, way), [])
-            ]
-            _errorbars(axes, points, number, label=way, linewidth=1.2)
-        if control := lines.get((robot, band)):
-            table = pd.DataFrame(control).sort_values("physical_trials")
-            x, low, middle, high = (
-                table[name] for name in ("physical_trials", "low", "recovery", "high")
-            )
+            _errorbars(axes, points * (shift, 1, 1, 1), number, label=way, linewidth=1.2)
+        if (robot, band) in lines:
+            x, middle, low, high = lines[robot, band].sort_values("physical_trials").to_numpy().T
             axes.plot(x, middle, color="black", label="evolution on the robot")
             axes.fill_between(x, low, high, color="black", alpha=0.12, linewidth=0)
         star: Style = {"marker": "*", "markersize": 11, "markerfacecolor": "white"}
@@ -318,17 +301,16 @@ def robots(shown: Sequence[Robot]) -> Figure:
             f"{len(anatomy.joints)} joints, {len(anatomy.hinges)} degrees of freedom, "
             f"{len(anatomy.sensors)} sensors"
         )
+        below = parts if view == "from the side" else "forward is to the right; m"
         axes.set_title(f"{robot.name}, {view}")
-        axes.set_xlabel(
-            parts if view == "from the side" else "forward is to the right; m", fontsize=9
-        )
+        axes.set_xlabel(below, fontsize=9)
     _legend(figure, columns=3)
     return figure
 
 
 def _draw_robot(axes: Axes, robot: Robot, plane: FloatArray) -> None:
     """Draws the outlines of the geoms, the farthest first, and the joints and sensors."""
-    model, data = robot.model, mujoco.MjData(robot.model)
+    model, data, anatomy = robot.model, mujoco.MjData(robot.model), robot.anatomy
     mujoco.mj_forward(model, data)
     bodies = np.flatnonzero(model.geom_bodyid > 0)
     for geom in bodies[np.argsort(data.geom_xpos[bodies] @ plane[:, 2])]:
@@ -336,29 +318,18 @@ def _draw_robot(axes: Axes, robot: Robot, plane: FloatArray) -> None:
         colour = "0.78" if model.body_parentid[model.geom_bodyid[geom]] == 0 else "0.92"
         outline = points[ConvexHull(points).vertices].T
         axes.fill(*outline, facecolor=colour, edgecolor="0.25", linewidth=0.6, zorder=2)
-    anatomy = robot.anatomy
+    angles = [one.hinge for one in anatomy.sensors if one.kind == "angle"]
+    touches = [model.sensor(one.name).objid[0] for one in anatomy.sensors if one.kind == "touch"]
+    hinges = [one.hinges[0] for one in anatomy.joints]
     ring: Style = {"markersize": 9.5, "markerfacecolor": "none", "markeredgewidth": 1.3}
-    places: dict[str, tuple[list[FloatArray], Style]] = {
-        "joint": (
-            [data.joint(joint.hinges[0]).xanchor for joint in anatomy.joints],
-            {"marker": "o", "color": COLOURS[1], "markersize": 4.5},
-        ),
-        "angle sensor": (
-            [data.joint(one.hinge).xanchor for one in anatomy.sensors if one.kind == "angle"],
-            {**ring, "marker": "o", "color": COLOURS[0]},
-        ),
-        "touch sensor": (
-            [
-                data.site_xpos[model.sensor(one.name).objid[0]]
-                for one in anatomy.sensors
-                if one.kind == "touch"
-            ],
-            {**ring, "marker": "^", "color": COLOURS[2]},
-        ),
-    }
-    for label, (positions, style) in places.items():
-        x, y = (np.array(positions).reshape(-1, 3) @ plane[:, :2]).T
-        axes.plot(x, y, linestyle="none", label=label, zorder=3, **style)
+    for number, label, marker, places, style in (
+        (1, "joint", "o", [data.joint(one).xanchor for one in hinges], {"markersize": 4.5}),
+        (0, "angle sensor", "o", [data.joint(one).xanchor for one in angles], ring),
+        (2, "touch sensor", "^", data.site_xpos[touches], ring),
+    ):
+        x, y = (np.array(places).reshape(-1, 3) @ plane[:, :2]).T
+        mark: Style = {"linestyle": "none", "marker": marker, "color": COLOURS[number], **style}
+        axes.plot(x, y, label=label, zorder=3, **mark)
     axes.set_aspect("equal")
     axes.margins(0.08)
 
@@ -393,17 +364,16 @@ def counts_text(counts: Iterable[int]) -> str:
     return f"n = {low}" if low == high else f"n = {low} to {high}"
 
 
+def _distinct(rows: Sequence[Row], name: str) -> list[Any]:
+    return list(dict.fromkeys(row[name] for row in rows))
+
+
 def _first_and_last(rows: Sequence[Row]) -> list[int]:
     trials = sorted({row["trials"] for row in rows})
     return sorted({*trials[:1], *trials[-1:]})
 
 
-def _errorbars(
-    axes: Axes,
-    points: Sequence[tuple[float, float, float, float]],
-    number: int,
-    **style: Any,  # noqa: ANN401  # of matplotlib
-) -> None:
+def _errorbars(axes: Axes, points: Any, number: int, **style: Any) -> None:  # noqa: ANN401  # of matplotlib
     """Draws estimates with the ends of their intervals, x, y, low and high, in a method's look."""
     x, y, low, high = np.array(points).reshape(-1, 4).T
     # An interval may end a rounding error inside its estimate.

@@ -18,13 +18,13 @@ import numpy as np
 import pandas as pd
 
 from selfmodel.settings import Settings
-from selfmodel.studies import figures
+from selfmodel.studies import figures, tables
 from selfmodel.studies.cells import finished
 from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, study_rows
 from selfmodel.studies.study import RUNS, SHARED, Row, grouped
-from selfmodel.studies.tables import Table, markdown_of, table_files, table_of, write_files
+from selfmodel.studies.tables import Table, table_of
 from selfmodel.tasks import ROBOTS
 
 NOT_RESTORED: Mapping[str, tuple[int, ...]] = MappingProxyType(
@@ -87,8 +87,7 @@ class PaperResults:
 
     def summaries(self) -> list[Row]:
         """Returns Table II: a row per robot, case and comparator, in the order of the rows."""
-        groups = grouped(self.recoveries, "robot", "case", "comparator")
-        return [_summary(group) for group in groups.values()]
+        return list(map(_summary, grouped(self.recoveries, "robot", "case", "comparator").values()))
 
     def costs(self) -> list[Row]:
         """Returns the restored function by way and number of physical trials: quartiles.
@@ -97,20 +96,22 @@ class PaperResults:
         with a displacement above 0 before the failure.
         """
         points = [
-            (robot, case, seed, way, trials, share)
-            for (robot, case, seed, way), rows in grouped(self.trials, *RUN, "comparator").items()
+            (*run, trials, share)
+            for run, rows in grouped(self.trials, *RUN, "comparator").items()
             for trials, share in enumerate(best_so_far(rows))
             if trials
-        ] + [
-            (*(row[name] for name in RUN), ON_ROBOT, row["evaluations"], _ratio(row))
+        ]
+        points += [
+            (*(row[name] for name in RUN), ON_ROBOT, row["evaluations"], _share(**row))
             for row in self.evolution
         ]
         frame = pd.DataFrame(points, columns=[*RUN, "way", "physical_trials", "recovery"])
-        ways_of_robot = frame.groupby("robot")["way"].transform("nunique")
-        ways_of_run = frame.groupby(list(RUN))["way"].transform("nunique")
-        paired = frame[ways_of_run == ways_of_robot].dropna()
-        groups = paired.groupby(["robot", "way", "physical_trials"], sort=False)["recovery"]
+        of_robot, of_run = (
+            frame.groupby(names)["way"].transform("nunique") for names in ("robot", list(RUN))
+        )
+        paired = frame[of_run == of_robot].dropna()
         rows = []
+        groups = paired.groupby(["robot", "way", "physical_trials"], sort=False)["recovery"]
         for (robot, way, trials), shares in groups:
             low, middle, high = np.quantile(shares, (0.25, 0.5, 0.75)).tolist()
             key = {"robot": robot, "way": way, "physical_trials": trials, "runs": len(shares)}
@@ -135,11 +136,7 @@ class PaperResults:
 
 
 def collect(folder: Path) -> PaperResults:
-    """Returns all results in the folder of an experiment.
-
-    Raises:
-        InputError: A cell in the folder is damaged.
-    """
+    """Returns all results in the folder of an experiment."""
     first = next(finished(folder / RUNS), None)
 
     def rows(table: str, columns: Sequence[str]) -> list[Row]:
@@ -159,10 +156,6 @@ def write_results(folder: Path) -> tuple[PaperResults, tuple[Path, ...]]:
     """Writes page, tables and figures of all finished runs in the folder of an experiment.
 
     Without a finished recovery, nothing is written.
-
-    Raises:
-        InputError: A cell in the folder is damaged.
-        OSError: The results cannot be written.
     """
     results = collect(folder)
     if not results.recoveries:
@@ -175,15 +168,15 @@ def write_results(folder: Path) -> tuple[PaperResults, tuple[Path, ...]]:
     if costs := results.costs():  # comparators that have no run in common cannot be compared
         drawn["figure-6"] = figures.by_cost(costs, ON_ROBOT, REPORTED)
     rows = {name: getattr(results, name) for name in ("recoveries", "trials", "evolution")}
-    tables = [*tables_of(results), *(table_of(name, one) for name, one in rows.items())]
+    every = [*tables_of(results), *(table_of(name, one) for name, one in rows.items())]
+    files: dict[str, bytes] = {}
+    for name, figure in drawn.items():
+        files |= figures.files_of(name, figure)
+    files |= tables.table_files(every, "csv")
     text = json.dumps(results.as_dict(), indent=1, allow_nan=False)
-    files = {
-        **{name: data for one in drawn.items() for name, data in figures.files_of(*one).items()},
-        **table_files(tables, "csv"),
-        "results.json": f"{text}\n".encode(),
-        "paper.md": page(results).encode(),
-    }
-    return results, write_files(folder, files)
+    files["results.json"] = f"{text}\n".encode()
+    files["paper.md"] = page(results).encode()
+    return results, tables.write_files(folder, files)
 
 
 def tables_of(results: PaperResults) -> list[Table]:
@@ -192,10 +185,9 @@ def tables_of(results: PaperResults) -> list[Table]:
         {
             **{name: str(row[name]) for name in ("robot", "case", "comparator")},
             "the paper": "restored" if row["restored_in_paper"] else "not restored",
-            "restored": f"{row['restored']} of {row['runs']}",
-            "right": f"{row['right']} of {row['runs']}",
+            **{name: f"{row[name]} of {row['runs']}" for name in ("restored", "right")},
             **{name: _short(row[name]) for name in ("before", "after", "recovered")},
-            "÷ before": _between(row["recovery"], row["lowest"], row["highest"], row["runs"]),
+            "÷ before": _between(row, "lowest", "highest"),
         }
         for row in results.summaries()
     ]
@@ -212,7 +204,7 @@ def _cost_table(costs: Sequence[Row]) -> Table:
             **{name: row[name] for name in ("robot", "way")},
             "physical trials": str(row["physical_trials"]),
             "n": str(row["runs"]),
-            "÷ before (quartiles)": _between(row["recovery"], row["low"], row["high"], row["runs"]),
+            "÷ before (quartiles)": _between(row, "low", "high"),
         }
         for row in costs
     ]
@@ -221,27 +213,21 @@ def _cost_table(costs: Sequence[Row]) -> Table:
 
 def page(results: PaperResults) -> str:
     """Returns the page of the experiment in Markdown."""
-    first, second, _ = tables_of(results)
+    first, second, _ = map(tables.markdown_of, tables_of(results))
     settings, last = results.settings or Settings(), results.last_costs()
-    costs = COSTS.format(on_robot=ON_ROBOT, table=markdown_of(_cost_table(last)))
-    return (
-        Path(__file__)
-        .with_suffix(".md")
-        .read_text(encoding="utf-8")
-        .format(
-            not_restored="; ".join(
-                f"{', '.join(map(str, cases))} of the {robot}"
-                for robot, cases in NOT_RESTORED.items()
-            ),
-            unknown="; ".join(UNKNOWN),
-            size=f"Search budget: population {settings.population}, {settings.generations} "
-            f"generations, {settings.steps} control steps, trials after the failing one: "
-            f"{settings.trials}; {'the' if settings == Settings() else 'not the'} paper's.\n",
-            failures=markdown_of(first),
-            restored_from=RESTORED_FROM,
-            summaries=markdown_of(second),
-            costs=costs if last else "No run has all ways, so that they could be compared.\n",
-        )
+    costs = COSTS.format(on_robot=ON_ROBOT, table=tables.markdown_of(_cost_table(last)))
+    restored = {robot: ", ".join(map(str, cases)) for robot, cases in NOT_RESTORED.items()}
+    template = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
+    return template.format(
+        not_restored="; ".join(f"{cases} of the {robot}" for robot, cases in restored.items()),
+        unknown="; ".join(UNKNOWN),
+        size=f"Search budget: population {settings.population}, {settings.generations} "
+        f"generations, {settings.steps} control steps, trials after the failing one: "
+        f"{settings.trials}; {'the' if settings == Settings() else 'not the'} paper's.\n",
+        failures=first,
+        restored_from=RESTORED_FROM,
+        summaries=second,
+        costs=costs if last else "No run has all ways, so that they could be compared.\n",
     )
 
 
@@ -255,42 +241,38 @@ def best_so_far(trials: Sequence[Row]) -> list[float]:
         First that of the failing trial, then that of the best recovery trial so far.
     """
     before, after, *recovery = (trial["displacement"] for trial in trials)
-    largest = np.maximum.accumulate(recovery).tolist()
-    return [_ratio({"best": one, "before": before}) for one in (after, *largest)]
+    return [_share(before, one) for one in (after, *np.maximum.accumulate(recovery).tolist())]
 
 
-def _ratio(row: Row) -> float:
-    return row["best"] / row["before"] if row["before"] > 0 else math.nan
+def _share(before: float, best: float, **_row: object) -> float:
+    return best / before if before > 0 else math.nan
 
 
 def _summary(rows: Sequence[Row]) -> Row:
-    first = rows[0]
-    ratios = [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
-    middle = {
-        name: median(row[name] for row in rows)
-        for name in ("before", "after", "recovered", "distinct_hypotheses", "seconds")
-    }
+    first, ratios = rows[0], tables.recovered_over_before(rows)
     return {
         **{name: first[name] for name in ("robot", "case", "truth", "comparator")},
         "runs": len(rows),
         "right": sum(row["correct"] for row in rows),
-        **{name: middle[name] for name in ("before", "after", "recovered")},
+        **tables.medians(rows, "before", "after", "recovered"),
         "recovery": median(ratios) if ratios else None,
         "lowest": min(ratios, default=None),
         "highest": max(ratios, default=None),
         "restored": sum(value >= RESTORED_FROM for value in ratios),
         "restored_in_paper": first["case"] not in NOT_RESTORED[first["robot"]],
         "best": " ".join(sorted({row["best"] for row in rows if not row["correct"]})),
-        "distinct_hypotheses": middle["distinct_hypotheses"],
+        **tables.medians(rows, "distinct_hypotheses"),
         "diverged": sum(row["diverged"] for row in rows),
-        "seconds": middle["seconds"],
+        **tables.medians(rows, "seconds"),
     }
 
 
-def _between(middle: float | None, low: float | None, high: float | None, count: int) -> str:
-    if middle is None or low is None or high is None:
+def _between(row: Row, low: str, high: str) -> str:
+    """Returns the restored share with two bounds, if there are several runs, as text."""
+    if row["recovery"] is None:
         return "-"
-    return _short(middle) + (f" ({_short(low)} to {_short(high)})" if count > 1 else "")
+    bounds = f" ({_short(row[low])} to {_short(row[high])})" if row["runs"] > 1 else ""
+    return _short(row["recovery"]) + bounds
 
 
 def _short(number: float) -> str:

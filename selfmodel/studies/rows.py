@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
@@ -15,7 +15,6 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.studies import comparisons
-from selfmodel.studies.comparisons import OUTCOME
 from selfmodel.studies.study import Row, rows_in, study_in
 
 INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
@@ -33,6 +32,8 @@ AFTER = (1, 3, 20)
 ORACLE = "oracle"
 """Name of the method that is a bound, and is not compared."""
 
+OutcomeRows = Iterator[tuple[Any, ...]]
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -41,7 +42,7 @@ class Kind:
     Attributes:
         table: Name of the rows in the result of a cell.
         names: Names of the columns of the rows, in order, with spaces between them.
-        may_lack: Those that tables of earlier versions lack.
+        may_lack: Those that published tables lack.
         sorted_by: Those by which rows are sorted.
         outcomes: Function of the rows to the outcomes that are compared.
     """
@@ -50,7 +51,7 @@ class Kind:
     names: str
     may_lack: str
     sorted_by: str
-    outcomes: Callable[[pd.DataFrame], list[tuple[Any, ...]]]
+    outcomes: Callable[[pd.DataFrame], OutcomeRows]
 
     @property
     def columns(self) -> list[str]:
@@ -63,50 +64,33 @@ class Kind:
         return (*key, row.get("comparator") != REFERENCE)
 
 
-def _of_ablation(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """Right (1) and wrong (0) diagnoses by comparator.
-
-    The tables are those of a robot and a number of trials: over all gaps, then each gap alone. A
-    pair has the robot, the failure, the gap, the seed and the way of the trials in common.
-    """
+def _of_ablation(rows: pd.DataFrame) -> OutcomeRows:
+    """Yields right (1) and wrong (0) diagnoses by comparator: over all gaps, then at each alone."""
     gaps = sorted(rows["gap"].unique())
-    return [
-        (
-            (row.robot, counted_trials(row.trials), *(() if gap is None else (f"gap {gap:g}",))),
-            row.comparator,
-            (f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial),
-            row.seed,
-            float(row.correct),
-            "share",
-        )
-        for gap in ([None, *gaps] if len(gaps) > 1 else [None])
-        for row in rows.itertuples()
-        if gap in (None, row.gap)
-    ]
+    for gap in [None, *gaps] if len(gaps) > 1 else [None]:
+        alone = () if gap is None else (f"gap {gap:g}",)
+        for row in (rows if gap is None else rows[rows["gap"] == gap]).itertuples():
+            table = row.robot, counted_trials(row.trials), *alone
+            cell = f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial
+            yield table, row.comparator, cell, row.seed, float(row.correct), "share"
 
 
-def _of_paper(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """Right (1) and wrong (0) diagnoses, and recovered displacements, by comparator."""
-    return [
-        ((row.robot, name), row.comparator, (f"{row.case:2d}",), row.seed, float(value), measure)
-        for row in rows.itertuples()
-        for name, value, measure in (
-            ("right", row.correct, "share"),
-            ("recovered, m", row.recovered, "number"),
-        )
-    ]
+def _of_paper(rows: pd.DataFrame) -> OutcomeRows:
+    """Yields right (1) and wrong (0) diagnoses, and recovered displacements, by comparator."""
+    for row in rows.itertuples():
+        run = row.comparator, (f"{row.case:2d}",), row.seed
+        yield (row.robot, "right"), *run, float(row.correct), "share"
+        yield (row.robot, "recovered, m"), *run, float(row.recovered), "number"
 
 
-def _of_methods(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """Displacements by method, m, and divided by the oracle's on the same physical robot.
+def _of_methods(rows: pd.DataFrame) -> OutcomeRows:
+    """Yields displacements by method, m, and divided by the oracle's on the same physical robot.
 
-    The tables are those of a robot, a number of physical trials and a unit. There is none after
-    more trials than any method had on the robot.
+    There is no table after more trials than any method had on the robot.
     """
     bounds = oracles(rows)
     compared = rows[rows["method"] != ORACLE]
     longest = compared["best"].map(len).groupby(compared["robot"]).max()
-    outcomes: list[tuple[Any, ...]] = []
     for trials in AFTER:
         for row in compared.itertuples():
             if trials > longest[row.robot]:
@@ -115,10 +99,9 @@ def _of_methods(rows: pd.DataFrame) -> list[tuple[Any, ...]]:
             bound = bounds.get((row.robot, row.case, row.gap, row.seed), 0.0)
             run = row.method, (f"gap {row.gap:g}", f"{row.case:2d}"), row.seed
             table = row.robot, f"after {counted_trials(trials)}"
-            outcomes.append(((*table, "m"), *run, value, "number"))
+            yield (*table, "m"), *run, value, "number"
             if bound > 0:
-                outcomes.append(((*table, "÷ oracle"), *run, value / bound, "number"))
-    return outcomes
+                yield (*table, "÷ oracle"), *run, value / bound, "number"
 
 
 def oracles(rows: pd.DataFrame) -> dict[tuple[Any, ...], float]:
@@ -172,7 +155,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "seconds upright repair search",
             "upright repair search",
             "robot case seed",
-            lambda _rows: [],  # its bodies are recovered with one comparator, and are no pairs
+            lambda _rows: iter(()),  # its bodies have one comparator, and are no pairs
         ),
     }
 )
@@ -269,28 +252,17 @@ def _rows_of_file(path: Path) -> pd.DataFrame:
         text = data.decode("utf-8-sig")
         if path.suffix == ".jsonl":
             return frame_of([json.loads(line) for line in text.splitlines()])
-        texts = pd.read_csv(io.StringIO(text), dtype=str, na_values=[""], keep_default_na=False)
-        return _typed(texts.apply(_parsed))
+        exact = {"float_precision": "round_trip", "na_values": [""], "keep_default_na": False}
+        return _typed(pd.read_csv(io.StringIO(text), **exact))
     except (ValueError, RecursionError) as error:  # pandas' own errors are ValueErrors
         reason = " ".join(str(error).split())
         raise InputError(f"{path}: expected the rows of a study, got {reason}") from error
 
 
-def _parsed(texts: pd.Series) -> pd.Series:
-    """Returns a column as flags or numbers, if all of its texts are; exact, unlike pandas' own."""
-    flags = texts.str.lower().map({"true": True, "false": False})
-    if flags.notna().any() and (flags.notna() == texts.notna()).all():
-        return flags
-    try:
-        return texts.map(float)
-    except ValueError:
-        return texts
-
-
 def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
     """Returns what the rows of a kind of study compare, with the columns ``OUTCOME``."""
     frame = rows if isinstance(rows, pd.DataFrame) else frame_of(rows, KINDS[name].columns)
-    return pd.DataFrame(KINDS[name].outcomes(frame), columns=list(OUTCOME))
+    return pd.DataFrame(list(KINDS[name].outcomes(frame)), columns=list(comparisons.OUTCOME))
 
 
 def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
@@ -322,8 +294,8 @@ def _typed(frame: pd.DataFrame) -> pd.DataFrame:
 
 def whole(tables: pd.DataFrame) -> pd.DataFrame:
     """Returns what is of the tables over all conditions: those with the fewest names."""
-    lengths = [len(table) for table in tables["table"]] if len(tables) else []
-    return tables[[length == min(lengths) for length in lengths]] if lengths else tables
+    lengths = tables["table"].map(len) if len(tables) else None
+    return tables if lengths is None else tables[lengths == lengths.min()]
 
 
 def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number, or pandas' NA

@@ -1,6 +1,7 @@
 """Statistics of plain numbers: intervals, and tests of paired differences.
 
-Errors and coverage by simulation: ``docs/results/statistics.md``.
+Assumptions, and errors and coverage by simulation: ``docs/results/statistics.md``. Numbers that are
+not finite are refused: NaN would compare as no difference, or as a sure one.
 """
 
 import itertools
@@ -41,9 +42,6 @@ def proportion(successes: int, trials: int) -> Interval:
 
     Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference*,
     JASA 22 (1927), without a correction for continuity.
-
-    Raises:
-        ValueError: The number of successes is negative or above the number of trials.
     """
     if not 0 <= successes <= trials:
         raise ValueError(f"expected 0 to {trials} successes in {trials} trials, got {successes}")
@@ -59,9 +57,6 @@ def ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interva
     The same numbers give the same interval in every call; one pair has none.
 
     Source: B. Efron and R. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
-
-    Raises:
-        ValueError: The lengths differ, or a denominator is not above 0.
     """
     above, below = np.array(numerators, dtype=float), np.array(denominators, dtype=float)
     if above.shape != below.shape or not np.all(below > 0):
@@ -86,20 +81,9 @@ def paired_interval(
     over the normal one and by the bias of a variance of few seeds, as a percentile bootstrap of
     n < 30 units is too narrow. With fewer than two seeds, the interval is NaN.
 
-    Assumptions: the seeds are independent and drawn from one population; the cells are fixed, and
-    every seed has nearly as many runs.
-
     Source: B. Efron and R. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13; the
     correction for few units: T. Hesterberg, *What Teachers Should Know About the Bootstrap*, The
     American Statistician 69 (2015).
-
-    Args:
-        differences: First minus second, one per run.
-        seeds: Seed of each run.
-        rng: Draws the seeds.
-
-    Raises:
-        ValueError: A difference is NaN or infinite, or there is no seed for it.
     """
     values, groups = _finite("differences", differences), np.array(seeds)
     if values.shape != groups.shape:
@@ -119,11 +103,10 @@ def paired_interval(
 def paired_proportion_interval(
     differences: Sequence[float], seeds: Sequence[int], rng: np.random.Generator
 ) -> Interval:
-    """Returns the difference of two paired proportions with an interval over seeds and runs.
+    """Returns the mean of differences -1, 0 and 1 with an interval over seeds and runs.
 
     It is the smallest interval that contains ``paired_interval`` and ``matched_proportions``: a
     bootstrap alone cannot draw the rare error that no seed has shown, and has no width without one.
-    The differences are -1, 0 or 1.
     """
     found = paired_interval(differences, seeds, rng)
     if math.isnan(found.low):
@@ -136,8 +119,6 @@ def paired_proportion_interval(
 
 def matched_proportions(only_first: int, only_second: int, runs: int) -> Interval:
     """Returns the difference of two paired proportions with Bonett and Price's interval.
-
-    Assumption: the runs are independent of each other.
 
     Source: D. G. Bonett and R. M. Price, *Adjusted Wald confidence interval for a difference of
     binomial proportions based on paired data*, Journal of Educational and Behavioral Statistics 37
@@ -158,10 +139,7 @@ def matched_proportions(only_first: int, only_second: int, runs: int) -> Interva
 def exact_mcnemar(only_first: int, only_second: int) -> float:
     """Returns the two-sided p of the exact McNemar test, from the numbers of discordant runs.
 
-    The runs in which only one method is right are a fair coin's throws if both are equally good.
-
-    Assumption: the runs are independent of each other. Runs of one seed share gaits, so p is too
-    small where they succeed and fail together; ``seed_test`` counts seeds.
+    Runs of one seed share gaits, so p is too small where they succeed and fail together.
 
     Source: Q. McNemar, *Note on the sampling error of the difference between correlated
     proportions or percentages*, Psychometrika 12 (1947); the binomial test is exact.
@@ -173,21 +151,11 @@ def exact_mcnemar(only_first: int, only_second: int) -> float:
 def sign_flip_test(differences: Sequence[float], rng: np.random.Generator) -> float:
     """Returns the two-sided p of the permutation test that flips the signs of differences.
 
-    The smallest p of n differences is 2 to the power of 1 - n: 0.125 with four.
+    Random signs are drawn for more than ``MAX_EXACT`` differences that are not 0.
     ``scipy.stats.permutation_test`` is the same test, with other random signs: its p would differ
     from published ones.
 
-    Assumption: if both methods are equally good, each difference is as likely with the other sign,
-    independently of the others.
-
     Source: R. A. Fisher, *The Design of Experiments* (1935), section 21.
-
-    Args:
-        differences: First minus second, one per independent unit.
-        rng: Draws signs if there are more than ``MAX_EXACT`` differences that are not 0.
-
-    Raises:
-        ValueError: A difference is NaN or infinite.
     """
     values = _finite("differences", differences)
     values = values[values != 0]
@@ -206,16 +174,10 @@ def sign_flip_test(differences: Sequence[float], rng: np.random.Generator) -> fl
 def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
     """Returns the two-sided p of Student's paired test over the means of the seeds.
 
-    It is 1 with fewer than two seeds, or if the mean of the means is 0.
-
-    Assumption: the means of the seeds are independent and normal; runs of one seed may depend on
-    each other. The means of few runs may be equal by chance, and p is then too small: a test over
-    runs is needed too.
+    It is 1 with fewer than two seeds, or if the mean of the means is 0. The means of few runs may
+    be equal by chance, and p is then too small: a test over runs is needed too.
 
     Source: Student, *The probable error of a mean*, Biometrika 6 (1908).
-
-    Raises:
-        ValueError: A difference is NaN or infinite.
     """
     values, groups = _finite("differences", differences), np.array(seeds)
     means = np.array([values[groups == seed].mean() for seed in np.unique(groups)])
@@ -230,15 +192,8 @@ def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
 def holm(p_values: Sequence[float]) -> list[float]:
     """Returns p values adjusted by Holm's method, in the order given.
 
-    The probability that any true hypothesis has an adjusted p below 0.05 is at most 0.05.
-
-    Assumption: each p is valid by itself; the tests may depend on each other in any way.
-
     Source: S. Holm, *A simple sequentially rejective multiple test procedure*, Scandinavian Journal
     of Statistics 6 (1979).
-
-    Raises:
-        ValueError: A p value is NaN, or outside 0 to 1.
     """
     given = _finite("p values", p_values)
     if np.any((given < 0) | (given > 1)):
@@ -268,11 +223,6 @@ def _bootstrap_ratio(
 
 
 def _finite(what: str, values: Sequence[float]) -> FloatArray:
-    """Returns numbers as an array: NaN would compare as no difference, or as a sure one.
-
-    Raises:
-        ValueError: A number is NaN or infinite.
-    """
     found = np.array(values, dtype=float)
     if not np.isfinite(found).all():
         place = int(np.argmin(np.isfinite(found)))

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 from types import MappingProxyType
 from typing import Any
 
@@ -36,28 +36,25 @@ def ablation_scores(rows: Sequence[Row]) -> list[Row]:
     names = ("robot", "gap", "comparator", "trials")
     groups = grouped(rows, *names)
     scores = []
-    for (robot, gap, comparator, trials), own in sorted(groups.items()):
+    for key, own in sorted(groups.items()):
         reference = {
             (row["truth"], row["seed"]): row["seconds"]
-            for row in groups.get((robot, gap, REFERENCE, trials), [])
+            for row in groups.get((*key[:2], REFERENCE, key[3]), [])
         }
         times = [
-            (row["seconds"], reference[key])
+            (row["seconds"], reference[run])
             for row in own
-            if (key := (row["truth"], row["seed"])) in reference
+            if (run := (row["truth"], row["seed"])) in reference
         ]
         recoveries = [
             (row["recovered"], row["before"])
             for row in own
             if None not in (row["recovered"], row["before"]) and row["before"] > 0
         ]
-        right = sum(row["correct"] for row in own)
         scores.append(
             {
-                **dict(zip(names, (robot, gap, comparator, trials), strict=True)),
-                "runs": len(own),
-                "right": right,
-                "correct": proportion(right, len(own)),
+                **dict(zip(names, key, strict=True)),
+                **_right(own),
                 "time": ratio(*zip(*times, strict=True)) if times else None,
                 "recovery": ratio(*zip(*recoveries, strict=True)) if recoveries else None,
             }
@@ -78,39 +75,50 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
     """
     summaries = []
     for (robot,), own in grouped(rows, "robot").items():
-        for (case,), same in sorted(grouped(own, "case").items()):
-            summaries.append(_suite_summary(robot, case, same[0]["truth"], same))
-        if single := [row for row in own if row["case"] in SINGLE]:
-            summaries.append(_suite_summary(robot, None, "", single))
+        cases = [(case, same) for (case,), same in sorted(grouped(own, "case").items())]
+        cases.append((None, [row for row in own if row["case"] in SINGLE]))
+        summaries += [
+            {
+                "robot": robot,
+                "case": case,
+                "truth": "" if case is None else same[0]["truth"],
+                **_right(same),
+                **medians(same, "before", "after", "recovered"),
+                "recovery": median(ratios) if (ratios := recovered_over_before(same)) else None,
+                "upright": sum(row.get("upright") is True for row in same),
+                "trials": fmean(row["trials"] for row in same),
+                **medians(same, "seconds"),
+            }
+            for case, same in cases
+            if same
+        ]
     return summaries
 
 
-def _suite_summary(robot: str, case: int | None, truth: str, rows: Sequence[Row]) -> Row:
+def _right(rows: Sequence[Row]) -> Row:
     right = sum(row["correct"] for row in rows)
-    ratios = [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
-    return {
-        "robot": robot,
-        "case": case,
-        "truth": truth,
-        "runs": len(rows),
-        "right": right,
-        "correct": proportion(right, len(rows)),
-        **{name: median(row[name] for row in rows) for name in ("before", "after", "recovered")},
-        "recovery": median(ratios) if ratios else None,
-        "upright": sum(row.get("upright") is True for row in rows),
-        "trials": sum(row["trials"] for row in rows) / len(rows),
-        "seconds": median(row["seconds"] for row in rows),
-    }
+    return {"runs": len(rows), "right": right, "correct": proportion(right, len(rows))}
+
+
+def medians(rows: Sequence[Row], *names: str) -> Row:
+    """Returns the medians of some columns."""
+    return {name: median(row[name] for row in rows) for name in names}
+
+
+def recovered_over_before(rows: Sequence[Row]) -> list[float]:
+    """Returns the recovered part of the score before the failure, where that is above 0."""
+    return [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
 
 
 def as_json(value: Any) -> Any:  # noqa: ANN401  # JSON
     """Returns rows or summaries as JSON: intervals as objects, unknown numbers as null."""
-    if isinstance(value, Interval):
-        return as_json(dataclasses.asdict(value))
-    if isinstance(value, Mapping):
-        return {key: as_json(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [as_json(inner) for inner in value]
+    match value:
+        case Interval():
+            return as_json(dataclasses.asdict(value))
+        case Mapping():
+            return {key: as_json(inner) for key, inner in value.items()}
+        case list() | tuple():
+            return [as_json(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -150,23 +158,19 @@ def table_of(
         named = "table" in records
         frame = records.assign(table=records["table"].map(", ".join)) if named else records
     else:
-        frame = frame_of([_flat(record, _interval_keys(records)) for record in records])
+        intervals = {key for row in records for key in row if isinstance(row[key], Interval)}
+        frame = frame_of([_flat(record, intervals) for record in records])
     if shown is None:
         values = frame.astype(object).where(frame.notna(), "-").map(str)
         return Table(name, frame, values, len(frame.columns))
     return Table(name, frame, pd.DataFrame(shown), texts)
 
 
-def _interval_keys(records: Sequence[Row]) -> set[str]:
-    return {key for record in records for key in record if isinstance(record[key], Interval)}
-
-
 def _flat(record: Row, intervals: set[str]) -> Row:
-    columns = (
-        ends(key, value or UNKNOWN) if key in intervals else {key: value}
-        for key, value in record.items()
-    )
-    return {key: value for column in columns for key, value in column.items()}
+    flat: Row = {}
+    for key, value in record.items():
+        flat |= ends(key, value or UNKNOWN) if key in intervals else {key: value}
+    return flat
 
 
 def results_files(
@@ -203,8 +207,7 @@ def markdown_of(table: Table) -> str:
 
 
 def _latex(table: Table) -> bytes:
-    count = len(table.shown.columns)
-    sides = "".join("l" if place < table.texts else "r" for place in range(count))
+    sides = "l" * table.texts + "r" * (len(table.shown.columns) - table.texts)
     text = table.shown.style.hide(axis="index").format(escape="latex")
     text = text.format_index(escape="latex", axis="columns")
     latex: str = text.to_latex(column_format=sides, hrules=True)
@@ -235,11 +238,7 @@ the package booktabs) and Markdown the rows for readers."""
 
 
 def check_format(wanted: str | None) -> None:
-    """Checks, before the work on a table, that it can be written; None is no table.
-
-    Raises:
-        InputError: The format is unknown, or needs a package that is missing.
-    """
+    """Checks, before the work on a table, that it can be written; None is no table."""
     if wanted is not None:
         table_files([table_of("none", [{"n": "1"}])], wanted)
 
@@ -257,15 +256,7 @@ def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Writes files into a folder, made if missing, and returns their paths.
-
-    Args:
-        folder: The folder.
-        files: Content by path relative to the folder.
-
-    Raises:
-        LogWriteError: A file cannot be written.
-    """
+    """Writes files, by their path in a folder, which is made if missing; returns their paths."""
     for name, data in files.items():
         make_folder((folder / name).parent)
         replace_file(folder / name, data)
