@@ -53,7 +53,7 @@ class Cell:
 
     Attributes:
         function: The ``Work`` that computes the cell, as ``package.module:function``.
-        name: Name for readers: letters, digits, ``.``, ``_``, ``-``, ``=``, ``%``.
+        name: Name for readers, which can name a folder.
         parameters: All inputs of the function, as JSON, the seed of its random numbers included.
         needs: Cells whose files the function reads, each by a name of its own.
         kind: Folder of the study for cells of this kind.
@@ -90,9 +90,9 @@ class FinishedCell:
         name: Name for readers.
         parameters: Inputs.
         result: The result, as JSON.
-        path: ``cell.json``, beside the other files of the cell.
+        path: ``cell.json``.
         made_with: Versions, and the digest of the code, that computed the cell.
-        files: Names of the other files, relative to the folder.
+        files: Paths of its other files, relative to the folder.
     """
 
     name: str
@@ -111,8 +111,7 @@ class FinishedCell:
 def finished(folder: Path) -> Iterator[FinishedCell]:
     """Yields every finished cell in a folder of cells, in the order of the names.
 
-    Raises:
-        InputError: A cell is damaged, or cells were made by different code.
+    All are verified, and made by the same code.
     """
     first: FinishedCell | None = None
     for path in sorted(folder.glob(f"*/{CELL}")):
@@ -129,11 +128,6 @@ def finished(folder: Path) -> Iterator[FinishedCell]:
 
 def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
     """Computes a cell in a worker, unless it is finished meanwhile.
-
-    Args:
-        folder: Folder of the study.
-        cell: The cell.
-        made: The versions and the digest of the code of the command.
 
     Raises:
         InputError: The worker has other code than the command.
@@ -228,11 +222,7 @@ def _is_complete(place: Path) -> bool:
 
 
 def read_cell(path: Path) -> FinishedCell:
-    """Returns a finished cell, verified.
-
-    Raises:
-        InputError: The file is damaged, altered, or of another cell.
-    """
+    """Returns a finished cell; one that is damaged, altered, or of another cell is refused."""
     data = read_file(path, "a cell of a study", MAX_BYTES)
     try:
         content = json.loads(data)
@@ -253,12 +243,8 @@ def read_cell(path: Path) -> FinishedCell:
 def made_with(function: str) -> dict[str, str]:
     """Returns what determines the bits of a cell besides its definition.
 
-    Args:
-        function: Function of the cell, as ``package.module:function``.
-
-    Returns:
-        The versions of selfmodel, MuJoCo and numpy, and the digest of the code: of all modules and
-        models of selfmodel, and of the function's module.
+    It is the versions of selfmodel, MuJoCo and numpy, and the digest of the code: of all modules
+    and models of selfmodel, and of the function's module.
     """
     files = [
         Path(folder, name)

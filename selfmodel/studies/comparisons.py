@@ -58,9 +58,9 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
     """
     rows: list[dict[str, Any]] = []
     for table, measure, runs in _tables(outcomes):
-        pairs = []
-        for pair in itertools.combinations(runs.columns, 2):
-            both = runs[list(pair)].dropna().astype(float)
+        pairs: list[dict[str, Any]] = []
+        for methods in itertools.combinations(runs.columns, 2):
+            both = runs[list(methods)].dropna().astype(float)
             if len(both):
                 pairs.append({"table": table, **_compared(both, measure, seed)})
         over_runs = statistics.holm([pair["p_runs"] for pair in pairs])

@@ -51,22 +51,16 @@ TIME = "time"
 class Experiment:
     """Definition of a recovery with known truth.
 
+    The fields of the same names are those of ``RecoveryLoop``.
+
     Attributes:
         robot: The nominal robot.
         case: Number of the failure in Table I; None for a failure that is not in it.
         truth: Faults of the physical robot after the failure.
-        choose_comparator: Chooses the comparator from the first trials.
-        settings: Parameters of the recovery.
-        seed: Seed of all random numbers.
-        threads: Number of threads of the physics.
         folder: Folder of the run.
-        gait: Controller before the failure; None to evolve one.
         gap: Level of the reality gap.
-        kinds: Fault kinds to search.
         calibrated: Whether the self-model is fitted to the trials before the failure.
         next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
-        design: Controller design; None for the robot's network.
-        score: Fitness of the repair.
         physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
             the model; unused with a reality gap.
         repair: Name of the repair, ``robust`` or ``paper``.
@@ -97,14 +91,7 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of an experiment.
-
-    Attributes:
-        recovery: The recovery.
-        correct: Whether the last diagnosis is right.
-        stats: Simulations of the self-model during the recovery.
-        seconds: Wall time of the recovery, s.
-    """
+    """Result of an experiment: simulations of the self-model, and wall time, s, of the recovery."""
 
     recovery: Recovery
     correct: bool
@@ -125,11 +112,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     journal = create_journal(
         experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
-    hidden: dict[Stage, str] = {
-        "before": str(INTACT),
-        "after": str(truth),
-        "recovery": str(truth),
-    }
+    hidden: dict[Stage, str] = {"before": str(INTACT), "after": str(truth), "recovery": str(truth)}
     recovery = RecoveryLoop(
         simulator=simulator,
         choose_comparator=experiment.choose_comparator,
@@ -235,10 +218,9 @@ def choose_score(
         reference: File of the trajectory to follow; None for the motion of the first controller in
             simulation.
         gait: The first controller; None for one with random weights if its motion is needed.
-        max_speed: Largest speed of a joint, rad/s; None for no limit.
-        max_torque: Largest torque of a joint, N m; None for no limit.
-        max_self_collision: Largest depth to which two bodies penetrate each other, m; None for no
-            limit.
+        max_speed: Largest speed of a joint, rad/s.
+        max_torque: Largest torque of a joint, N m.
+        max_self_collision: Largest depth to which two bodies penetrate each other, m.
 
     Raises:
         InputError: The name is unknown or the robot has no such score, a reference or a limit is
@@ -270,18 +252,14 @@ def choose_score(
 
 def _limited(name: str, limits: Sequence[float | None]) -> Score:
     """Returns the score ``upright`` with limits of speed, torque and depth; None for no limit."""
-    options = {
-        "--max-joint-speed": "above 0 rad/s",
-        "--max-joint-torque": "above 0 N m",
-        "--max-self-collision": "of 0 m or above",
-    }
+    options = ("--max-joint-speed", "--max-joint-torque", "--max-self-collision")
     if name != UPRIGHT.name:
         raise InputError(
             f"{', '.join(options)} are limits of --score {UPRIGHT.name}, got {name}: leave them out"
         )
-    for (option, allowed), limit in zip(options.items(), limits, strict=True):
-        is_depth = option == "--max-self-collision"
-        if limit is not None and not (limit > 0 or (is_depth and limit == 0)):
+    ranges = ("above 0 rad/s", "above 0 N m", "of 0 m or above")
+    for option, allowed, limit in zip(options, ranges, limits, strict=True):
+        if limit is not None and not (limit > 0 or (limit == 0 and "or above" in allowed)):
             raise InputError(
                 f"expected {option} {allowed}, got {limit:g}: give the largest value that is "
                 f"allowed, or leave the option out"
@@ -290,23 +268,14 @@ def _limited(name: str, limits: Sequence[float | None]) -> Score:
 
 
 def check_score(name: str, entry: Entry) -> None:
-    """Checks that a robot has a score of that name.
-
-    Raises:
-        InputError: The name is unknown, the robot has no task with rewards, or the score is a
-            displacement and the base is fixed.
-    """
+    """Checks that a robot has a score of that name, and that its base moves if that is needed."""
     if name != TRACKING:
         robot = entry.robot()
         check_motion(plugins.score(name, robot.name, entry), robot)
 
 
 def check_motion(score: Score, robot: Robot) -> None:
-    """Checks that the base of a robot moves if its score is a displacement.
-
-    Raises:
-        InputError: The score is a displacement and the base is fixed.
-    """
+    """Checks that the base of a robot moves if its score is a displacement."""
     if robot.has_fixed_base and score.needs_free_base:
         raise InputError(
             f"the base of {robot.name} is fixed, and the score {score.name} is a displacement of "

@@ -6,15 +6,8 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent import futures
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
@@ -24,18 +17,8 @@ from typing import ParamSpec, TypeVar
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.files import make_folder
-from selfmodel.studies.cells import (
-    CELL,
-    UNFINISHED,
-    Answer,
-    Cell,
-    FinishedCell,
-    compute,
-    keep_error,
-    listed,
-    made_with,
-    read_cell,
-)
+from selfmodel.studies import cells as cell_files
+from selfmodel.studies.cells import CELL, UNFINISHED, Answer, Cell, listed, made_with, read_cell
 
 ATTEMPTS = 2
 """Attempts to compute a cell whose process ends."""
@@ -120,16 +103,13 @@ def _with_needs(cells: Iterable[Cell]) -> dict[str, Cell]:
 
 
 def _unfinished(folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]) -> dict[str, Cell]:
-    """Returns the cells to compute by their place.
-
-    A cell that only finished ones need is not computed; one that others need, and that lacks files,
-    is.
+    """Returns the cells to compute by their place; a needed cell that lacks files is among them.
 
     Raises:
         InputError: A cell in the folder is damaged, or was made by other code than this.
     """
     made = [made_with(function) for function in {cell.function for cell in every.values()}]
-    known: dict[str, FinishedCell] = {}
+    known: dict[str, cell_files.FinishedCell] = {}
     for path in sorted(folder.glob(f"*/*/{CELL}")):
         if path.parts[-3] == UNFINISHED:  # what a killed worker left
             continue
@@ -185,7 +165,11 @@ def _computed(
                     answers[place] = 0.0, f"not computed: it needs {lost[0]}, which failed"
                 else:
                     running[_submitted(executor, folder, cell)] = place
-            for future in wait(running, return_when=FIRST_COMPLETED).done if not answers else ():
+            for future in (
+                futures.wait(running, return_when=futures.FIRST_COMPLETED).done
+                if not answers
+                else ()
+            ):
                 place = running.pop(future)
                 answers[place] = _answer(future, folder, place)
             for place, answer in answers.items():
@@ -200,12 +184,12 @@ def _until_all_end(executor: Executor, running: Iterable["Future[Answer]"]) -> I
     try:
         yield executor
     finally:
-        wait([future for future in running if not future.cancel()])
+        futures.wait([future for future in running if not future.cancel()])
 
 
 def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]":
     try:
-        return executor.submit(compute, folder, cell, dict(made_with(cell.function)))
+        return executor.submit(cell_files.compute, folder, cell, dict(made_with(cell.function)))
     except RuntimeError as error:  # of an executor that has ended
         raise WorkError(
             f"the executor takes no more cells ({error}): finished cells are kept; the same "
@@ -214,13 +198,7 @@ def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]"
 
 
 def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
-    """Returns the answer of a call that has ended.
-
-    Raises:
-        InputError: The worker has other code than the command.
-        OSError: The worker cannot write into the folder.
-        WorkError: The executor has ended.
-    """
+    """Returns the answer of a call that has ended; raises what ends the grid."""
     if future.cancelled():
         raise WorkError(
             "the executor has ended, such as the scheduler of a cluster: finished cells are kept; "
@@ -238,7 +216,7 @@ def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
             f"selfmodel there as here"
         ) from error
     reason = f"the executor failed to compute it: {line}"
-    keep_error(folder, place, reason)
+    cell_files.keep_error(folder, place, reason)
     return 0.0, reason
 
 
@@ -246,9 +224,6 @@ class Processes(Executor):
     """Processes of this machine; a call whose process ends is repeated once, in a new one.
 
     The processes end with the ``with`` block.
-
-    Args:
-        workers: Number of processes.
     """
 
     def __init__(self, workers: int) -> None:
@@ -281,13 +256,13 @@ class Processes(Executor):
                 future: Future[_T] = self._of_thread.pool.submit(call, *args, **kwargs)
             try:
                 return future.result()
-            except BrokenExecutor as error:
+            except futures.BrokenExecutor as error:
                 reason = error
                 del self._of_thread.pool
-        raise BrokenExecutor(f"its process ended in each of {ATTEMPTS} attempts: {reason}")
+        raise futures.BrokenExecutor(f"its process ended in each of {ATTEMPTS} attempts: {reason}")
 
 
-def _one_process() -> ProcessPoolExecutor:
+def _one_process() -> futures.ProcessPoolExecutor:
     """Returns an executor of one process.
 
     Python's resource tracker, which it needs, must not end with the terminal, by SIGHUP: started
@@ -298,7 +273,7 @@ def _one_process() -> ProcessPoolExecutor:
         resource_tracker.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
+    return futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
 
 
 def _begin_worker() -> None:

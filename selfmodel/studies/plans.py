@@ -63,6 +63,8 @@ DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 PAPER_COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
 """Comparators of the paper's experiment by default: the paper's, then selfmodel's."""
 
+Needs = Callable[[Point], Mapping[str, Cell]]
+
 Share = tuple[int, int]
 """``(i, n)``: share i of n of the runs, from 1, for n machines with a folder each."""
 
@@ -113,9 +115,9 @@ def ablation(
         InputError: The definition is invalid.
     """
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
+    trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
-    _check_lists(lists, cases, damages)
-    _check_trials(next_trial, settings.trials, gaps)
+    _check(lists, cases, damages, next_trial, trials)
     if bank is not None and by_bank and repair != plugins.PAPER:
         raise InputError(
             f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
@@ -130,13 +132,10 @@ def ablation(
         for case, truth in failures[robot]
         for gap in gaps
     ][only[0] - 1 :: only[1]]
-    count = max(HEALTHY_TRIALS, settings.trials) if by_bank else 1
     # The trials of a recovery exclude the failing one.
-    trials = settings.trials if by_bank else settings.trials - 1
-    shared = {
-        **_shared(dataclasses.replace(settings, trials=trials), kinds, chosen, next_trial),
-        "evolves": bank is None or not by_bank,
-    }
+    own = dataclasses.replace(settings, trials=trials if by_bank else trials - 1)
+    evolves = {"evolves": bank is None or not by_bank}
+    shared = {**_shared(own, kinds, chosen, next_trial), **evolves}
 
     @cache
     def gait(robot: str, number: int) -> Cell:
@@ -146,13 +145,14 @@ def ablation(
         return recoveries.given_gait_cell(bank, model, number)
 
     def needs(point: Point) -> dict[str, Cell]:
-        gaits = [gait(point["robot"], (point["seed"] + trial) % GAITS) for trial in range(count)]
+        robot, seed = point["robot"], point["seed"]
         if not by_bank:
-            return {"gait": gaits[0]}
+            return {"gait": gait(robot, seed % GAITS)}
+        count = max(HEALTHY_TRIALS, trials)
+        gaits = {f"gait-{number}": gait(robot, (seed + number) % GAITS) for number in range(count)}
         run = {name: value for name, value in point.items() if name != "comparator"}
-        named = {f"gait-{number}": one for number, one in enumerate(gaits)}
         function = f"{recoveries.__name__}:run_trials"
-        return {"trials": Cell(function, _name(run), {**run, "shared": shared}, named, "trials")}
+        return {"trials": Cell(function, _name(run), {**run, "shared": shared}, gaits, "trials")}
 
     points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
     function = "diagnose" if by_bank else "recover"
@@ -176,7 +176,7 @@ def suite(
     search: str | None = None,
     only: Share = ALL,
 ) -> Study:
-    """Returns a study of recoveries of many bodies.
+    """Returns a study of recoveries of many bodies, with one comparator; see ``ablation``.
 
     Args:
         folder: Folder of the study.
@@ -205,7 +205,6 @@ def suite(
     for case in cases:
         if case not in known:
             raise unknown_name("case of these bodies", str(case), map(str, known))
-    design = {"controller": controller, "neurons": neurons}
     points: list[Point] = []
     for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
         entry = robot_entry(body)
@@ -216,7 +215,8 @@ def suite(
             truth = entry.cases.get(case)
             # Controllers without hidden neurons have none that could fail.
             if truth and max(silent_neurons(parse(truth, robot.anatomy)), default=-1) < hidden:
-                points.append(_point(body, case, truth, gap, seed, comparator=comparator))
+                points.append({**_point(body, case, truth, gap, seed), "comparator": comparator})
+    design = {"controller": controller, "neurons": neurons}
     shared = {**_shared(settings, kinds, chosen), **design, "comparator": comparator, "gap": gap}
     return _study("suite", folder, points, shared, _one_gait(settings, chosen, **design))
 
@@ -235,14 +235,6 @@ def paper(
     A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
     is exact, and is not calibrated.
 
-    Args:
-        folder: Folder of the study.
-        robots: Names of the paper's robots.
-        cases: Numbers of failures in Table I.
-        seeds: Seeds, one run of each case each.
-        comparators: Names of comparators, ``package.module:object``, or ``auto``.
-        settings: Parameters of the recoveries.
-
     Raises:
         InputError: The definition is invalid.
     """
@@ -258,15 +250,12 @@ def paper(
         comparator_choice(comparator)
     chosen = repair_parameters(plugins.PAPER, None, None)
     points = [
-        _point(robot, case, ROBOTS[robot].cases[case], 0.0, seed, comparator=way)
+        {**_point(robot, case, ROBOTS[robot].cases[case], 0.0, seed), "comparator": way}
         for seed, robot, case in itertools.product(seeds, robots, cases)
         for way in (*comparators, ON_ROBOT)
     ]
     shared = {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False}
     return _study("paper", folder, points, shared, _one_gait(settings, chosen))
-
-
-Needs = Callable[[Point], Mapping[str, Cell]]
 
 
 def _one_gait(settings: Settings, repair: Mapping[str, str], **design: Any) -> Needs:  # noqa: ANN401  # name and neurons
@@ -310,17 +299,15 @@ def _study(
     return Study(name, folder, f"{recoveries.__name__}:{function}", named, shared, needs)
 
 
-def _point(
-    robot: str, case: int | None, truth: str, gap: float, seed: int, **more: str
-) -> dict[str, Any]:
-    return {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed, **more}
+def _point(robot: str, case: int | None, truth: str, gap: float, seed: int) -> dict[str, Any]:
+    return {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed}
 
 
 def _name(run: Point) -> str:
     """Returns the name of a run or of a point, in which a colon of a plug-in's is quoted."""
     failure = quote(run["truth"], safe="=") if run["case"] is None else f"case{run['case']:02d}"
     name = f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
-    return "-".join([name, *(quote(run[key], safe="=") for key in ("comparator",) if key in run)])
+    return f"{name}-{quote(run['comparator'], safe='=')}" if "comparator" in run else name
 
 
 def _shared(
@@ -339,19 +326,20 @@ def _shared(
     }
 
 
-def _check_lists(
-    lists: Mapping[str, Sequence[Any]], cases: Sequence[int] | None, damages: Sequence[str]
+def _check(
+    lists: Mapping[str, Sequence[Any]],
+    cases: Sequence[int] | None,
+    damages: Sequence[str],
+    next_trial: str,
+    trials: int,
 ) -> None:
-    for name, values in lists.items():
-        if not values:
-            raise InputError(f"expected at least one of the {name} of an ablation, got none")
+    """Refuses the definition of an ablation that has no runs, or no trials to choose."""
+    if empty := [name for name, values in lists.items() if not values]:
+        raise InputError(f"expected at least one of the {empty[0]} of an ablation, got none")
     if not (cases is None or cases or damages):
         raise InputError("expected at least one case or one damage of an ablation, got neither")
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
-
-
-def _check_trials(next_trial: str, trials: int, gaps: Sequence[float]) -> None:
     if next_trial not in NEXT_TRIAL:
         raise unknown_name("choice of the next trial", next_trial, NEXT_TRIAL)
     if next_trial != BANK and trials < 2:
@@ -359,7 +347,7 @@ def _check_trials(next_trial: str, trials: int, gaps: Sequence[float]) -> None:
             f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
             f"diagnosis chooses the second trial"
         )
-    if next_trial == BANK and trials > GAITS and 0 in gaps:
+    if next_trial == BANK and trials > GAITS and 0 in lists["gaps"]:
         raise InputError(
             f"without a gap, the same gait gives the same trial, and the bank has {GAITS} gaits: "
             f"give at most {GAITS} trials, got {trials}, or only gaps above 0"
@@ -400,18 +388,16 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
     """
     bodies: list[str] = []
     for given in domains:
-        if is_model(given):
-            bodies.append(given)
-            continue
-        domain = _domain(given)
-        every = DOMAINS[domain]
+        domain = given if is_model(given) else _domain(given)
+        every = DOMAINS.get(domain, ())
         chosen = every[:1] if tasks is None else [task for task in every if task in tasks]
-        if not chosen:
+        if every and not chosen:
             raise InputError(
                 f"{domain} has none of the tasks {', '.join(tasks or ())}: it has "
                 f"{', '.join(every)}"
             )
-        bodies += [domain] if domain in ROBOTS else [f"{domain}-{task}" for task in chosen]
+        is_body = domain in ROBOTS or not every
+        bodies += [domain] if is_body else [f"{domain}-{task}" for task in chosen]
     known = tasks_of(domains)
     for task in tasks or ():
         if task not in known:

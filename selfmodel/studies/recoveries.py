@@ -8,7 +8,7 @@ import base64
 import dataclasses
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -40,14 +40,8 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.studies import experiment as experiments
 from selfmodel.studies.cells import Cell
-from selfmodel.studies.experiment import (
-    Experiment,
-    choose_score,
-    draw_reality,
-    is_correct,
-    run,
-)
 from selfmodel.studies.study import Row
 from selfmodel.tasks import Entry
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
@@ -156,7 +150,9 @@ def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
     entry, settings = planned_entry(parameters), Settings(**parameters["settings"])
     robot, seed = entry.robot(), parameters["seed"]
     design = plugins.design(parameters["controller"], robot, parameters["neurons"])
-    score, gait = choose_score(parameters["score"], entry, design, steps=settings.steps, seed=seed)
+    score, gait = experiments.choose_score(
+        parameters["score"], entry, design, steps=settings.steps, seed=seed
+    )
     evaluations = 0
     if gait is None:
         make_repair = plugins.repair(parameters["repair"], parameters["search"])
@@ -205,15 +201,6 @@ def _bank_file(bank: Path, robot: str, number: int) -> Path:
     return evolved[0] if evolved and not given.exists() else given
 
 
-def read_gait(folder: Path, robot: Robot) -> Controller:
-    """Returns the gait in the folder of its cell.
-
-    Raises:
-        InputError: The gait is for another robot.
-    """
-    return read_controller(folder / GAIT, robot)
-
-
 def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str]:
     """Runs the trials of a run before and after the failure, and fits the self-model to the former.
 
@@ -222,15 +209,15 @@ def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str
     """
     settings = Settings(**parameters["shared"]["settings"])
     robot, seed = planned_entry(parameters).robot(), parameters["seed"]
-    gaits = [read_gait(needs[f"gait-{number}"], robot) for number in range(len(needs))]
-    stages: list[Stage] = ["before" for _ in range(HEALTHY_TRIALS)]
-    stages += ["after" for _ in range(settings.trials)]
-    reality = draw_reality(robot, seed, parameters["gap"])
+    gaits = [read_controller(needs[f"gait-{number}"] / GAIT, robot) for number in range(len(needs))]
+    truth = truth_of(parameters, robot)
+    before: list[tuple[Stage, Hypothesis]] = [("before", INTACT)] * HEALTHY_TRIALS
+    after: list[tuple[Stage, Hypothesis]] = [("after", truth)] * settings.trials
+    reality = experiments.draw_reality(robot, seed, parameters["gap"])
     trials: list[Trial] = []
-    for number, stage in enumerate(stages):
+    for number, (stage, hidden) in enumerate([*before, *after]):
         name = f"{number:02d}-{stage}"
         gait = gaits[number if stage == "before" else number - HEALTHY_TRIALS]
-        hidden = INTACT if stage == "before" else truth_of(parameters, robot)
         # Noise differs between trials and is the same for every comparator.
         physical = reality.robot(robot, hidden, stream=number)
         plan = TrialPlan(name, stage, gait, settings.steps, seed)
@@ -265,18 +252,9 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],
     )
-    watch, counts = _DiagnosisWatch(), []
-
-    def on_event(event: Event) -> None:
-        watch(event)
-        if isinstance(event, Diagnosis):
-            counts.append(search.distinct_hypotheses)
-
-    diagnose_trials(trials, search, parameters["seed"], on_event, after={1, len(trials)})
-    rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
-    for row, count in zip(rows, counts, strict=True):
-        row["distinct_hypotheses"] = count
-    return {"diagnoses": rows}
+    watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
+    diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
+    return {"diagnoses": watch.rows(shared, robot, truth_of(parameters, robot), trials)}
 
 
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
@@ -293,11 +271,13 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     shared, entry = parameters["shared"], planned_entry(parameters)
     robot, settings = entry.robot(), Settings(**shared["settings"])
     design = plugins.design(shared["controller"], robot, shared["neurons"])
-    truth, gait = truth_of(parameters, robot), read_gait(needs["gait"], robot)
+    truth, gait = truth_of(parameters, robot), read_controller(needs["gait"] / GAIT, robot)
     check_silent_neurons(design, silent_neurons(truth))
     steps, seed = settings.steps, parameters["seed"]
-    score = choose_score(shared["score"], entry, design, steps=steps, seed=seed, gait=gait).score
-    experiment = Experiment(
+    score, _ = experiments.choose_score(
+        shared["score"], entry, design, steps=steps, seed=seed, gait=gait
+    )
+    experiment = experiments.Experiment(
         robot=robot,
         case=parameters["case"],
         truth=truth,
@@ -318,7 +298,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         search=shared["search"],
     )
     watch = _DiagnosisWatch()
-    outcome = run(experiment, watch)
+    outcome = experiments.run(experiment, watch)
     recovery = outcome.recovery
     before, after, *recoveries = [
         score.of_trial(robot, truth if number else INTACT, trial)
@@ -348,6 +328,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "repair": shared["repair"],
         "search": shared["search"],
     }
+    columns = (recovery.trials, recovery.tried, recovery.predicted, recovery.falls)
     trials = [
         {
             "robot": robot.name,
@@ -356,10 +337,10 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
             "hypothesis": str(tried),
             "displacement": trial.displacement,
             "upright": UPRIGHT.of_trial(robot, tried, trial),
-            "predicted": _finite(recovery.predicted[number]),
-            "fell_at_step": recovery.falls[number],
+            "predicted": _finite(predicted),
+            "fell_at_step": fall,
         }
-        for number, (trial, tried) in enumerate(zip(recovery.trials, recovery.tried, strict=True))
+        for number, (trial, tried, predicted, fall) in enumerate(zip(*columns, strict=True))
     ]
     return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
 
@@ -372,7 +353,7 @@ def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
     """
     robot = planned_entry(parameters).robot()
     settings = Settings(**parameters["shared"]["settings"])
-    simulator, gait = Simulator(robot, threads=1), read_gait(needs["gait"], robot)
+    simulator, gait = Simulator(robot, threads=1), read_controller(needs["gait"] / GAIT, robot)
     walk = simulator.run([(INTACT, gait)], settings.steps, DISPLACEMENT.record).trajectory
     before = float(DISPLACEMENT.of(robot, INTACT, walk)[0])
     rows: list[Row] = []
@@ -389,10 +370,14 @@ def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
 
 
 class _DiagnosisWatch:
-    """Keeps each diagnosis with the hypotheses that were evaluated, and the seconds, until then."""
+    """Keeps each diagnosis with what it took until then.
 
-    def __init__(self) -> None:
-        self._diagnoses: list[tuple[Diagnosis, int, float]] = []
+    Args:
+        count: Returns the number of distinct hypotheses so far; None if it is unknown.
+    """
+
+    def __init__(self, count: Callable[[], int | None] = lambda: None) -> None:
+        self._count, self._costs = count, list[tuple[Diagnosis, Row]]()
         self._evaluations, self._seconds, self._start, self._diagnosing = 0, 0.0, 0.0, False
 
     def __call__(self, event: Event) -> None:
@@ -404,32 +389,37 @@ class _DiagnosisWatch:
                 self._evaluations += event.evaluations
             case Diagnosis():
                 self._seconds += perf_counter() - self._start
-                self._diagnoses.append((event, self._evaluations, self._seconds))
+                cost = {
+                    "evaluations": self._evaluations,
+                    "distinct_hypotheses": self._count(),
+                    "seconds": self._seconds,
+                }
+                self._costs.append((event, cost))
 
     def rows(
         self, shared: Parameters, robot: Robot, truth: Hypothesis, trials: Sequence[Trial]
     ) -> list[Row]:
-        """Returns a row per diagnosis, without displacements and number of distinct hypotheses."""
+        """Returns a row per diagnosis, without displacements."""
         simulator = Simulator(robot, threads=1)  # scoring is no cost of the diagnosis
         evolved = shared["evolves"]
         return [
             {
                 "next_trial": shared["next_trial"],
-                "trials": diagnosis.trials,
-                "best": str(diagnosis.best),
-                "correct": is_correct(diagnosis.best, truth, trials[: diagnosis.trials], simulator),
-                "distance": _finite(diagnosis.ranked[0].distance),
-                "intact_distance": _finite(diagnosis.intact_distance),
-                "verdict": diagnosis.verdict,
-                "rivals": len(diagnosis.indistinguishable),
-                "evaluations": evaluations,
-                "distinct_hypotheses": None,
-                "seconds": seconds,
+                "trials": found.trials,
+                "best": str(found.best),
+                "correct": experiments.is_correct(
+                    found.best, truth, trials[: found.trials], simulator
+                ),
+                "distance": _finite(found.ranked[0].distance),
+                "intact_distance": _finite(found.intact_distance),
+                "verdict": found.verdict,
+                "rivals": len(found.indistinguishable),
+                **cost,
                 **dict.fromkeys(("before", "after", "recovered")),
                 "repair": shared["repair"] if evolved else None,
                 "search": shared["search"] if evolved else None,
             }
-            for diagnosis, evaluations, seconds in self._diagnoses
+            for found, cost in self._costs
         ]
 
 

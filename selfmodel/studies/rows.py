@@ -252,11 +252,22 @@ def _rows_of_file(path: Path) -> pd.DataFrame:
         text = data.decode("utf-8-sig")
         if path.suffix == ".jsonl":
             return frame_of([json.loads(line) for line in text.splitlines()])
-        exact = {"float_precision": "round_trip", "na_values": [""], "keep_default_na": False}
-        return _typed(pd.read_csv(io.StringIO(text), **exact))
+        texts = pd.read_csv(io.StringIO(text), dtype=str, na_values=[""], keep_default_na=False)
+        return _typed(texts.apply(_parsed))
     except (ValueError, RecursionError) as error:  # pandas' own errors are ValueErrors
         reason = " ".join(str(error).split())
         raise InputError(f"{path}: expected the rows of a study, got {reason}") from error
+
+
+def _parsed(texts: pd.Series) -> pd.Series:
+    """Returns a column as flags or numbers, if all of its texts are; exact, unlike pandas' own."""
+    flags = texts.str.lower().map({"true": True, "false": False})
+    if flags.notna().any() and (flags.notna() == texts.notna()).all():
+        return flags
+    try:
+        return texts.map(float)
+    except ValueError:
+        return texts
 
 
 def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:

@@ -29,8 +29,7 @@ Row = dict[str, Any]
 def points_of(**axes: Iterable[Any]) -> dict[str, Point]:
     """Returns all combinations of the values of axes by a name for readers, the last axis fastest.
 
-    Args:
-        **axes: Values by the name of the axis, as JSON.
+    The values are JSON.
     """
     points = (dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values()))
     return {
@@ -72,8 +71,7 @@ class Study:
             Cell(self.function, name, {**point, SHARED: shared}, self.needs(point), RUNS)
             for name, point in self.points.items()
         ]
-        if cells:
-            self._check(cells)
+        self._check(cells, shared)
         return cells
 
     def run(
@@ -92,18 +90,15 @@ class Study:
         """Returns the rows of all finished runs in the folder; see ``rows_in``."""
         return rows_in(self.folder, table)
 
-    def _check(self, cells: Sequence[Cell]) -> None:
+    def _check(self, cells: Sequence[Cell], shared: Mapping[str, Any]) -> None:
         """Checks that the runs in the folder and the cells to compute make one table."""
         places = {cell.name: cell.place for cell in cells}
         models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
-        for run in finished(self.folder / RUNS):
+        for run in finished(self.folder / RUNS) if cells else ():
             robot, model = run.parameters.get("robot"), run.parameters.get("model")
-            there = {**run.parameters.get(SHARED, {}), f"the model of {robot}": model}
-            requested = {
-                **cells[0].parameters[SHARED],
-                f"the model of {robot}": models.get(robot, model),
-            }
-            if where := _difference(there, requested):
+            of_model = f"the model of {robot}"
+            there = {**run.parameters.get(SHARED, {}), of_model: model}
+            if where := _difference(there, {**shared, of_model: models.get(robot, model)}):
                 raise InputError(
                     f"{self.folder} contains a study with other settings ({where}): choose another "
                     f"folder"
@@ -129,9 +124,8 @@ def rows_in(folder: Path, table: str | None = None) -> list[Row]:
     """
     rows: list[Row] = []
     for cell in finished(folder / RUNS):
-        hidden = (SHARED, "model")
-        axes = {key: value for key, value in cell.parameters.items() if key not in hidden}
-        result = cell.result
+        given, result = cell.parameters, cell.result
+        axes = {key: given[key] for key in given if key not in (SHARED, "model")}
         if table and isinstance(result, dict):
             result = result.get(table, [])
         result = result if isinstance(result, list) else [result]
