@@ -13,21 +13,10 @@ from threadpoolctl import threadpool_limits
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import NOMINAL, Fit, is_determined, nested_fits
 from selfmodel.simulation.log_check import Suspicion, suspicion
-from selfmodel.simulation.model_factors import (
-    FACTORS,
-    JOINT_FIELDS,
-    JOINT_PRIOR_DEVIATIONS,
-    SHARED,
-    Parameters,
-    factor_names,
-    joint_values,
-    nominal,
-    prior_deviations,
-    with_parameters,
-)
-from selfmodel.simulation.rollout import SimulationStats
+from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.segments import SegmentErrors, observed_segments, root_mean_square
 from selfmodel.trials.trial import Trial
 
@@ -72,7 +61,7 @@ class Calibration:
     error_before: float
     error: float
     joints: dict[str, Any] | None = None
-    chosen: str = FACTORS
+    chosen: str = model_factors.FACTORS
     determined: tuple[bool, ...] = ()
     held_out_gain: float = 0.0
     suspicion: Suspicion | None = None
@@ -94,7 +83,7 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
-        parts = (*JOINT_FIELDS, "body_mass", "body_inertia")
+        parts = (*model_factors.JOINT_FIELDS, "body_mass", "body_inertia")
         factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
         return {
             **({} if self.joints is None else {"joints": self.joints}),
@@ -132,7 +121,7 @@ class Calibration:
 
     def rows(self) -> list[dict[str, Any]]:
         """Returns name, factor, deviation and whether the trials determine it, of each factor."""
-        names = factor_names(self.robot)
+        names = model_factors.factor_names(self.robot)
         columns = (
             *(names, self.parameters.factors.tolist(), self.deviations.tolist()),
             self.determined or (False,) * len(names),
@@ -169,99 +158,93 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
     with threadpool_limits(1, "blas"):
-        segments, stats = _segment_errors(robot, trials, threads), SimulationStats()
-        before = segments.of([nominal(robot)], stats)[:, 0]
-        prior = prior_deviations(robot)
-        fits = [Fit(NOMINAL, nominal(robot), prior, before, before)]
+        segments = _segment_errors(robot, trials, threads)
+        before = segments.of([nominal(robot)])[:, 0]
+        prior = model_factors.prior_deviations(robot)
+        first = Fit(NOMINAL, nominal(robot), prior, before, before)
         is_exact = root_mean_square(before) < EXACT_ERROR
-        if not is_exact:
-            fits = nested_fits(segments, before, stats)
-        if stats.diverged == stats.runs:
+        best = first if is_exact else nested_fits(segments, first)[-1]
+        if segments.stats.diverged == segments.stats.runs:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
                 f"remained finite, before and after the fit: check the model and the units of the "
                 f"log"
             )
-        best, is_checked = fits[-1], not (is_exact or robot.has_fixed_base)
         deviations, known = (
-            np.concatenate([own[quantity] for quantity in (*SHARED, "motor_gains")])
+            np.concatenate([own[quantity] for quantity in (*model_factors.SHARED, "motor_gains")])
             for own in (best.deviations, prior)
         )
-        loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, fits[0]))
+        loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
+        is_fixed, parameters = robot.has_fixed_base, best.parameters
         return Calibration(
-            robot=robot if best.name == NOMINAL else with_parameters(robot, best.parameters),
-            parameters=best.parameters,
+            robot=robot if best is first else model_factors.with_parameters(robot, parameters),
+            parameters=parameters,
             deviations=deviations,
-            error_before=root_mean_square(before),
-            error=root_mean_square(best.errors),
-            joints=_joints(segments, fits[0], best) if robot.has_fixed_base else None,
+            error_before=float(root_mean_square(before)),
+            error=float(root_mean_square(best.errors)),
+            joints=_joints(segments, first, best) if is_fixed else None,
             chosen=best.name,
             determined=tuple(is_determined(deviations, known).tolist()) if best.is_fitted else (),
             held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
-            suspicion=suspicion(segments, best.parameters, best.errors) if is_checked else None,
+            suspicion=None if is_exact or is_fixed else suspicion(segments, best),
         )
 
 
 def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
-    """Returns the prediction error of a self-model on trials.
+    """Returns the prediction error of a self-model on trials, as for ``calibrate``.
 
-    Args:
-        robot: The self-model.
-        trials: The trials, as for ``calibrate``.
-        threads: Threads of MuJoCo's steps.
-
-    Returns:
-        The root mean square error over all columns after all valid steps, in units of
-        ``CALIBRATION_ERROR_SCALES``.
+    It is the root mean square error over all columns after all valid steps, in units of
+    ``CALIBRATION_ERROR_SCALES``.
 
     Raises:
         InputError: Too little of a trial was observed.
     """
-    return root_mean_square(_segment_errors(robot, trials, threads).of([nominal(robot)]))
+    errors = _segment_errors(robot, trials, threads).of([nominal(robot)])[:, 0]
+    return float(root_mean_square(errors))
 
 
 def _segment_errors(robot: Robot, trials: Sequence[Trial], threads: int) -> SegmentErrors:
     return SegmentErrors(robot, [observed_segments(robot, trial) for trial in trials], threads)
 
 
-_QUANTITY_NAMES = {
-    "motor_gains": "gain",
-    "joint_damping": "damping",
-    "dry_friction": "dry friction",
-    "armature": "armature",
-}
-"""Names of quantities in JSON."""
-
-_ROW = ("name", "quantity", "before", "value", "deviation", "determined")
-
-
 def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
     robot, rows = segments.robot, list[dict[str, Any]]()
-    for quantity, prior in JOINT_PRIOR_DEVIATIONS.items():
-        if quantity in JOINT_FIELDS:
-            names = robot.anatomy.hinges
-            before, values = (
-                joint_values(robot, own.parameters, quantity) for own in (first, best)
-            )
-        else:
-            names, before = robot.anatomy.motors, np.ones(robot.model.nu)
-            values = np.array(best.parameters.motor_gains)
+    quantities = {
+        "gain": "motor_gains",
+        "damping": "joint_damping",
+        "dry friction": "dry_friction",
+        "armature": "armature",
+    }
+    for name, quantity in quantities.items():
+        is_gain = quantity == "motor_gains"
+        before, values = (
+            np.array(own.parameters.motor_gains)
+            if is_gain
+            else model_factors.joint_values(robot, own.parameters, quantity)
+            for own in (first, best)
+        )
         deviations = best.deviations[quantity]
-        known = best.is_fitted & is_determined(deviations, np.array(prior))
-        columns = (own.tolist() for own in (before, values, deviations, known))
+        known = best.is_fitted & is_determined(deviations, first.deviations[quantity])
         rows += [
-            dict(zip(_ROW, (name, _QUANTITY_NAMES[quantity], *numbers), strict=True))
-            for name, *numbers in zip(names, *columns, strict=True)
+            {
+                "name": part,
+                "quantity": name,
+                "before": float(before[k]),
+                "value": float(values[k]),
+                "deviation": float(deviations[k]),
+                "determined": bool(known[k]),
+            }
+            for k, part in enumerate(robot.anatomy.motors if is_gain else robot.anatomy.hinges)
         ]
-    sizes = np.sqrt((segments.joint_errors(best.errors) ** 2).mean(axis=0))
+    sizes = root_mean_square(segments.joint_errors(best.errors))
     worst = int(np.argmax(sizes))
     return {
         "set": best.name,
         "delay": best.parameters.delay,
-        "error_before": root_mean_square(first.errors),
-        "error": root_mean_square(best.errors),
-        "held_out_error_before": root_mean_square(first.held_out),
-        "held_out_error": root_mean_square(best.held_out),
+        "error_before": float(root_mean_square(first.errors)),
+        "error": float(root_mean_square(best.errors)),
+        "held_out_error_before": float(root_mean_square(first.held_out)),
+        "held_out_error": float(root_mean_square(best.held_out)),
         "worst_joint": robot.anatomy.hinges[worst],
         "worst_joint_error": float(sizes[worst]),
         "parameters": rows,

@@ -13,15 +13,15 @@ friction and armature of all joints together, of each kind of joint, and of each
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import mujoco.minimize
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY, as_delay
-from selfmodel.simulation.model_factors import Basis, Parameters, bases, nominal, prior_deviations
-from selfmodel.simulation.rollout import SimulationStats
+from selfmodel.simulation.model_factors import Basis, Parameters, bases, prior_deviations
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
 
 NOMINAL, DELAY, CONTACTS = "nominal", "delay", "contacts"
@@ -115,41 +115,28 @@ def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
     return np.asarray(deviation < UNDETERMINED_SHARE * prior)
 
 
-def nested_fits(segments: SegmentErrors, before: FloatArray, stats: SimulationStats) -> list[Fit]:
-    """Returns the nominal set, then each nested set that was chosen; the last is the best.
-
-    Args:
-        segments: Segments of the healthy trials.
-        before: Errors of the nominal model, ``(errors,)``.
-        stats: Statistics that are updated by the predictions of fitted factors.
-    """
-    robot, folds = segments.robot, segments.folds(FOLDS)
-    best, prior = nominal(robot), prior_deviations(robot)
-    chosen = [Fit(NOMINAL, best, prior, before, before)]
+def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
+    """Returns the nominal set, then each nested set that was chosen; the last is the best."""
+    robot, best, chosen = segments.robot, first.parameters, [first]
 
     def choose(fit: Fit, min_z: float) -> bool:
-        losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
-        better = is_better(losses, others, min_z)
+        better = is_better(
+            segments.losses(fit.held_out), segments.losses(chosen[-1].held_out), min_z
+        )
         if better:
             chosen.append(fit)
         return better
 
-    def best_of(name: str, candidates: list[Parameters], errors: FloatArray) -> Fit:
-        """Returns the fit by the best candidate, given the errors of the best one so far."""
-        new = [own for own in candidates if own != best]
-        known = {best: errors, **dict(zip(new, segments.of(new).T, strict=True))}
-        return _best_candidate(name, segments, known, folds, prior)
-
     if not robot.has_fixed_base:
         delays = [replace(best, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
-        fit = best_of(DELAY, delays, before)
+        fit = _best_candidate(DELAY, segments, delays, first)
         choose(fit, MIN_Z)
         best = fit.parameters
         contacts = [
             replace(best, contact_stiffness=stiffness, contact_damping=damping)
             for stiffness, damping in product(CANDIDATE_STIFFNESSES, CANDIDATE_DAMPINGS)
         ]
-        fit = best_of(CONTACTS, contacts, fit.errors)
+        fit = _best_candidate(CONTACTS, segments, contacts, fit)
         if choose(fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
             best = fit.parameters
     for number, (name, basis) in enumerate(bases(robot)):
@@ -158,15 +145,9 @@ def nested_fits(segments: SegmentErrors, before: FloatArray, stats: SimulationSt
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
-        errors = segments.of([best], stats)[:, 0]
+        errors = segments.of([best])[:, 0]
         if _cost(errors) < _cost(chosen[-1].errors):
-            slopes = fitter.slopes(best, x, errors)
-            parts = folds[segments.segment_of_error]
-            left_out = [slopes.without(parts == part) for part in range(FOLDS)]
-            every = segments.of([basis.applied(best, own) for own in left_out])
-            held_out = every[np.arange(len(parts)), parts]
-            deviations = prior | basis.by_quantity(slopes.deviations())
-            choose(Fit(name, best, deviations, errors, held_out, is_fitted=True), MIN_Z)
+            choose(fitter.tested(name, best, x, errors), MIN_Z)
     return chosen
 
 
@@ -175,22 +156,24 @@ def _cost(errors: FloatArray) -> float:
 
 
 def _best_candidate(
-    name: str,
-    segments: SegmentErrors,
-    candidates: Mapping[Parameters, FloatArray],
-    folds: IndexArray,
-    prior: Mapping[str, FloatArray],
+    name: str, segments: SegmentErrors, candidates: list[Parameters], known: Fit
 ) -> Fit:
-    """Returns the best candidate, with the errors of each part by the best one without it."""
-    losses = {own: segments.losses(errors) for own, errors in candidates.items()}
-    best = min(candidates, key=lambda own: _cost(candidates[own]))
+    """Returns the best of a fit and other candidates.
+
+    The held-out errors of each part are those of the best candidate without it.
+    """
+    new = [own for own in candidates if own != known.parameters]
+    errors = {known.parameters: known.errors, **dict(zip(new, segments.of(new).T, strict=True))}
+    losses = {own: segments.losses(each) for own, each in errors.items()}
+    best = min(errors, key=lambda own: _cost(errors[own]))
+    folds = segments.folds(FOLDS)
     parts = folds[segments.segment_of_error]
     held_out = np.empty(len(parts))
     for part in range(FOLDS):
         kept = folds != part
         without = min(losses, key=lambda own: float(losses[own][kept].sum()))
-        held_out[parts == part] = candidates[without][parts == part]
-    return Fit(name, best, prior, candidates[best], held_out)
+        held_out[parts == part] = errors[without][parts == part]
+    return Fit(name, best, known.deviations, errors[best], held_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,11 +190,11 @@ class _Fitter:
     basis: Basis
     method: Method
 
-    @property
-    def steps(self) -> FloatArray:
-        """Steps of the finite differences, ``(coordinates, coordinates)``: a diagonal."""
+    @cached_property
+    def _widths(self) -> FloatArray:
+        """Steps of the finite differences, ``(coordinates,)``."""
         prior, method = self.basis.prior, self.method
-        return np.diag(method.step * (np.ones_like(prior) if method.is_central else prior))
+        return np.asarray(method.step * (np.ones_like(prior) if method.is_central else prior))
 
     def solved(
         self, start: Parameters, iterations: int | None = None
@@ -220,8 +203,7 @@ class _Fitter:
 
         Delay and contacts are the start's.
         """
-        basis, steps = self.basis, self.steps
-        width = np.diag(steps)
+        basis, width, steps = self.basis, self._widths, np.diag(self._widths)
 
         def residual(logarithms: FloatArray) -> FloatArray:
             """Returns the residuals of the data, then those of the prior."""
@@ -248,6 +230,12 @@ class _Fitter:
         )
         x = np.asarray(fitted.ravel())
         return basis.applied(start, x), x
+
+    @property
+    def _delay_parts(self) -> int:
+        """Parts of a control step of which a delay is a multiple."""
+        robot = self.segments.robot
+        return 1 if robot.model.na else robot.substeps
 
     def with_best_delay(self, start: Parameters) -> Parameters:
         """Returns the fit with the best delay: of whole control steps, then of parts of one.
@@ -293,79 +281,75 @@ class _Fitter:
                 best, least = moved, cost
         return best
 
-    @property
-    def _delay_parts(self) -> int:
-        """Parts of a control step of which a delay is a multiple."""
-        robot = self.segments.robot
-        return 1 if robot.model.na else robot.substeps
+    def tested(self, name: str, point: Parameters, x: FloatArray, errors: FloatArray) -> Fit:
+        """Returns a fit with its held-out errors and its posterior deviations.
 
-    def slopes(self, point: Parameters, x: FloatArray, errors: FloatArray) -> "_Slopes":
-        """Returns the residuals around a fit, given its coordinates and its errors.
+        Its residuals are linearised around it, with independent segments: long simulations are
+        chaotic, so that their derivatives would be meaningless. The fit without a part differs by
+        one Gauss-Newton step, less that of the whole fit, which the solver left.
 
-        Segments are made independent: long simulations are chaotic, so that their derivatives would
-        be meaningless.
+        Args:
+            name: Name of the set.
+            point: The fitted parameters.
+            x: Their coordinates, ``(coordinates,)``.
+            errors: Errors of their predictions, ``(errors,)``.
         """
-        independent, steps = self.segments.with_estimated_states(point), self.steps
-        moved = [self.basis.applied(point, own) for own in np.concatenate([x + steps, x - steps])]
+        segments, basis, width = self.segments, self.basis, self._widths
+        moved = np.concatenate([x + np.diag(width), x - np.diag(width)])
+        independent = segments.with_estimated_states(point)
         residuals = pseudo_huber(errors)
-        change = pseudo_huber(independent.of(moved)) - residuals[:, np.newaxis]
-        ahead, behind = np.split(change / np.tile(np.diag(steps), 2), 2, axis=1)
-        return _Slopes(self, x, residuals, ahead, -behind)
+        change = pseudo_huber(independent.of([basis.applied(point, own) for own in moved]))
+        change = (change - residuals[:, np.newaxis]) / np.tile(width, 2)
+        ahead, behind = np.split(change, 2, axis=1)
+        behind = -behind
 
+        def step(used: BoolArray) -> FloatArray:
+            slopes, left = (ahead + behind)[used] / 2, residuals[used]
+            weight = 1 / (max(len(left), 1) * self.method.prior_weight**2)
+            prior = basis.prior**-2
+            gradient = slopes.T @ left * weight + prior * x
+            return np.asarray(
+                -np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient)
+            )
 
-@dataclass(frozen=True, eq=False)
-class _Slopes:
-    """The residuals of the data around a fit, without those of the prior.
+        parts = segments.folds(FOLDS)[segments.segment_of_error]
+        whole = step(np.ones(len(parts), np.bool_))
+        without = [
+            np.clip(x + (step(parts != part) - whole), -basis.bounds, basis.bounds)
+            for part in range(FOLDS)
+        ]
+        every = segments.of([basis.applied(point, own) for own in without])
+        deviations = self._deviations(residuals, ahead, behind)
+        return Fit(
+            name,
+            point,
+            prior_deviations(segments.robot) | basis.by_quantity(deviations),
+            errors,
+            every[np.arange(len(parts)), parts],
+            is_fitted=True,
+        )
 
-    Attributes:
-        fitter: The method, and the coordinates of the fit.
-        x: Fitted coordinates, ``(coordinates,)``.
-        residuals: Residuals of the fit, ``(residuals,)``.
-        ahead: Forward differences of the residuals, ``(residuals, coordinates)``.
-        behind: Backward differences.
-    """
-
-    fitter: _Fitter
-    x: FloatArray
-    residuals: FloatArray
-    ahead: FloatArray
-    behind: FloatArray
-
-    def without(self, left_out: BoolArray) -> FloatArray:
-        """Returns the coordinates of the fit without some residuals, by one Gauss-Newton step.
-
-        The step of the whole fit, which the solver left, is subtracted.
-        """
-        bounds = self.fitter.basis.bounds
-        step = self._step(~left_out) - self._step(np.ones_like(left_out))
-        return np.asarray(np.clip(self.x + step, -bounds, bounds))
-
-    def _step(self, used: BoolArray) -> FloatArray:
-        slopes, residuals = (self.ahead + self.behind)[used] / 2, self.residuals[used]
-        weight = 1 / (max(len(residuals), 1) * self.fitter.method.prior_weight**2)
-        prior = self.fitter.basis.prior**-2
-        gradient = slopes.T @ residuals * weight + prior * self.x
-        return np.asarray(-np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient))
-
-    def deviations(self) -> FloatArray:
+    def _deviations(
+        self, residuals: FloatArray, ahead: FloatArray, behind: FloatArray
+    ) -> FloatArray:
         """Returns the posterior standard deviation of each coordinate.
 
         Without contacts, the variance of the data is that of the segments' gradients (Huber 1967,
         White 1980), which includes model error and the correlation of neighbouring steps; that of
         the prior is added.
         """
-        prior = self.fitter.basis.prior
-        if not self.fitter.segments.robot.has_fixed_base:
-            weight = INDEPENDENT_ERRORS / len(self.residuals)
-            information = consistent_information(self.ahead, self.behind) * weight
+        prior = self.basis.prior
+        if not self.segments.robot.has_fixed_base:
+            weight = INDEPENDENT_ERRORS / len(residuals)
+            information = consistent_information(ahead, behind) * weight
             variance = np.diag(np.linalg.inv(np.diag(prior**-2) + information))
             return np.asarray(np.sqrt(variance))
-        slopes, segment = (self.ahead + self.behind) / 2, self.fitter.segments.segment_of_error
+        slopes, segment = (ahead + behind) / 2, self.segments.segment_of_error
         used = np.unique(segment)
-        scores = slopes * self.residuals[:, np.newaxis]
+        scores = slopes * residuals[:, np.newaxis]
         gradients = np.array([scores[segment == number].sum(axis=0) for number in used])
         spread = len(used) / max(len(used) - 1, 1) * gradients.T @ gradients
-        weight = len(self.residuals) * self.fitter.method.prior_weight**2
+        weight = len(residuals) * self.method.prior_weight**2
         inverse = np.linalg.inv(slopes.T @ slopes + np.diag(weight * prior**-2))
         variance = np.diag(inverse @ (spread + np.diag(weight**2 * prior**-2)) @ inverse)
         return np.asarray(np.minimum(np.sqrt(variance), prior))

@@ -5,7 +5,7 @@ than no motion at all, or off to one side. Then the same model predicts the tria
 the order of the columns corrected, and the best correction names the joint.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -14,10 +14,16 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.model_factors import Parameters, joint_of_motor
-from selfmodel.simulation.segments import ObservedSegments, SegmentErrors, is_better
+from selfmodel.simulation.fit import Fit
+from selfmodel.simulation.model_factors import joint_of_motor
+from selfmodel.simulation.segments import (
+    POSITIONS,
+    ObservedSegments,
+    SegmentErrors,
+    is_better,
+    root_mean_square,
+)
 from selfmodel.trials.estimation import JOINTS
-from selfmodel.trials.signals import Signal
 
 MAX_RATIO = 1.0
 """Largest root mean square error of a joint relative to that of the prediction of no motion."""
@@ -59,51 +65,36 @@ class Suspicion:
         return {"joint": self.joint, "cause": self.cause, "message": str(self)}
 
 
-def suspicion(
-    segments: SegmentErrors, parameters: Parameters, errors: FloatArray
-) -> Suspicion | None:
-    """Returns the probable error in the recording of healthy trials; None if there is none.
-
-    The errors are those of the predictions with the calibrated parameters, ``(errors,)``.
-    """
-    hinges = segments.robot.anatomy.hinges
-    predicted = segments.joint_errors(errors)
-    sizes = _root_mean_square(predicted)
-    ratios = sizes / np.maximum(_root_mean_square(_motion(segments.data)), 1e-9)
-    ratios[sizes < MIN_ERROR] = 0.0
-    biases = predicted.mean(axis=0)
+def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
+    """Returns the probable error in the recording of healthy trials; None if there is none."""
+    hinges, delay = segments.robot.anatomy.hinges, fit.parameters.delay
+    errors = segments.joint_errors(fit.errors)
+    sizes, biases = root_mean_square(errors), errors.mean(axis=0)
+    # The error of the prediction of no motion; the motion of an unknown hinge is 0.
+    starts = [own.segments.states[POSITIONS][:, np.newaxis] for own in segments.data]
+    motion = [
+        (own.observed[POSITIONS] - start)[own.valid]
+        for own, start in zip(segments.data, starts, strict=True)
+    ]
+    still = root_mean_square(np.nan_to_num(np.concatenate(motion)))
+    ratios = np.where(sizes < MIN_ERROR, 0.0, sizes / np.maximum(still, 1e-9))
     worst, leaning = int(np.argmax(ratios)), int(np.argmax(np.abs(biases)))
-    if ratios[worst] > MAX_RATIO or abs(biases[leaning]) > MAX_BIAS:
-        correction = _best_correction(segments, parameters, errors, np.argsort(-ratios)[:WORST])
+    leans = abs(biases[leaning]) > MAX_BIAS
+    if ratios[worst] > MAX_RATIO or leans:
+        correction = _best_correction(segments, fit, np.argsort(-ratios)[:WORST])
         if correction is not None:
             return correction
     if ratios[worst] > MAX_RATIO and abs(biases[worst]) <= MAX_BIAS:
         times = f"its error is {ratios[worst]:.1f} times that of no motion"
         return Suspicion(hinges[worst], times)
-    if abs(biases[leaning]) > MAX_BIAS:
+    if leans:
         return Suspicion(
             hinges[leaning], f"its mean error is {biases[leaning]:.2f} rad: an offset?"
         )
-    if parameters.delay >= MAX_CONTROL_DELAY > segments.robot.control_delay:
-        limit = f"the control delay is {parameters.delay} steps, the largest that is fitted"
+    if delay >= MAX_CONTROL_DELAY > segments.robot.control_delay:
+        limit = f"the control delay is {delay} steps, the largest that is fitted"
         return Suspicion(None, limit)
     return None
-
-
-def _root_mean_square(errors: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt((errors**2).mean(axis=0)))
-
-
-def _motion(data: Sequence[ObservedSegments]) -> FloatArray:
-    """Returns the motion of the joints since the start of the segment, ``(steps, hinges)``, rad.
-
-    The motion of an unknown hinge is 0.
-    """
-    name = JOINTS[0]
-    motion = [
-        (own.observed[name] - own.segments.states[name][:, np.newaxis])[own.valid] for own in data
-    ]
-    return np.asarray(np.nan_to_num(np.concatenate(motion)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,80 +104,68 @@ class _Columns:
     order: IndexArray
     signs: FloatArray
 
-    @classmethod
-    def of(
-        cls, count: int, *, flipped: IndexArray | int | None = None, swapped: Sequence[int] = ()
-    ) -> "_Columns":
-        order, signs = np.arange(count), np.ones(count)
-        if flipped is not None:
-            signs[flipped] = -1.0
-        order[list(swapped)] = swapped[::-1]
-        return cls(order, signs)
-
-    def __call__(self, values: FloatArray) -> FloatArray:
+    def of(self, values: FloatArray) -> FloatArray:
         return np.asarray(values[..., self.order] * self.signs)
 
+    def flipped(self, columns: IndexArray | int) -> "_Columns":
+        signs = self.signs.copy()
+        signs[columns] = -1.0
+        return replace(self, signs=signs)
 
-@dataclass(frozen=True, eq=False)
-class _Correction:
-    """A change of the columns of joints and motors, and the joint that it is about."""
-
-    suspicion: Suspicion
-    hinges: _Columns
-    motors: _Columns
-
-    def of(self, own: ObservedSegments) -> ObservedSegments:
-        """Returns segments with the change."""
-
-        def joints(signals: Mapping[Signal, FloatArray]) -> dict[Signal, FloatArray]:
-            return {**signals, **{name: self.hinges(signals[name]) for name in JOINTS}}
-
-        segments = own.segments
-        changed = replace(
-            segments, states=joints(segments.states), commands=self.motors(segments.commands)
-        )
-        return replace(own, segments=changed, observed=joints(own.observed))
+    def swapped(self, columns: Sequence[int]) -> "_Columns":
+        order = self.order.copy()
+        order[list(columns)] = columns[::-1]
+        return replace(self, order=order)
 
 
-def _best_correction(
-    segments: SegmentErrors, parameters: Parameters, errors: FloatArray, worst: IndexArray
-) -> Suspicion | None:
+def _corrected(own: ObservedSegments, joints: _Columns, motors: _Columns) -> ObservedSegments:
+    segments = own.segments
+    states, observed = (
+        {**signals, **{name: joints.of(signals[name]) for name in JOINTS}}
+        for signals in (segments.states, own.observed)
+    )
+    changed = replace(segments, states=states, commands=motors.of(segments.commands))
+    return replace(own, segments=changed, observed=observed)
+
+
+def _best_correction(segments: SegmentErrors, fit: Fit, worst: IndexArray) -> Suspicion | None:
     """Returns the correction with the lowest loss; None if none is significantly better."""
-    losses = segments.losses(errors)
+    losses = segments.losses(fit.errors)
     best, least = None, losses
-    for each in _corrections(segments.robot, worst):
-        changed = replace(segments, data=[each.of(own) for own in segments.data])
-        own = changed.losses(changed.of([parameters])[:, 0])
+    for cause, joints, motors in _corrections(segments.robot, worst):
+        data = [_corrected(own, joints, motors) for own in segments.data]
+        changed = replace(segments, data=data)
+        own = changed.losses(changed.of([fit.parameters])[:, 0])
         if own.mean() < least.mean() and is_better(own, losses, MIN_Z):
-            best, least = each.suspicion, own
+            best, least = cause, own
     return best
 
 
-def _corrections(robot: Robot, worst: IndexArray) -> Iterator[_Correction]:
-    """Yields a change of each sign, and exchanges with a joint of ``worst``."""
-    hinges, joints, motors = robot.anatomy.hinges, len(robot.anatomy.hinges), robot.model.nu
-    motors_of = [np.flatnonzero(joint_of_motor(robot) == number) for number in range(joints)]
+def _corrections(robot: Robot, worst: IndexArray) -> Iterator[tuple[Suspicion, _Columns, _Columns]]:
+    """Yields a change of each sign, and exchanges with a joint of ``worst``.
 
-    def correction(
-        hinge: int, change: str, of_hinges: _Columns, of_motors: _Columns
-    ) -> _Correction:
-        cause = Suspicion(hinges[hinge], f"with {change} it is predicted better")
-        return _Correction(cause, of_hinges, of_motors)
+    Each is the joint that it is about, and the columns of joints and of motors.
+    """
+    names = robot.anatomy.hinges
+    joints, motors = (
+        _Columns(np.arange(count), np.ones(count)) for count in (len(names), robot.model.nu)
+    )
+    motors_of = [np.flatnonzero(joint_of_motor(robot) == number) for number in range(len(names))]
 
-    same = _Columns.of(motors)
-    for number in range(joints):
-        flipped, sign = _Columns.of(joints, flipped=number), "the other sign of its angle"
-        yield correction(number, sign, flipped, same)
-        commands = _Columns.of(motors, flipped=motors_of[number])
-        yield correction(number, f"{sign} and command", flipped, commands)
-    for pair in combinations(range(joints), 2):
+    def cause(joint: int, change: str) -> Suspicion:
+        return Suspicion(names[joint], f"with {change} it is predicted better")
+
+    for number, driven in enumerate(motors_of):
+        flipped, sign = joints.flipped(number), "the other sign of its angle"
+        yield cause(number, sign), flipped, motors
+        yield cause(number, f"{sign} and command"), flipped, motors.flipped(driven)
+    for pair in combinations(range(len(names)), 2):
         if not set(pair) & set(worst.tolist()):
             continue
         first, second = pair if pair[0] in worst else pair[::-1]
-        swapped = _Columns.of(joints, swapped=pair)
-        yield correction(first, f"the angles of {hinges[second]}", swapped, same)
-        driven = [motors_of[number] for number in pair]
-        if all(len(own) == 1 for own in driven):
-            commands = _Columns.of(motors, swapped=np.concatenate(driven).tolist())
-            change = f"the angles and commands of {hinges[second]}"
-            yield correction(first, change, swapped, commands)
+        swapped, other = joints.swapped(pair), names[second]
+        yield cause(first, f"the angles of {other}"), swapped, motors
+        both = [motors_of[number] for number in pair]
+        if all(len(own) == 1 for own in both):
+            commands = motors.swapped(np.concatenate(both).tolist())
+            yield cause(first, f"the angles and commands of {other}"), swapped, commands

@@ -6,8 +6,8 @@ servos hold them to the commands, and in a second the commands move the joints t
 shows gains, friction and inertia.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 
@@ -17,22 +17,14 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import with_known_base
 from selfmodel.simulation.model_factors import Parameters, model_with_parameters
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
 from selfmodel.simulation.rollout import SimulationStats, largest_batch
-from selfmodel.trials.estimation import (
-    BASE,
-    JOINTS,
-    ONBOARD,
-    STATE,
-    estimated_states,
-    known_steps,
-    lacks_joint_velocities,
-    with_joint_velocities,
-)
+from selfmodel.trials import estimation
 from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
@@ -53,17 +45,15 @@ MIN_COMPLETE_SHARE = 0.25
 SEGMENT_SECONDS = 1.0
 """Length of a segment of a robot with a fixed base, s, in a trial that is long enough."""
 
-MIN_SEGMENTS = 12
-"""Smallest number of segments of a fixed base: a short trial has shorter segments."""
-
-MIN_HORIZON = 5
-"""Smallest length of a segment of a fixed base, control steps."""
+MIN_SEGMENTS, MIN_HORIZON = 12, 5
+"""Smallest number of segments of a fixed base, as a short trial has shorter segments; and their
+smallest length, control steps."""
 
 MAX_ERROR = 1e6
 """Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
 simulation that is no longer finite. The solver does not end on numbers that are not finite."""
 
-_POSITIONS: Signal = "joint_positions"
+POSITIONS: Signal = "joint_positions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +81,9 @@ class ObservedSegments:
         """
         masks: dict[Signal, BoolArray] = {}
         for signal in (own for own in CALIBRATION_ERROR_SCALES if own in self.observed):
-            values = self.observed[signal]
-            known = np.isfinite(values) if signal in JOINTS else np.ones((*values.shape[:2], 3))
-            masks[signal] = (known != 0) & self.valid[..., np.newaxis]
+            values, joints = self.observed[signal], signal in estimation.JOINTS
+            known = np.isfinite(values) if joints else np.ones((*values.shape[:2], 3), np.bool_)
+            masks[signal] = known & self.valid[..., np.newaxis]
         return masks
 
 
@@ -115,19 +105,21 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     """
     trajectory = with_known_base(robot, trial.trajectory)
     if robot.has_fixed_base:
-        found = _consecutive(trial, trajectory)
+        cut: ObservedSegments | str = _consecutive(trajectory)
+        needs = (
+            f"calibration of a robot with a fixed base needs {MIN_SEGMENTS} segments of "
+            f"{MIN_HORIZON} steps or more with joint positions and commands"
+        )
     else:
-        if trajectory.steps <= LEAD + HORIZON:
-            raise _unusable(trial, f"the trial has {trajectory.steps}")
-        some = _spread(trajectory) or _sequential(trajectory)
-        if some is None:
-            never = _never_known(trajectory)
-            raise _unusable(
-                trial, f"the log never has {never}" if never else "the log has no such segment"
-            )
-        found = some
-    check_magnitudes(trial, (*found.observed, "commands"))
-    return found
+        cut = _spread(trajectory) or _sequential(trajectory) or _lack(trajectory)
+        needs = (
+            f"calibration needs segments of {LEAD + HORIZON + 1} steps or more, without late "
+            f"steps, with {', '.join(estimation.ONBOARD)} and the commands"
+        )
+    if isinstance(cut, str):
+        raise InputError(f"{trial.path}: {needs}, and {cut}: leave this log out")
+    check_magnitudes(trial, (*cut.observed, "commands"))
+    return cut
 
 
 def _spread(trajectory: Trajectory) -> ObservedSegments | None:
@@ -137,19 +129,22 @@ def _spread(trajectory: Trajectory) -> ObservedSegments | None:
     segment before, they follow each other.
     """
     last = trajectory.steps - 1 - HORIZON
-    begins = np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(np.intp))
-    states = estimated_states(trajectory, STATE)
-    onboard = _known({signal: states[signal] for signal in ONBOARD}) & _steady(trajectory)
+    if last < LEAD:
+        return None
+    states = estimation.estimated_states(trajectory)
+    onboard = _known({signal: states[signal] for signal in estimation.ONBOARD})
+    onboard = onboard & _complete(trajectory.steady_commands)
     known = onboard & _known(states)
+    begins = np.unique(np.linspace(LEAD, last, MAX_SEGMENTS).round().astype(np.intp))
     whole = _all_known(known, begins)
     if not whole.any() or whole.sum() < MIN_BASE_SHARE * _all_known(onboard, begins).sum():
         return None
-    if any(np.isnan(states[signal][known]).any() for signal in JOINTS):
+    if any(np.isnan(states[signal][known]).any() for signal in estimation.JOINTS):
         begins = np.arange(LEAD, last + 1, HORIZON)
         whole = _all_known(known, begins)
         if not whole.any():
             return None
-    return _cut(trajectory, states, begins[whole], HORIZON, STATE)
+    return _cut(trajectory, states, begins[whole], HORIZON, estimation.STATE)
 
 
 def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
@@ -159,31 +154,34 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     continue from its end. A step is valid if its state was observed and no command before it, in
     the segment or in its lead, was held for other than a control time step.
     """
+    if trajectory.steps <= LEAD + HORIZON:
+        return None
     begins = np.arange(0, trajectory.steps - HORIZON, HORIZON)
-    states = estimated_states(trajectory, ONBOARD)
-    starts = begins[_known(states)[begins] & _all_known(_commanded(trajectory), begins)]
-    segments = _cut(trajectory, states, starts, HORIZON, ONBOARD)
-    return segments if segments.valid.sum() >= HORIZON else None
+    states = estimation.estimated_states(trajectory, estimation.ONBOARD)
+    commanded = _all_known(_complete(trajectory["commands"]), begins)
+    starts = begins[_known(states)[begins] & commanded]
+    cut = _cut(trajectory, states, starts, HORIZON, estimation.ONBOARD)
+    return cut if cut.valid.sum() >= HORIZON else None
 
 
-def _consecutive(trial: Trial, measured: Trajectory) -> ObservedSegments:
-    """Returns segments of the joints of a fixed base that begin in a known state.
+def _consecutive(measured: Trajectory) -> ObservedSegments | str:
+    """Returns segments of the joints of a fixed base that begin in a known state, or the lack.
 
     Joint velocities that were not measured are estimated, as the initial velocity of a segment.
     """
-    trajectory, steps = with_joint_velocities(measured), measured.steps
-    compared = JOINTS[:1] if lacks_joint_velocities(measured) else JOINTS
+    trajectory, steps = estimation.with_joint_velocities(measured), measured.steps
+    compared = estimation.JOINTS[: 1 if estimation.lacks_joint_velocities(measured) else 2]
     timestep = float(trajectory.time[1] - trajectory.time[0]) if steps > 1 else 1.0
     horizon = min(round(SEGMENT_SECONDS / timestep), (steps - 1 - LEAD) // MIN_SEGMENTS)
     if horizon < MIN_HORIZON:
-        raise _unusable(trial, f"the trial has {steps} steps", fixed=True)
-    states = estimated_states(trajectory, STATE)
+        return f"the trial has {steps} steps"
+    states = estimation.estimated_states(trajectory)
     starts = np.arange(LEAD, steps - horizon, horizon)
-    commanded = _commanded(trajectory)[command_steps(starts, horizon)].all(axis=1)
+    commanded = _complete(trajectory["commands"])[command_steps(starts, horizon)].all(axis=1)
     starts = starts[_known(states)[starts] & commanded]
     starts = starts[_cut(trajectory, states, starts, horizon, compared).valid.any(axis=1)]
     if len(starts) < MIN_SEGMENTS // 2:
-        raise _unusable(trial, f"the log has {len(starts)} such segments", fixed=True)
+        return f"the log has {len(starts)} such segments"
     return _cut(trajectory, states, starts, horizon, compared)
 
 
@@ -196,7 +194,7 @@ def _cut(
 ) -> ObservedSegments:
     before = np.maximum(command_steps(starts, horizon), 0)
     after = starts[:, np.newaxis] + np.arange(1, horizon + 1)
-    steady = np.logical_and.accumulate(_steady(trajectory)[before], axis=1)
+    steady = np.logical_and.accumulate(_complete(trajectory.steady_commands)[before], axis=1)
     observed = {signal: states[signal] for signal in compared}
     return ObservedSegments(
         segments=cut_segments(trajectory, states, starts, horizon, record=compared),
@@ -210,19 +208,13 @@ def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
 
     It is known completely there; if that is rare, single hinges may be unknown.
     """
-    complete = np.isfinite(np.hstack(list(states.values()))).all(axis=1)
-    some = known_steps(states)
-    return np.asarray(complete if complete.sum() >= MIN_COMPLETE_SHARE * some.sum() else some)
+    complete, some = _complete(np.hstack(list(states.values()))), estimation.known_steps(states)
+    return complete if complete.sum() >= MIN_COMPLETE_SHARE * some.sum() else some
 
 
-def _commanded(trajectory: Trajectory) -> BoolArray:
-    """Returns a mask of the steps with known commands, ``(steps,)``."""
-    return np.asarray(np.isfinite(trajectory["commands"]).all(axis=1))
-
-
-def _steady(trajectory: Trajectory) -> BoolArray:
-    """Returns a mask of the known commands held for one control time step, ``(steps,)``."""
-    return np.asarray(np.isfinite(trajectory.steady_commands).all(axis=1))
+def _complete(values: FloatArray) -> BoolArray:
+    """Returns a mask of the rows without an unknown number, ``(steps,)``."""
+    return np.asarray(np.isfinite(values).all(axis=1))
 
 
 def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
@@ -230,31 +222,21 @@ def _all_known(known: BoolArray, begins: IndexArray) -> BoolArray:
     return np.array([known[max(k - LEAD, 0) : k + HORIZON + 1].all() for k in begins.tolist()])
 
 
-def _never_known(trajectory: Trajectory) -> str:
-    """Returns the required signals that were never observed, with columns if only some are.
+def _lack(trajectory: Trajectory) -> str:
+    """Returns why there are no segments: too few steps, or signals that were never observed.
 
-    Of the joints, one hinge is enough.
+    Columns are named if only some of a signal lack. Of the joints, one hinge is enough.
     """
+    if trajectory.steps <= LEAD + HORIZON:
+        return f"the trial has {trajectory.steps}"
     never = []
-    signals: tuple[Signal, ...] = (*ONBOARD, "commands")
+    signals: tuple[Signal, ...] = (*estimation.ONBOARD, "commands")
     for signal in signals:
         names = np.array(trajectory.names.columns(signal))
         lacking = ~np.isfinite(trajectory[signal]).any(axis=0)
-        if lacking.all() or (lacking.any() and signal not in JOINTS):
-            some = "" if lacking.all() else f" of {', '.join(names[lacking])}"
-            never.append(signal + some)
-    return ", ".join(never)
-
-
-def _unusable(trial: Trial, reason: str, *, fixed: bool = False) -> InputError:
-    needs = (
-        f"calibration of a robot with a fixed base needs {MIN_SEGMENTS} segments of {MIN_HORIZON} "
-        f"steps or more with joint positions and commands"
-        if fixed
-        else f"calibration needs segments of {LEAD + HORIZON + 1} steps or more, without late "
-        f"steps, with {', '.join(ONBOARD)} and the commands"
-    )
-    return InputError(f"{trial.path}: {needs}, and {reason}: leave this log out")
+        if lacking.all() or (lacking.any() and signal not in estimation.JOINTS):
+            never.append(signal + ("" if lacking.all() else f" of {', '.join(names[lacking])}"))
+    return f"the log never has {', '.join(never)}" if never else "the log has no such segment"
 
 
 def is_better(one: FloatArray, other: FloatArray, min_z: float) -> bool:
@@ -264,9 +246,9 @@ def is_better(one: FloatArray, other: FloatArray, min_z: float) -> bool:
     return bool(gains.mean() > min_z * error and gains.mean() > 0)
 
 
-def root_mean_square(errors: FloatArray) -> float:
-    """Returns the root mean square of errors."""
-    return float(np.sqrt(np.mean(errors**2)))
+def root_mean_square(errors: FloatArray) -> FloatArray:
+    """Returns the root mean square of errors over their first axis."""
+    return np.asarray(np.sqrt((errors**2).mean(axis=0)))
 
 
 def pseudo_huber(errors: FloatArray) -> FloatArray:
@@ -282,11 +264,13 @@ class SegmentErrors:
         robot: The robot as its model describes it.
         data: Segments of at least one trial of the healthy robot.
         threads: Threads of MuJoCo's steps.
+        stats: Statistics that are updated.
     """
 
     robot: Robot
     data: Sequence[ObservedSegments]
     threads: int
+    stats: SimulationStats = field(default_factory=SimulationStats)
 
     @cached_property
     def segment_of_error(self) -> IndexArray:
@@ -301,17 +285,10 @@ class SegmentErrors:
         )
 
     @property
-    def segments(self) -> int:
-        """Number of segments of all trials."""
-        return sum(len(own.valid) for own in self.data)
-
-    @property
     def overlap(self) -> float:
         """Number of segments that contain a step, on average over the steps; at least 1."""
-        steps = [
-            own.segments.starts[:, np.newaxis] + np.arange(own.segments.horizon)
-            for own in self.data
-        ]
+        trials = [own.segments for own in self.data]
+        steps = [own.starts[:, np.newaxis] + np.arange(own.horizon) for own in trials]
         return sum(own.size for own in steps) / sum(len(np.unique(own)) for own in steps)
 
     def folds(self, count: int) -> IndexArray:
@@ -324,67 +301,62 @@ class SegmentErrors:
 
         A segment without a valid step has a loss of 0.
         """
-        number = self.segment_of_error
-        sums = np.bincount(number, pseudo_huber(errors) ** 2, self.segments)
-        return np.asarray(sums / np.maximum(np.bincount(number, minlength=self.segments), 1))
+        number, count = self.segment_of_error, sum(len(own.valid) for own in self.data)
+        sums = np.bincount(number, pseudo_huber(errors) ** 2, count)
+        return np.asarray(sums / np.maximum(np.bincount(number, minlength=count), 1))
 
     def joint_errors(self, errors: FloatArray) -> FloatArray:
         """Returns the errors of joint positions, ``(valid steps, hinges)``, rad.
 
         The error of an unknown hinge is 0. ``errors`` are all errors of one model, ``(errors,)``.
         """
-        first, found = 0, []
-        for own in self.data:
-            for signal, mask in own.compared.items():
-                last = first + int(mask.sum())
-                if signal == _POSITIONS:
-                    known = mask[own.valid]
-                    found.append(np.zeros(known.shape))
-                    found[-1][known] = errors[first:last]
-                first = last
-        return np.concatenate(found) * CALIBRATION_ERROR_SCALES[_POSITIONS]
+        masks = [(own, *compared) for own in self.data for compared in own.compared.items()]
+        ends = np.cumsum([mask.sum() for _, _, mask in masks])
+        positions = []
+        for (own, signal, mask), part in zip(masks, np.split(errors, ends[:-1]), strict=True):
+            if signal == POSITIONS:
+                values = np.zeros(mask.shape)
+                values[mask] = part
+                positions.append(values[own.valid])
+        return np.concatenate(positions) * CALIBRATION_ERROR_SCALES[POSITIONS]
 
-    def of(self, models: Sequence[Parameters], stats: SimulationStats | None = None) -> FloatArray:
+    def of(self, models: Sequence[Parameters]) -> FloatArray:
         """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
 
         The models are predicted in batches, so that their memory is bounded; adjacent ones with one
         control delay share them.
         """
-        stats = SimulationStats() if stats is None else stats
         size = min(largest_batch(self.robot, own.segments, steps=0) for own in self.data)
         batches = [
             same[first : first + size]
             for same in (list(group) for _, group in groupby(models, lambda own: own.delay))
             for first in range(0, len(same), size)
         ]
-        return np.concatenate([self._of_batch(batch, stats) for batch in batches], axis=1)
+        return np.concatenate([self._of_batch(batch) for batch in batches], axis=1)
 
     def with_estimated_states(self, parameters: Parameters) -> "SegmentErrors":
         """Returns the errors of independent segments.
 
         An unknown state begins as the parameters predict it.
         """
-        predict_with = self._predictor([parameters], SimulationStats())
-
-        def independent(own: ObservedSegments) -> ObservedSegments:
-            segments = own.segments
-            if segments.independent:
-                return own
-            predicted = predict_with(replace(segments, record=(*BASE, *JOINTS)))
-            states = dict(segments.states)
-            for signal in predicted.signals:
-                begin = predicted[signal][0, :, 0]
-                known = states.get(signal, np.full_like(begin, np.nan))
-                states[signal] = np.where(np.isnan(known), begin, known)
-            return replace(own, segments=replace(segments, states=states))
-
-        return replace(self, data=[independent(own) for own in self.data])
-
-    def _of_batch(self, models: Sequence[Parameters], stats: SimulationStats) -> FloatArray:
-        predict_with = self._predictor(models, stats)
-        rows = []
+        variants, record = self._variants([parameters]), (*estimation.BASE, *estimation.JOINTS)
+        data = []
         for own in self.data:
-            predicted = predict_with(own.segments)
+            segments, states = own.segments, dict(own.segments.states)
+            if not segments.independent:
+                whole = replace(segments, record=record)
+                predicted = self._predicted(variants, whole, parameters.delay)
+                for signal in record:
+                    begin = predicted[signal][0, :, 0]
+                    known = states.get(signal, np.full_like(begin, np.nan))
+                    states[signal] = np.where(np.isnan(known), begin, known)
+            data.append(replace(own, segments=replace(segments, states=states)))
+        return replace(self, data=data)
+
+    def _of_batch(self, models: Sequence[Parameters]) -> FloatArray:
+        variants, rows = self._variants(models), []
+        for own in self.data:
+            predicted = self._predicted(variants, own.segments, models[0].delay)
             for signal, mask in own.compared.items():
                 with np.errstate(over="ignore", invalid="ignore"):  # bounded below
                     error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
@@ -392,22 +364,17 @@ class SegmentErrors:
         errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
         return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 
-    def _predictor(
-        self, models: Sequence[Parameters], stats: SimulationStats
-    ) -> Callable[[Segments], Trajectory]:
-        """Returns a function that predicts segments with models of equal delay.
+    def _variants(self, models: Sequence[Parameters]) -> list[ModelVariant]:
+        scaled = [model_with_parameters(self.robot, parameters) for parameters in models]
+        return [apply_faults(model, self.robot.anatomy, INTACT) for model in scaled]
 
-        The signals of its result are ``(models, segments, horizon + 1, width)``.
-        """
-        robot, delay = self.robot, models[0].delay
-        variants = [
-            apply_faults(model_with_parameters(robot, parameters), robot.anatomy, INTACT)
-            for parameters in models
-        ]
-
-        def predict_with(segments: Segments) -> Trajectory:
-            return predict(
-                robot, variants, segments, threads=self.threads, stats=stats, delay=delay
-            ).trajectory
-
-        return predict_with
+    def _predicted(
+        self, variants: list[ModelVariant], segments: Segments, delay: float
+    ) -> Trajectory:
+        """Returns predictions of equal delay, ``(models, segments, horizon + 1, width)``."""
+        return predict(
+            *(self.robot, variants, segments),
+            threads=self.threads,
+            stats=self.stats,
+            delay=delay,
+        ).trajectory

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.simulation.fit import Fit
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import nominal
 from selfmodel.simulation.segments import SegmentErrors, observed_segments
@@ -22,9 +23,17 @@ OTHER = QUADRUPED.anatomy.hinges.index("back_right_shoulder")
 
 def found(tried: Trial) -> Suspicion | None:
     """The suspicion of the nominal model about a trial."""
-    segments = SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, tried)], 1)
-    parameters = nominal(QUADRUPED)
-    return suspicion(segments, parameters, segments.of([parameters])[:, 0])
+    return suspicion(*nominal_fit(tried))
+
+
+def nominal_fit(tried: Trial, delay: float = 0) -> tuple[SegmentErrors, Fit]:
+    """The segments of a trial, and their errors with the nominal model, said to have a delay."""
+    segments, own = (
+        SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, tried)], 1),
+        nominal(QUADRUPED),
+    )
+    errors = segments.of([own])[:, 0]
+    return segments, Fit("nominal", replace(own, delay=delay), {}, errors, errors)
 
 
 def changed(**signals: np.ndarray) -> Trial:
@@ -59,10 +68,7 @@ def test_a_joint_with_the_other_sign_exchanged_joints_and_an_offset_are_named():
 
 
 def test_a_delay_at_the_limit_of_the_fit_is_reported():
-    segments = SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, HEALTHY)], 1)
-    parameters = nominal(QUADRUPED)
-    errors = segments.of([parameters])[:, 0]
-    suspect = suspicion(segments, replace(parameters, delay=5), errors)
+    suspect = suspicion(*nominal_fit(HEALTHY, delay=5))
 
     assert suspect is not None
     assert suspect.to_dict()["joint"] is None
