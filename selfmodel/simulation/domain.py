@@ -33,11 +33,9 @@ _SEEDS = 2**63
 
 @dataclass(frozen=True)
 class StartSpread:
-    """Random deviation of initial poses from the reference pose of a model.
+    """Standard deviations of initial poses from the reference pose of a model.
 
-    Attributes:
-        angles: Standard deviation of the joint angles, rad.
-        tilt: Standard deviation of the roll and of the pitch of the base, rad.
+    They are those of the joint angles, and of the roll and the pitch of the base, rad.
     """
 
     angles: float
@@ -131,14 +129,12 @@ def initial_positions(
     spread: StartSpread,
 ) -> FloatArray:
     """Returns the initial generalised positions of a robot, ``(conditions, nq)``."""
-    poses = []
-    for variant, condition in zip(variants, conditions, strict=True):
-        data = mujoco.MjData(variant.model)
-        if spread != NO_SPREAD:
+    states = [mujoco.MjData(variant.model) for variant in variants]
+    if spread != NO_SPREAD:
+        for data, condition in zip(states, conditions, strict=True):
             rng = np.random.default_rng((condition.seed or 0, 0))
-            randomize_initial_pose(robot, variant.model, data, spread, rng)
-        poses.append(data.qpos.copy())
-    return np.array(poses)
+            randomize_initial_pose(robot, data.model, data, spread, rng)
+    return np.array([data.qpos for data in states])
 
 
 def randomize_initial_pose(
@@ -151,14 +147,8 @@ def randomize_initial_pose(
     """Moves a robot from its reference pose to a random pose nearby, above the ground.
 
     Joint angles stay within their limits. Welded joints and the heading are unchanged, and so are
-    degrees of freedom that the base does not have, such as the tilt of a planar base.
-
-    Args:
-        robot: The robot as its model describes it.
-        model: Compiled model of the robot, with its faults.
-        data: State of the model in the reference pose; it is changed.
-        spread: Standard deviations of the pose.
-        rng: Random numbers.
+    degrees of freedom that the base does not have, such as the tilt of a planar base. ``model`` is
+    that of the robot with its faults, and ``data`` its state in the reference pose.
     """
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, model, data)
@@ -179,17 +169,13 @@ def randomize_joint_angles(
     deviation: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds normal noise (rad) to the joint angles in ``data``, within their limits.
-
-    Welded joints keep their angles.
-    """
+    """Adds normal noise (rad) to the joint angles within their limits, but for welded joints."""
     angles = deviation * rng.standard_normal(len(anatomy.hinges))
     for name, angle in zip(anatomy.hinges, angles, strict=True):
-        hinge = model.joint(name)
-        if _is_welded(model, name):
-            continue
-        moved = data.qpos[hinge.qposadr[0]] + angle
-        data.qpos[hinge.qposadr[0]] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
+        if not _is_welded(model, name):
+            hinge = model.joint(name)
+            address, moved = hinge.qposadr[0], data.qpos[hinge.qposadr[0]] + angle
+            data.qpos[address] = np.clip(moved, *hinge.range) if hinge.limited[0] else moved
 
 
 def _is_welded(model: mujoco.MjModel, hinge: str) -> bool:

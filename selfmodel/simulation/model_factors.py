@@ -35,17 +35,15 @@ by 1 rad/s^2, a tenth of its inertia."""
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of a self-model as factors of its nominal parameters.
-
-    A tuple that is empty changes nothing.
+    """Parameters of a self-model as factors of its nominal parameters; an empty tuple is all 1.
 
     Attributes:
         root_mass: Factor of the mass and inertia of the root body.
         limb_mass: Factor of the mass and inertia of all other bodies.
         friction: Factor of the sliding friction of all geoms and contact pairs.
         damping: Factor of the damping of all joints.
-        motor_gains: Factor of the torque per motor, in the model's order.
-        delay: Control delay, in control steps; a multiple of a physics step.
+        motor_gains: Factor of the torque of each motor.
+        delay: Control delay, control steps; a multiple of a physics step.
         contact_stiffness: Factor of the stiffness of all contacts.
         contact_damping: Factor of their damping.
         joint_damping: Factor of the damping of each hinge. A value that is 0 in the model is
@@ -99,9 +97,9 @@ def nominal(robot: Robot) -> Parameters:
 
 
 def from_factors(factors: FloatArray, delay: float) -> Parameters:
-    """Returns parameters from ``Parameters.factors`` and a control delay, in control steps."""
-    root, limbs, friction, damping, *motors = factors.tolist()
-    return Parameters(root, limbs, friction, damping, tuple(motors), delay)
+    """Returns parameters from ``Parameters.factors`` and a control delay, control steps."""
+    *shared, motors = *factors[:4].tolist(), tuple(factors[4:].tolist())
+    return Parameters(*shared, motors, delay)
 
 
 def model_with_parameters(
@@ -230,12 +228,9 @@ class LogNormal:
     """Independent log-normal factors with a median of 1.
 
     Attributes:
-        factors: Standard deviation of the logarithm of each factor of ``Parameters.factors``,
-            ``(4 + motors,)``.
-        bodies: Standard deviation of the logarithm of the further factor of the mass, and of that
-            of the inertia, of each body, ``(bodies,)``.
-        contacts: Standard deviation of the logarithm of the factors of the stiffness and of the
-            damping of contacts.
+        factors: Standard deviation of the logarithm of each factor of ``Parameters.factors``.
+        bodies: That of the further factor of the mass, and of that of the inertia, of each body.
+        contacts: That of the factors of the stiffness and of the damping of contacts.
     """
 
     factors: FloatArray
@@ -248,32 +243,23 @@ class LogNormal:
         return not (self.factors.any() or self.bodies.any() or self.contacts)
 
     def draw(self, rng: np.random.Generator) -> Parameters:
-        """Returns random parameters."""
-
-        def drawn(deviations: FloatArray) -> tuple[float, ...]:
-            return tuple(np.exp(deviations * rng.standard_normal(len(deviations))).tolist())
-
-        factors = from_factors(np.array(drawn(self.factors)), 0)
-        masses, inertias = drawn(self.bodies), drawn(self.bodies)
-        # Contacts that are known take no random numbers.
-        stiffness, damping = drawn(np.full(2, self.contacts)) if self.contacts else (1.0, 1.0)
+        """Returns random parameters; contacts that are known take no random numbers."""
+        contacts = np.full(2 if self.contacts else 0, self.contacts)
+        factors, masses, inertias, contact = (
+            np.exp(deviations * rng.standard_normal(len(deviations)))
+            for deviations in (self.factors, self.bodies, self.bodies, contacts)
+        )
         return dataclasses.replace(
-            factors,
-            body_mass=masses,
-            body_inertia=inertias,
-            contact_stiffness=stiffness,
-            contact_damping=damping,
+            from_factors(factors, 0),
+            body_mass=tuple(masses.tolist()),
+            body_inertia=tuple(inertias.tolist()),
+            **dict(zip(("contact_stiffness", "contact_damping"), contact.tolist(), strict=False)),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """A weighted sample of models.
-
-    Attributes:
-        models: The models.
-        weights: Their probabilities, ``(models,)``, with a sum of 1.
-    """
+    """A sample of models, and their probabilities, ``(models,)``."""
 
     models: Sequence[Parameters]
     weights: FloatArray
@@ -378,17 +364,14 @@ def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
     one kind or each is of its own, is left out.
     """
     if not robot.has_fixed_base:
-        order = {quantity: np.arange(1) for quantity in SHARED}
-        order["motor_gains"] = np.arange(robot.model.nu)
-        yield FACTORS, _basis(order, PRIOR_DEVIATIONS)
+        groups = dict.fromkeys(SHARED, np.arange(1)) | {"motor_gains": np.arange(robot.model.nu)}
+        yield FACTORS, _basis(groups, PRIOR_DEVIATIONS)
         return
-    hinges, joint = np.arange(len(robot.anatomy.hinges)), joint_of_motor(robot)
-    size = 0
-    for name, kind in zip(
-        JOINT_SETS, (np.zeros_like(hinges), kinds_of_joints(robot), hinges), strict=True
-    ):
-        by_joint = dict.fromkeys(JOINT_FIELDS, kind)
-        basis = _basis({"motor_gains": kind[joint]} | by_joint, JOINT_PRIOR_DEVIATIONS)
+    hinges, size = np.arange(len(robot.anatomy.hinges)), 0
+    kinds = (np.zeros_like(hinges), kinds_of_joints(robot), hinges)
+    for name, kind in zip(JOINT_SETS, kinds, strict=True):
+        groups = {"motor_gains": kind[joint_of_motor(robot)]} | dict.fromkeys(JOINT_FIELDS, kind)
+        basis = _basis(groups, JOINT_PRIOR_DEVIATIONS)
         if len(basis.prior) > size:
             size = len(basis.prior)
             yield name, basis

@@ -6,13 +6,13 @@ from functools import cache, partial
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray, held
+from selfmodel.arrays import FloatArray, IndexArray, held, median_of_known
 from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, state_writer
-from selfmodel.simulation.requests import Segments
+from selfmodel.simulation.requests import END, Segments
 from selfmodel.simulation.rollout import RobotBatch, SimulationResult, SimulationStats, live_signals
 from selfmodel.trials.trajectory import Trajectory
 
@@ -40,7 +40,7 @@ def predict(
 
     Welded joints begin at their welded angle. The hinges of a detached limb have no logged motion:
     if the segments include joint positions, these hinges begin at rest, at their median angle over
-    all segments; a hinge without a known angle in its initial pose.
+    the last third of the segments; a hinge without a known angle in its initial pose.
 
     Args:
         robot: The healthy robot.
@@ -57,10 +57,8 @@ def predict(
         has.
     """
     n, count, horizon = len(variants), len(segments.starts), segments.horizon
-    simulated, source_of = np.unique(
-        np.arange(n) if same_dynamics_as is None else np.asarray(same_dynamics_as),
-        return_inverse=True,
-    )
+    same = range(n) if same_dynamics_as is None else same_dynamics_as
+    simulated, source_of = np.unique(np.asarray(same), return_inverse=True)
     moving = [variants[i] for i in simulated]
     lag = robot.control_delay if delay is None else delay
     loop = _OpenLoop(robot, moving, segments, lag, threads, stats)
@@ -72,9 +70,9 @@ def predict(
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
     live = live_signals(robot, loop.bind, loop.models, segments.record)
+    names, hinges = robot.anatomy.names, robot.anatomy.hinges
     kept = {
-        signal: np.empty((n, count, horizon + 1, robot.anatomy.names.width(signal)))
-        for signal in segments.record
+        signal: np.empty((n, count, horizon + 1, names.width(signal))) for signal in segments.record
     }
     for stage, k in loop.steps():
         if "sensors" in kept:
@@ -83,13 +81,10 @@ def predict(
         for signal, read in live.items():
             kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
     diverged = np.any(loop.batch.diverged()[batch_rows].reshape(n, together), axis=1)
-    stats.runs += n
-    stats.steps += len(moving) * count * horizon
-    stats.diverged += int(diverged.sum())
-    hinges = robot.anatomy.hinges
+    stats.count(n, len(moving) * count * horizon, diverged)
     addresses = [int(robot.model.joint(name).qposadr[0]) for name in hinges]
     predicted = Trajectory(
-        robot.anatomy.names,
+        names,
         np.arange(horizon + 1, dtype=np.float64) * robot.control_timestep,
         kept,
         welded=np.array(
@@ -103,13 +98,8 @@ def predict(
 class _OpenLoop:
     """A batch that follows the commands of segments, for every variant by its control delay.
 
-    Args:
-        robot: The healthy robot.
-        moving: The variants, each in adjacent rows, one per segment that is simulated together.
-        segments: Initial states and commands.
-        lag: Control delay without faults, control steps.
-        threads: Threads of the physics.
-        stats: Statistics of the time of the physics.
+    Each variant of ``moving`` is in adjacent rows, one per segment that is simulated together. The
+    control delay without faults is ``lag``.
     """
 
     def __init__(  # noqa: PLR0917  # as ``predict``
@@ -121,9 +111,10 @@ class _OpenLoop:
         threads: int,
         stats: SimulationStats,
     ) -> None:
-        self._segments, self._stats = segments, stats
+        self._segments, self._stats, self._substeps = segments, stats, robot.substeps
+        count = len(segments.starts)
         self._stages: list[IndexArray] = np.split(
-            np.arange(len(segments.starts)), 1 if segments.independent else len(segments.starts)
+            np.arange(count), 1 if segments.independent else count
         )
         self.together = len(self._stages[0])
         self.models = [own for own in moving for _ in range(self.together)]
@@ -131,14 +122,11 @@ class _OpenLoop:
         # Before the first step, after which a field that is bound remains zero.
         self._live = {name: self.batch.bind(name) for name in ("qpos", "qvel", "act")}
         self._fields: dict[str, FloatArray] = {}
-        self._substeps = robot.substeps
         whole, self._part = split_delay(lag, robot.substeps)
         added = [added_steps(lag, float(own.added_delay[0])) for own in moving]
         self._delays = whole + np.array(added, dtype=np.intp)
         # The last row, at -1, is that of every step before the trial.
-        self._commands = np.concatenate(
-            [segments.commands, np.zeros((1, segments.commands.shape[1]))]
-        )
+        self._commands = np.pad(segments.commands, ((0, 1), (0, 0)))
         self._write = state_writer(robot, self.batch.bind, *(own.model for own in self.models))
         since_rest = cache(partial(activations, robot, segments.commands))
         self._activations = np.array(
@@ -207,12 +195,13 @@ class _OpenLoop:
 def _resting_hinges(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
     """Returns the ``qpos`` and ``qvel`` index and the resting angle of each hinge, by name.
 
-    A hinge without a known angle has that of the initial pose. The result is empty for segments
-    without joint positions.
+    The angle is the median at the end, because a limb may be lost during a trial; a hinge without a
+    known one has that of the initial pose. The result is empty without joint positions.
     """
-    angles = segments.resting_angles
+    angles = segments.states.get("joint_positions")
     if angles is None:
         return {}
+    medians = median_of_known(angles[round((1 - END) * len(angles)) :]).tolist()
     hinges = [robot.model.joint(name) for name in robot.anatomy.hinges]
     return {
         hinge.name: (
@@ -220,12 +209,8 @@ def _resting_hinges(robot: Robot, segments: Segments) -> dict[str, tuple[int, in
             int(hinge.dofadr[0]),
             float(hinge.qpos0[0]) if np.isnan(angle) else angle,
         )
-        for hinge, angle in zip(hinges, angles.tolist(), strict=True)
+        for hinge, angle in zip(hinges, medians, strict=True)
     }
-
-
-_SAME_OPTIONS = ("timestep", "integrator", "disableflags", "disableactuator")
-_SAME_MOTORS = ("dynprm", "ctrllimited", "ctrlrange", "actlimited", "actrange", "group")
 
 
 def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArray:
@@ -247,15 +232,14 @@ def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArra
         ``(steps, na)``.
     """
     states = np.zeros((len(commands), robot.model.na))
-    if not robot.model.na:
-        return states
-    model = _motors_only(robot.model)
-    data = mujoco.MjData(model)
-    arriving = held(np.concatenate([np.zeros((delay + 1, model.nu)), commands]))[1:]
-    for after, command in zip(states[1:], arriving[: len(commands) - 1], strict=True):
-        data.ctrl[:] = command
-        mujoco.mj_step(model, data, robot.substeps)
-        after[:] = data.act
+    if robot.model.na:
+        model = _motors_only(robot.model)
+        data = mujoco.MjData(model)
+        arriving = held(np.concatenate([np.zeros((delay + 1, model.nu)), commands]))[1:]
+        for after, command in zip(states[1:], arriving[: len(commands) - 1], strict=True):
+            data.ctrl[:] = command
+            mujoco.mj_step(model, data, robot.substeps)
+            after[:] = data.act
     return states
 
 
@@ -272,8 +256,8 @@ def _motors_only(model: mujoco.MjModel) -> mujoco.MjModel:
             gainprm=np.zeros(10),
         )
     motors = spec.compile()
-    for name in _SAME_OPTIONS:
+    for name in ("timestep", "integrator", "disableflags", "disableactuator"):
         setattr(motors.opt, name, getattr(model.opt, name))
-    for name in _SAME_MOTORS:
+    for name in ("dynprm", "ctrllimited", "ctrlrange", "actlimited", "actrange", "group"):
         getattr(motors, f"actuator_{name}")[:] = getattr(model, f"actuator_{name}")
     return motors

@@ -9,7 +9,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import compile_model
 from selfmodel.faults.hypothesis import Hypothesis
@@ -81,14 +80,13 @@ def draw_gap_of(
             f"got {level}"
         )
 
-    def factors(names: list[str]) -> dict[str, float]:
-        drawn = _factor(level, rng.standard_normal(len(names)))
-        return dict(zip(names, drawn.tolist(), strict=True))
+    def drawn(spread: float, count: int) -> list[float]:
+        return np.maximum(MIN_FACTOR, 1 + spread * rng.standard_normal(count)).tolist()
 
     bodies = [model.body(b).name for b in range(1, model.nbody)]
-    mass, inertia = factors(bodies), factors(bodies)
-    friction, damping = _factor(2 * level, rng.standard_normal(2)).tolist()
-    motors = factors(list(anatomy.motors))
+    mass, inertia = (dict(zip(bodies, drawn(level, len(bodies)), strict=True)) for _ in range(2))
+    friction, damping = drawn(2 * level, 2)
+    motors = dict(zip(anatomy.motors, drawn(level, len(anatomy.motors)), strict=True))
     delay = int(rng.integers(MAX_EXTRA_DELAY + 1))
     return RealityGap(
         level=level,
@@ -111,15 +109,19 @@ def perturbed_model(model: mujoco.MjModel, gap: RealityGap) -> mujoco.MjModel:
     """
     if gap.level == 0:
         return copy.copy(model)
-    names = [model.body(b).name.removeprefix(DEBRIS_PREFIX) for b in range(model.nbody)]
+    bodies = [model.body(b).name.removeprefix(DEBRIS_PREFIX) for b in range(model.nbody)]
     motors = [model.actuator(k).name for k in range(model.nu)]
+    mass, inertia, gains = (
+        np.array([factors.get(name, 1.0) for name in names])
+        for factors, names in ((gap.mass, bodies), (gap.inertia, bodies), (gap.motors, motors))
+    )
     return scale_model(
         model,
-        mass=_factors_of(gap.mass, names),
-        inertia=_factors_of(gap.inertia, names),
+        mass=mass,
+        inertia=inertia,
         friction=gap.friction,
         damping=gap.damping,
-        motor_gains=_factors_of(gap.motors, motors),
+        motor_gains=gains,
     )
 
 
@@ -136,12 +138,3 @@ def perturbed_models(
         perturbed_model(model, draw_gap_of(robot.model, robot.anatomy, level, rng))
         for _ in range(members)
     )
-
-
-def _factor(spread: float, normal: FloatArray) -> FloatArray:
-    return np.maximum(MIN_FACTOR, 1 + spread * normal)
-
-
-def _factors_of(factors: Mapping[str, float], names: list[str]) -> FloatArray:
-    """Returns the factor of each name, ``(names,)``; 1 for a name without a factor."""
-    return np.array([factors.get(name, 1.0) for name in names])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray, median_of_known
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
@@ -49,19 +49,6 @@ class Segments:
     starts: IndexArray
     horizon: int
     record: tuple[Signal, ...]
-
-    @property
-    def resting_angles(self) -> FloatArray | None:
-        """Angle at which the hinges of detached limbs are predicted: the median at the end.
-
-        The last third of the segments counts, because a limb may be lost during a trial. The shape
-        is ``(hinges,)``, rad, with NaN for a hinge without a known angle; None for segments without
-        joint positions.
-        """
-        angles = self.states.get("joint_positions")
-        if angles is None:
-            return None
-        return median_of_known(angles[round((1 - END) * len(angles)) :])
 
     @property
     def independent(self) -> bool:

@@ -42,6 +42,12 @@ class SimulationStats:
     diverged: int = 0
     physics_seconds: float = 0.0
 
+    def count(self, runs: int, steps: int, diverged: BoolArray) -> None:
+        """Adds the simulations of a batch."""
+        self.runs += runs
+        self.steps += steps
+        self.diverged += int(diverged.sum())
+
     @contextmanager
     def physics(self) -> Iterator[None]:
         """Adds the time of a block to ``physics_seconds``."""
@@ -203,27 +209,26 @@ class Rollout:
     ) -> None:
         self._stats = SimulationStats() if stats is None else stats
         self._substeps, self._disturb = robot.substeps, disturb
-        model = variants[0].model
+        model, sensors = variants[0].model, len(robot.anatomy.sensors)
         self._batch = batch = RobotBatch(model, variants, threads)
         self._reader = SensorReader(model, robot.anatomy, variants)
-        self._controllers = make_batch(
-            drivers,
-            [variant.silent_neurons for variant in variants],
-            len(robot.anatomy.sensors),
-        )
+        silent = [variant.silent_neurons for variant in variants]
+        self._controllers = make_batch(drivers, silent, sensors)
         self._sensordata, self._qpos = batch.bind("sensordata"), batch.bind("qpos")
         whole, self._part = split_delay(robot.control_delay, robot.substeps)
         added = [
-            added_delay + added_steps(robot.control_delay, float(variant.added_delay[0]))
-            for variant in variants
+            added_steps(robot.control_delay, float(variant.added_delay[0])) for variant in variants
         ]
-        delays = whole + bool(self._part) + np.array(added, dtype=np.intp)
-        self._motors = _DelayLine(batch.bind("ctrl"), delays)
+        # Delay line of the commands; those of the motors are 0 until the first arrives.
+        self._delays = whole + bool(self._part) + added_delay + np.array(added, dtype=np.intp)
+        self._motors = batch.bind("ctrl")
+        self._sent = np.zeros((int(self._delays.max()) + 1, *self._motors.shape))
+        self._commands = np.zeros(self._motors.shape)
         self.live: dict[Signal, Callable[[], FloatArray]] = {
             **live_signals(robot, batch.bind, variants, record),
             "sensors": lambda: self._controllers.readings,
             # Those of the controllers, before the control delay.
-            "commands": lambda: self._motors.inlet,
+            "commands": lambda: self._commands,
         }
         if start is None:
             batch.reset(mujoco.mjtStage.mjSTAGE_ACC)
@@ -239,51 +244,24 @@ class Rollout:
                 with self._stats.physics():
                     if self._part:
                         self._batch.step(self._part)
-                        self._motors.release()
+                        self._command(k)
                     self._batch.step(self._substeps - self._part)
             self._reader.read(self._sensordata, self._qpos, self._controllers.readings)
             self._disturb(self._controllers.readings)
-            self._controllers.step(self._motors.inlet)
-            self._motors.advance()
+            self._controllers.step(self._commands)
+            self._sent[k % len(self._sent)] = self._commands
+            self._command(k)
             self._stats.steps += len(self._batch.running)
             yield k
+
+    def _command(self, step: int) -> None:
+        """Sends the motors the commands that reach them at a step, by the delay of each run."""
+        rows = (step - self._delays) % len(self._sent)
+        self._motors[:] = self._sent[rows, np.arange(len(rows))]
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the rollouts that have diverged or had a MuJoCo warning, ``(n,)``."""
         return self._batch.diverged()
-
-
-class _DelayLine:
-    """Delay line of the commands; the motors' commands are 0 until the first arrives.
-
-    Args:
-        outlet: Commands at the motors, ``(n, motors)``; written.
-        delays: Control delay of each run, control steps, rounded up, ``(n,)``.
-    """
-
-    def __init__(self, outlet: FloatArray, delays: IndexArray) -> None:
-        self._outlet, self._delays = outlet, delays
-        longest = int(delays.max())
-        self._line = np.zeros((longest + 1, *outlet.shape))
-        self._rows = np.arange(len(outlet))
-        self._step = 0
-        self._delayed = longest > 0
-        self.inlet = np.zeros(outlet.shape) if self._delayed else outlet
-        """Next commands, ``(n, motors)``; the outlet itself without a delay."""
-
-    def advance(self) -> None:
-        """Moves the commands of the inlet into the line, and the delayed ones to the outlet."""
-        if self._delayed:
-            self._step += 1
-            self._line[self._step % len(self._line)] = self.inlet
-            self._send(self._delays)
-
-    def release(self) -> None:
-        """Moves those commands to the outlet that would be there a step later."""
-        self._send(self._delays - 1)
-
-    def _send(self, delays: IndexArray) -> None:
-        self._outlet[:] = self._line[(self._step - delays) % len(self._line), self._rows]
 
 
 MAX_BATCH = 512 * 2**20

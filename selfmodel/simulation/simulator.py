@@ -13,6 +13,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.robot.actuators import ancestors
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
@@ -109,10 +110,13 @@ class Simulator:
         """
         variants = [self._variant(hypothesis) for hypothesis in hypotheses]
         if observed is not None and "base_position" in segments.states:
-            variants = [
-                self._adapted_to_contacts(variant, hypothesis, observed)
-                for variant, hypothesis in zip(variants, hypotheses, strict=True)
-            ]
+            for number, hypothesis in enumerate(hypotheses):
+                faults = [fault for fault in hypothesis.faults if fault.kind.adapts_to_contacts]
+                if faults:
+                    variants[number] = copy.deepcopy(variants[number])  # the other is cached
+                for fault in faults:
+                    points = self._contact_points(observed)
+                    fault.kind.adapt_to_contacts(variants[number], fault, points)
         first: dict[Hypothesis, int] = {}
         same_dynamics_as = [
             first.setdefault(hypothesis.dynamics_part, i) for i, hypothesis in enumerate(hypotheses)
@@ -125,17 +129,6 @@ class Simulator:
             threads=self.threads,
             stats=self.stats,
         )
-
-    def _adapted_to_contacts(
-        self, variant: ModelVariant, hypothesis: Hypothesis, observed: Trajectory
-    ) -> ModelVariant:
-        faults = [fault for fault in hypothesis.faults if fault.kind.adapts_to_contacts]
-        if not faults:
-            return variant
-        adapted = copy.deepcopy(variant)  # the argument is in the cache
-        for fault in faults:
-            fault.kind.adapt_to_contacts(adapted, fault, self._contact_points(observed))
-        return adapted
 
     def run_ensemble(
         self,
@@ -192,18 +185,14 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
-        *,
-        start: FloatArray | None = None,
-        disturb: Callable[[FloatArray], None] = lambda _: None,
+        **changes: Any,  # noqa: ANN401  # ``start`` and ``disturb`` of a rollout
     ) -> SimulationResult:
-        robot, n, threads, stats = self.robot, len(variants), self.threads, self.stats
-        names = robot.anatomy.names
+        names, n = self.robot.anatomy.names, len(variants)
         rollout = Rollout(
-            *(robot, variants, drivers, record),
-            threads=threads,
-            stats=stats,
-            start=start,
-            disturb=disturb,
+            *(self.robot, variants, drivers, record),
+            threads=self.threads,
+            stats=self.stats,
+            **changes,
         )
         # Steps first during the run, so that each step is written to contiguous memory.
         kept = {signal: np.empty((steps, n, names.width(signal))) for signal in record}
@@ -211,12 +200,11 @@ class Simulator:
             for signal, rows in kept.items():
                 rows[k] = rollout.live[signal]()
         diverged = rollout.diverged()
-        stats.runs += n
-        stats.diverged += int(diverged.sum())
+        self.stats.count(n, 0, diverged)
         signals = {
             signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
         }
-        time = np.arange(steps, dtype=np.float64) * robot.control_timestep
+        time = np.arange(steps, dtype=np.float64) * self.robot.control_timestep
         return SimulationResult(Trajectory(names, time, signals), diverged)
 
 
@@ -233,21 +221,20 @@ def ground_contact_points(robot: Robot, trajectory: Trajectory) -> FloatArray:
     Returns:
         ``(n, 3)``, world frame, m, read-only; ``(0, 3)`` for a model without level ground.
     """
-    model, feet = robot.model, _feet(robot)
-    ground, points = _level_ground(model), []
-    if ground is not None and feet:
+    model, feet, points = robot.model, _feet(robot), list[FloatArray]()
+    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_bodyid == 0)
+    grounds = np.flatnonzero(planes)
+    if len(grounds) and feet:
+        ground = int(grounds[np.argmax(directions(model.geom_quat[grounds])[:, -1])])
         states = estimated_states(with_known_base(robot, trajectory), STATE)
-        touched = trajectory["sensors"] == 1
-        touched[:, [column for column in range(touched.shape[1]) if column not in feet]] = False
-        unknown = np.isnan(states["joint_positions"])
+        touched, unknown = trajectory["sensors"] == 1, np.isnan(states["joint_positions"])
         data, nearest = mujoco.MjData(model), np.empty(6)
         write = state_writer(robot, bind_data(data))
-        for step in np.flatnonzero(known_steps(states) & touched.any(axis=1)):
+        for step in np.flatnonzero(known_steps(states) & touched[:, list(feet)].any(axis=1)):
             write({signal: values[[step]] for signal, values in states.items()})
             mujoco.mj_kinematics(model, data)
-            for column in np.flatnonzero(touched[step]).tolist():
-                geoms, hinges = feet[column]
-                if unknown[step, hinges].any():
+            for column, (geoms, hinges) in feet.items():
+                if not touched[step, column] or unknown[step, hinges].any():
                     continue
                 distance = MAX_GROUND_DISTANCE
                 for geom in geoms:
@@ -263,14 +250,6 @@ def ground_contact_points(robot: Robot, trajectory: Trajectory) -> FloatArray:
     return contacts
 
 
-def _level_ground(model: mujoco.MjModel) -> int | None:
-    """Returns the most level plane of the world, or None without a plane."""
-    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_bodyid == 0)
-    numbers = np.flatnonzero(planes)
-    upward = directions(model.geom_quat[numbers])[:, -1]
-    return int(numbers[np.argmax(upward)]) if len(numbers) else None
-
-
 def _feet(robot: Robot) -> dict[int, tuple[list[int], list[int]]]:
     """Returns of each touch sensor with a colliding body, by its column, what determines its place.
 
@@ -280,16 +259,12 @@ def _feet(robot: Robot) -> dict[int, tuple[list[int], list[int]]]:
     solid = (model.geom_contype | model.geom_conaffinity) != 0
     body_of_hinge = [int(model.joint(name).bodyid[0]) for name in robot.anatomy.hinges]
     for column, sensor in enumerate(robot.anatomy.sensors):
-        if sensor.kind != "touch":
-            continue
-        body = int(model.site_bodyid[int(model.sensor(sensor.name).objid[0])])
-        geoms = np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
-        chain = set[int]()
-        while body:
-            chain.add(body)
-            body = int(model.body_parentid[body])
-        if geoms:
-            feet[column] = geoms, [k for k, own in enumerate(body_of_hinge) if own in chain]
+        if sensor.kind == "touch":
+            body = int(model.site_bodyid[int(model.sensor(sensor.name).objid[0])])
+            geoms = np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
+            chain = ancestors(model, body)
+            if geoms:
+                feet[column] = geoms, [k for k, own in enumerate(body_of_hinge) if own in chain]
     return feet
 
 

@@ -94,26 +94,24 @@ def replay(
     simulated = Trajectory(
         batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS}
     )
-    recorded, predicted = (
-        np.concatenate([own[signal] for signal in SIGNALS], axis=1) for own in (logged, simulated)
-    )
-    observed = ~np.isnan(recorded)
-    is_same = (predicted.view(np.int64) == recorded.view(np.int64)) | ~observed
-    ends = np.cumsum([logged.names.width(signal) for signal in SIGNALS])[:-1]
-    with np.errstate(all="ignore"):  # values of a diverged simulation; steps without observation
-        differences = np.where(observed, predicted - recorded, 0.0)
-        differs = ~(np.abs(differences) <= tolerance).all(axis=1)
-        squares, counts = (
-            [own.sum(axis=1) for own in np.split(values, ends, axis=1)]
-            for values in (differences**2, observed)
-        )
-        means = [total / count for total, count in zip(squares, counts, strict=True)]
+    errors, known, same = dict[Signal, FloatArray](), list[bool](), list[bool]()
+    differs = np.zeros(logged.steps, np.bool_)
+    for signal in SIGNALS:
+        one, other = simulated[signal], logged[signal]
+        observed = ~np.isnan(other)
+        with np.errstate(all="ignore"):  # values of a diverged simulation; steps not observed
+            difference = np.where(observed, one - other, 0.0)
+            differs |= ~(np.abs(difference) <= tolerance).all(axis=1)
+            errors[signal] = np.sqrt((difference**2).sum(axis=1) / observed.sum(axis=1))
+        known.append(bool(observed.any()))
+        is_same = (one.view(np.int64) == other.view(np.int64)) | ~observed
+        same.append(bool(is_same.all()))
     steps = np.flatnonzero(differs)
     return Replay(
         simulated=simulated,
-        observed=bool(observed.any()),
-        identical=bool(observed.any() and is_same.all()),
+        observed=any(known),
+        identical=any(known) and all(same),
         first_divergence_step=int(steps[0]) if len(steps) else None,
-        errors={signal: np.sqrt(mean) for signal, mean in zip(SIGNALS, means, strict=True)},
+        errors=errors,
         diverged=bool(outcome.diverged[0]),
     )
