@@ -142,8 +142,7 @@ def _averaged(
 
     A position whose velocity was never observed is returned as it is.
     """
-    steps = len(values)
-    path = np.concatenate([np.zeros((1, values.shape[1])), np.nancumsum(displacements, axis=0)])
+    steps, path = len(values), _summed(np.where(np.isnan(displacements), 0.0, displacements))
     deviations = values - path
     known = np.isfinite(deviations) & np.isfinite(velocities)
     sums = _summed(np.where(known, deviations, 0.0))
@@ -172,16 +171,17 @@ _MIN_HALF_WIDTH = 2
 
 
 def with_joint_velocities(trajectory: Trajectory) -> Trajectory:
-    """Returns a trajectory with joint velocities; a trajectory that has any is returned unchanged.
+    """Returns a trajectory with joint velocities; one that has any is returned unchanged.
 
     The velocity at a step is the slope of the cubic polynomial of least squares over the positions
     within ``HALF_WIDTH`` (Savitzky & Golay 1964, Analytical Chemistry 36), with a window that is
     shifted inwards at the ends of the trajectory. It is NaN if a position in its window is unknown,
     or a step in its window is late.
     """
-    if not lacks_joint_velocities(trajectory):
-        return trajectory
-    return trajectory.with_signals({"joint_velocities": _slopes(trajectory)})
+    lacks = lacks_joint_velocities(trajectory)
+    return (
+        trajectory.with_signals({"joint_velocities": _slopes(trajectory)}) if lacks else trajectory
+    )
 
 
 def lacks_joint_velocities(trajectory: Trajectory) -> bool:
@@ -204,21 +204,13 @@ def _slopes(trajectory: Trajectory) -> FloatArray:
     known = np.isfinite(positions)
     if trajectory.late is not None:
         known &= ~trajectory.late[:, np.newaxis]
+    inverse = np.linalg.pinv(np.vander(offsets / half, _DEGREE + 1, increasing=True))
     for step in range(steps):
         centre = min(max(step, half), steps - 1 - half)
-        rows = centre + offsets
-        weights = _slope_weights(half, step - centre) / timestep
+        rows, at = centre + offsets, (step - centre) / half
+        weights = np.array([0.0, 1.0, 2 * at, 3 * at**2]) / half @ inverse / timestep
         slopes[step] = np.where(known[rows].all(axis=0), weights @ positions[rows], np.nan)
     return slopes
-
-
-def _slope_weights(half: int, position: int) -> FloatArray:
-    """Returns the weights of the positions of a window for the slope at one of them, per step."""
-    offsets = np.arange(-half, half + 1)
-    powers = np.vander(offsets / half, _DEGREE + 1, increasing=True)
-    at = position / half
-    slope = np.array([0.0, 1.0, 2 * at, 3 * at**2]) / half
-    return np.asarray(slope @ np.linalg.pinv(powers))
 
 
 PLAY = 0.01
@@ -234,26 +226,17 @@ _NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal var
 
 
 def standing_tolerance(positions: FloatArray) -> FloatArray:
-    """Returns the root mean square motion up to which a hinge counts as standing, ``(hinges,)``.
-
-    Args:
-        positions: Logged joint positions, ``(steps, hinges)`` rad; NaN where unknown.
-    """
+    """Returns the root mean square motion up to which a hinge counts as standing, rad."""
     return np.hypot(PLAY, NOISE_FACTOR * encoder_noise(positions))
 
 
 def encoder_noise(positions: FloatArray) -> FloatArray:
-    """Returns the standard deviation of the noise of each encoder, ``(hinges,)``.
+    """Returns the standard deviation of the noise of each encoder, ``(hinges,)`` rad.
 
     The larger of two estimates: white noise with the same median fourth difference, and the
     rounding error of an encoder with steps as large as the smallest difference between two of its
-    values. The first alone is 0 for a hinge that stands between two steps of its encoder.
-
-    Args:
-        positions: Logged joint positions, ``(steps, hinges)`` rad; NaN where unknown.
-
-    Returns:
-        Noise levels, rad; 0 for a column of too few values, or of one value.
+    values. The first alone is 0 for a hinge that stands between two steps of its encoder. Both are
+    0 for too few values, or one. Unknown positions, ``(steps, hinges)`` rad, are NaN.
     """
     return np.array([_noise(column) for column in positions.T], dtype=np.float64)
 

@@ -8,13 +8,9 @@ from selfmodel.arrays import FloatArray
 def rotation_between(to: FloatArray, start: FloatArray) -> FloatArray:
     """Returns the rotation from one orientation to another, as a small rotation vector.
 
-    Args:
-        to: ``(..., 4)``.
-        start: ``(..., 4)``, of a shape that broadcasts to that of ``to``.
-
-    Returns:
-        Twice the vector part of the rotation in the frame of ``start``, ``(..., 3)``: axis times
-        angle, rad, for small angles; its norm is at most 2.
+    It is twice the vector part of the rotation in the frame of ``start``, ``(..., 3)``: axis times
+    angle, rad, for small angles; its norm is at most 2. The shape of ``start`` broadcasts to that
+    of ``to``.
     """
     w, v = start[..., :1], start[..., 1:]
     scalar = (to * start).sum(axis=-1, keepdims=True)
@@ -23,16 +19,10 @@ def rotation_between(to: FloatArray, start: FloatArray) -> FloatArray:
 
 
 def directions(orientation: FloatArray) -> FloatArray:
-    """Returns the heading and the tilt of a body as direction cosines.
+    """Returns the heading and the tilt of a body as direction cosines, ``(..., 5)``.
 
-    The result is the same for a quaternion and its negative.
-
-    Args:
-        orientation: ``(..., 4)``.
-
-    Returns:
-        ``(..., 5)``: the horizontal components of the body's x axis in the world frame, then the
-        world's upward direction in the body frame.
+    They are the horizontal components of the body's x axis in the world frame, then the world's
+    upward direction in the body frame: the same for a quaternion and its negative.
     """
     w, x, y, z = np.moveaxis(orientation, -1, 0)
     forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z))
@@ -41,11 +31,9 @@ def directions(orientation: FloatArray) -> FloatArray:
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Returns the quaternion product: the second rotation followed by the first.
+    """Returns the quaternion product, ``(..., 4)``: the second rotation followed by the first.
 
-    Args:
-        first: ``(..., 4)``, w x y z.
-        second: ``(..., 4)``, w x y z, of a shape that broadcasts to that of ``first``.
+    The second one's shape broadcasts to that of the first.
     """
     scalar, axis = first[..., :1], first[..., 1:]
     second_scalar, second_axis = second[..., :1], second[..., 1:]
@@ -55,12 +43,7 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns vectors rotated from the body frame to the world frame.
-
-    Args:
-        vectors: ``(..., 3)``.
-        orientation: Orientation of the body, ``(..., 4)``, w x y z.
-    """
+    """Returns vectors, ``(..., 3)``, rotated from the body frame to the world frame."""
     twice = 2 * cross(orientation[..., 1:], vectors)
     return np.asarray(vectors + orientation[..., :1] * twice + cross(orientation[..., 1:], twice))
 
@@ -69,10 +52,6 @@ def cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """Returns cross products, bit-identical to ``numpy.cross`` in half of its time.
 
     The pose of a planar body needs two cross products per control step.
-
-    Args:
-        first: ``(..., 3)``.
-        second: ``(..., 3)``, of a shape that broadcasts with that of ``first``.
     """
     a, b, c = (first[..., i] for i in range(3))
     x, y, z = (second[..., i] for i in range(3))

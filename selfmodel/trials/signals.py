@@ -40,32 +40,23 @@ range). ``commands``: actuator controls, each in its own unit: a position servo'
 
 @dataclass(frozen=True)
 class Names:
-    """Column names of the signals of a trajectory.
-
-    Attributes:
-        sensors: Inputs of the controller, in its order.
-        motors: Outputs of the controller, in its order.
-        hinges: Hinge joints of the model, in its order.
-    """
+    """Column names of the signals of a trajectory, in the order of the controller and the model."""
 
     sensors: tuple[str, ...]
     motors: tuple[str, ...]
     hinges: tuple[str, ...]
 
     def width(self, signal: Signal) -> int:
-        """Returns the number of columns of a signal."""
+        """Number of columns of a signal."""
         return len(self.columns(signal))
 
     def columns(self, signal: Signal) -> tuple[str, ...]:
-        """Returns the column names of a signal."""
-        return {
-            "sensors": self.sensors,
-            "commands": self.motors,
-            "joint_positions": self.hinges,
-            "joint_velocities": self.hinges,
-            "joint_efforts": self.hinges,
-            "base_orientation": ("w", "x", "y", "z"),
-        }.get(signal, ("x", "y", "z"))
+        """Column names of a signal."""
+        if signal.startswith("joint_"):
+            return self.hinges
+        others = {"sensors": self.sensors, "commands": self.motors}
+        xyz = ("x", "y", "z")
+        return others.get(signal, ("w", *xyz) if signal == "base_orientation" else xyz)
 
 
 def difference(signal: Signal, one: FloatArray, other: FloatArray) -> FloatArray:

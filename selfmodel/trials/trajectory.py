@@ -74,8 +74,8 @@ class Trajectory:
             control time step; None for a robot without its own clock.
         substeps: Physics steps of the robot's model per control step, by which positions are
             integrated; the default is that of the paper's robots.
-        welded: Mask of the hinges that the hypothesis of each run welds, ``(runs, hinges)``; None
-            for none, and for a trajectory that is no prediction of segments.
+        welded: Mask of the hinges that the hypothesis of each run welds, ``(runs, hinges)``, of a
+            prediction of segments.
         detached: Mask of the hinges of detached limbs, likewise.
 
     Raises:
@@ -120,11 +120,9 @@ class Trajectory:
 
     def hinge_mask(self, effect: Literal["welded", "detached"]) -> BoolArray:
         """Returns ``welded`` or ``detached`` of a batch of runs, ``(runs, hinges)``."""
-        found = self.welded if effect == "welded" else self.detached
-        if found is not None:
-            return found
+        mask: BoolArray | None = getattr(self, effect)
         runs = len(next(iter(self.signals.values())))
-        return np.zeros((runs, len(self.names.hinges)), dtype=np.bool_)
+        return np.zeros((runs, len(self.names.hinges)), np.bool_) if mask is None else mask
 
     @property
     def steady_commands(self) -> FloatArray:
@@ -187,30 +185,18 @@ def collect(names: Names, samples: Iterable[Sample]) -> Trajectory:
     rows = list(samples)
     if not rows:
         raise ValueError("a trajectory needs at least one sample, got none")
-    return Trajectory(
-        names=names,
-        time=frozen(np.array([row.time for row in rows])),
-        signals={
-            signal: frozen(np.stack([row.values[signal] for row in rows]))
-            for signal in rows[0].values
-        },
-        late=late_steps([row.moment for row in rows]),
-    )
-
-
-def late_steps(moments: Sequence[StepTiming | None]) -> BoolArray | None:
-    """Returns a mask of the late steps, ``(steps,)``; None for a robot without its own clock."""
-    known = [moment for moment in moments if moment is not None]
-    return np.array([moment.late for moment in known]) if known else None
+    time = frozen(np.array([row.time for row in rows]))
+    late = [row.moment.late for row in rows if row.moment is not None]
+    signals = {
+        signal: frozen(np.stack([row.values[signal] for row in rows])) for signal in rows[0].values
+    }
+    return Trajectory(names, time, signals, np.array(late) if late else None)
 
 
 def forward_displacement(trajectory: Trajectory) -> FloatArray:
-    """Returns the forward displacement d(T) - d(1) of the root body along the world's x axis.
+    """Returns the forward displacement d(T) - d(1) along the world's x axis, m, of each run.
 
     Source: the paper, section III (fitness of the repair EA).
-
-    Returns:
-        Displacement of each run, m, ``(...)``; ``()`` for a single run.
     """
     x = trajectory["base_position"][..., 0]
     with np.errstate(invalid="ignore"):  # a log may contain infinity: the displacement is NaN
@@ -259,13 +245,10 @@ def trajectory_of_arrays(
     steps = max((len(values) for values in given.values() if values.ndim), default=0)
     if steps < 2:
         raise InputError("a trial needs at least two rows of joint_positions and of commands")
-    found = {
-        signal: frozen(_checked(given[signal], signal, steps, names, orders.get(signal)))
-        if signal in given
-        else frozen(np.full((steps, names.width(signal)), np.nan))
-        for signal in SIGNALS
-    }
-    lengths = np.linalg.norm(found["base_orientation"], axis=1)
+    signals = {signal: np.full((steps, names.width(signal)), np.nan) for signal in SIGNALS}
+    for signal, values in given.items():
+        signals[signal] = _checked(values, signal, steps, names.columns(signal), orders.get(signal))
+    lengths = np.linalg.norm(signals["base_orientation"], axis=1)
     wrong = np.flatnonzero(np.abs(lengths - 1) > MAX_LENGTH_ERROR)
     if len(wrong):
         raise InputError(
@@ -275,7 +258,8 @@ def trajectory_of_arrays(
     scheduled = np.arange(steps, dtype=np.float64) * robot.control_timestep
     if time is not None:
         _check_time(_numbers("time", time), scheduled, robot.control_timestep)
-    return Trajectory(names, frozen(scheduled), found)
+    frozen_signals = {signal: frozen(values) for signal, values in signals.items()}
+    return Trajectory(names, frozen(scheduled), frozen_signals)
 
 
 def _numbers(signal: str, values: ArrayLike) -> FloatArray:
@@ -288,12 +272,15 @@ def _numbers(signal: str, values: ArrayLike) -> FloatArray:
 
 
 def _checked(
-    values: FloatArray, signal: Signal, steps: int, names: Names, order: Sequence[str] | None
+    values: FloatArray,
+    signal: Signal,
+    steps: int,
+    known: tuple[str, ...],
+    order: Sequence[str] | None,
 ) -> FloatArray:
     """Returns an array whose shape and numbers are right, with its columns in the robot's order."""
-    known = names.columns(signal)
-    kind = {"sensors": "sensors", "commands": "motors"}.get(signal, "numbers")
-    kind = "hinges" if signal.startswith("joint_") else kind
+    kinds = {"sensors": "sensors", "commands": "motors"}
+    kind = kinds.get(signal, "hinges" if signal.startswith("joint_") else "numbers")
     if values.shape != (steps, len(known)):
         raise InputError(
             f"{signal} must have the shape (steps, {kind}) = ({steps}, {len(known)}), "

@@ -42,13 +42,6 @@ def stage_of(name: str) -> Stage | None:
     return next((stage for stage in STAGES if stage == name), None)
 
 
-def checked_seed(seed: int) -> int:
-    """Returns a valid seed of a trial; raises ``InputError`` for another one."""
-    if not 0 <= seed <= MAX_SEED:
-        raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {seed}")
-    return seed
-
-
 @dataclass(frozen=True)
 class TrialPlan:
     """The plan of a trial, known before it starts.
@@ -71,7 +64,8 @@ class TrialPlan:
     seed: int
 
     def __post_init__(self) -> None:
-        checked_seed(self.seed)
+        if not 0 <= self.seed <= MAX_SEED:
+            raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {self.seed}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,13 +221,7 @@ def _digest(trajectory: Trajectory) -> str:
 
 @dataclass(frozen=True, eq=False)
 class TrialPart:
-    """A part of a trial: the pieces that lie between two times.
-
-    Attributes:
-        trial: The whole trial.
-        begin: First time of the part, s since the start of the trial.
-        end: Last time of the part, s since the start of the trial.
-    """
+    """A part of a trial: what lies between two times, s since its start, both inclusive."""
 
     trial: Trial
     begin: float = -math.inf
@@ -273,10 +261,6 @@ def trial_names(trials: Iterable[Trial]) -> dict[str, str]:
     return {path: name if counts[name] == 1 else path for path, name in names.items()}
 
 
-LOSABLE_SIGNALS: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
-"""Signals whose columns may be lost with an encoder."""
-
-
 def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """Returns a trial without the columns that were never observed in one of the others.
 
@@ -285,7 +269,8 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     returned if the others, of the same robot, lack nothing.
     """
     reduced: dict[Signal, FloatArray] = {}
-    for signal in LOSABLE_SIGNALS:
+    losable: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
+    for signal in losable:  # with an encoder
         observed = [np.isfinite(own.trajectory[signal]).any(axis=0) for own in (trial, *others)]
         lost = observed[0] & ~np.logical_and.reduce(observed)
         if lost.any():
@@ -334,16 +319,12 @@ def command_difference(one: Trial, other: Trial) -> float:
     the root mean square of the other trial's standard deviations; infinite without known commands.
     The commands of a network differ in every step, and their distributions hardly.
     """
-    first, second = _known(one), _known(other)
+    commands = (one.trajectory["commands"], other.trajectory["commands"])
+    first, second = (rows[np.isfinite(rows).all(axis=1)] for rows in commands)
     if not len(first) or not len(second):
-        return float("inf")
+        return math.inf
     scale = float(np.sqrt(np.mean(second.var(axis=0))))
     means = np.abs(first.mean(axis=0) - second.mean(axis=0))
     deviations = np.abs(first.std(axis=0) - second.std(axis=0))
     difference = float(np.mean(means + deviations))
-    return difference / scale if scale > 0 else (float("inf") if difference > 0 else 0.0)
-
-
-def _known(trial: Trial) -> FloatArray:
-    commands = trial.trajectory["commands"]
-    return np.asarray(commands[np.isfinite(commands).all(axis=1)])
+    return difference / scale if scale > 0 else (math.inf if difference > 0 else 0.0)
