@@ -98,8 +98,8 @@ def nominal(robot: Robot) -> Parameters:
 
 def from_factors(factors: FloatArray, delay: float) -> Parameters:
     """Returns parameters from ``Parameters.factors`` and a control delay, control steps."""
-    *shared, motors = *factors[:4].tolist(), tuple(factors[4:].tolist())
-    return Parameters(*shared, motors, delay)
+    root, limbs, friction, damping, *motors = factors.tolist()
+    return Parameters(root, limbs, friction, damping, tuple(motors), delay)
 
 
 def model_with_parameters(

@@ -2,7 +2,7 @@
 
 import copy
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,13 +80,14 @@ def draw_gap_of(
             f"got {level}"
         )
 
-    def drawn(spread: float, count: int) -> list[float]:
-        return np.maximum(MIN_FACTOR, 1 + spread * rng.standard_normal(count)).tolist()
+    def drawn(spread: float, names: Sequence[str]) -> dict[str, float]:
+        factors = np.maximum(MIN_FACTOR, 1 + spread * rng.standard_normal(len(names)))
+        return dict(zip(names, factors.tolist(), strict=True))
 
     bodies = [model.body(b).name for b in range(1, model.nbody)]
-    mass, inertia = (dict(zip(bodies, drawn(level, len(bodies)), strict=True)) for _ in range(2))
-    friction, damping = drawn(2 * level, 2)
-    motors = dict(zip(anatomy.motors, drawn(level, len(anatomy.motors)), strict=True))
+    mass, inertia = drawn(level, bodies), drawn(level, bodies)
+    friction, damping = drawn(2 * level, ("friction", "damping")).values()
+    motors = drawn(level, anatomy.motors)
     delay = int(rng.integers(MAX_EXTRA_DELAY + 1))
     return RealityGap(
         level=level,
