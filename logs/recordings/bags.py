@@ -6,7 +6,6 @@ reads the files, whose content may be hostile.
 """
 
 import io
-import os
 import re
 import shlex
 import sqlite3
@@ -19,9 +18,9 @@ from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+import mcap.records
 import numpy as np
 import zstandard
-from mcap.records import Channel, Message as McapMessage, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags import rosbag1
 from ruamel.yaml import YAML
@@ -30,21 +29,18 @@ from ruamel.yaml.error import YAMLError
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, file_digest, read_file
 from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
-from selfmodel.logs.recordings.messages import (
-    CDR,
-    DECODERS,
-    ROS1,
-    ZSTD_MAGIC,
-    RefusedError,
-    decode,
+from selfmodel.logs.recordings import messages
+from selfmodel.logs.recordings.recording import (
+    MAX_TIME,
+    Column,
+    Recording,
+    Series,
+    packed,
+    unpacked,
 )
-from selfmodel.logs.recordings.recording import Column, Recording, Series, packed, unpacked
 
 if TYPE_CHECKING:
     from selfmodel.arrays import FloatArray
-
-MAX_LOG_TIME = 2**62
-"""Maximum log time of a bag, ns: the year 2116; sums still fit 64 bits."""
 
 _EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
@@ -54,16 +50,15 @@ def read_bag(path: Path, topics: Collection[str] | None = None) -> Recording:
     """Returns a bag, after a check of all its files.
 
     Args:
-        path: Folder of a rosbag2 bag, with or without ``metadata.yaml``, or one of its files; or
-            a ROS 1 bag.
-        topics: Topics to decode, where their type is in ``DECODERS``; None for all. Only types and
-            counts of the others are read.
+        path: Folder of a rosbag2 bag, or one of its files; or a ROS 1 bag.
+        topics: Topics to decode, where their type is in ``messages.DECODERS``; None for all. Only
+            types and counts of the others are read.
 
     Raises:
         InputError: The bag does not exist, is damaged, or cannot be read.
     """
     request = Message({"path": str(path), "topics": None if topics is None else sorted(topics)})
-    task = "selfmodel.logs.recordings.bags:read_in_child"
+    task = f"{__name__}:read_in_child"
     return unpacked(run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS))
 
 
@@ -105,9 +100,8 @@ def bag_files(path: Path) -> list[Path]:
             f"{metadata}: expected the list of the bag's files, got: {reason}: {advice}"
         ) from failure
     if missing := [file.name for file in files if not file.is_file()]:
-        raise InputError(
-            f"{metadata}: expected files that exist, got {', '.join(missing)}: {advice}"
-        )
+        names = ", ".join(missing)
+        raise InputError(f"{metadata}: expected files that exist, got {names}: {advice}")
     return files
 
 
@@ -134,7 +128,7 @@ def _stored(file: Path) -> Iterator[_Stored]:
     with file.open("rb") as opened:
         head = opened.read(16)
         opened.seek(0)
-        if head.startswith(ZSTD_MAGIC):
+        if head.startswith(messages.ZSTD_MAGIC):
             with tempfile.TemporaryDirectory() as folder:
                 plain = Path(folder, file.stem)
                 with plain.open("wb") as target:
@@ -144,40 +138,44 @@ def _stored(file: Path) -> Iterator[_Stored]:
     for magic, (read, _) in _FORMATS.items():
         if head.startswith(magic):
             for item in read(file):
-                if not (isinstance(item.time, int) and 0 <= item.time < MAX_LOG_TIME):
+                if not (isinstance(item.time, int) and 0 <= item.time < MAX_TIME):
                     raise ValueError(f"a message has the log time {item.time!r} ns")
                 yield item
             return
     raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
 
 
-class _WholeReader(io.BufferedReader):
-    """File that is read whole, where a damaged length is more than any memory."""
+class _BoundedReader(io.BufferedReader):
+    """File whose reads are bounded by its size: a damaged length is more than any memory."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(io.FileIO(file))
+        self.size = file.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
         """Reads that many bytes, or the rest."""
-        return super().read(-1 if size is None or size > os.fstat(self.fileno()).st_size else size)
+        return super().read(-1 if size is None or size > self.size else size)
 
 
 def _mcap(file: Path) -> Iterator[_Stored]:
     types, topics = {0: ""}, {}
     count, claimed = 0, None
-    size = file.stat().st_size
-    with _WholeReader(io.FileIO(file)) as opened:
-        # No record is larger than its file; a damaged length would take the memory.
-        for record in StreamReader(opened, validate_crcs=True, record_size_limit=size).records:
+    with _BoundedReader(file) as opened:
+        # No record is larger than its file.
+        reader = StreamReader(opened, validate_crcs=True, record_size_limit=opened.size)
+        for record in reader.records:
             match record:
-                case Schema():
+                case mcap.records.Schema():
                     types[record.id] = record.name
-                case Channel():
+                case mcap.records.Channel():
                     kind = types.get(record.schema_id, "")
                     topics[record.id] = _Stored(record.topic, kind, record.message_encoding)
                     yield topics[record.id]
-                case McapMessage():
+                case mcap.records.Message():
                     count += 1
                     topic = topics[record.channel_id]
                     yield topic._replace(time=record.log_time, data=record.data)
-                case Statistics():
+                case mcap.records.Statistics():
                     claimed = record.message_count
         # The library skips records of a damaged type: their messages would be missing silently.
         if claimed not in (None, count):
@@ -219,7 +217,7 @@ def _sqlite(file: Path) -> Iterator[_Stored]:
 
 def _ros1(file: Path) -> Iterator[_Stored]:
     with rosbag1.Reader(file) as reader:
-        topics = {c.id: _Stored(c.topic, c.msgtype, ROS1) for c in reader.connections}
+        topics = {c.id: _Stored(c.topic, c.msgtype, messages.ROS1) for c in reader.connections}
         yield from topics.values()
         count = 0
         for connection, time, data in reader.messages():
@@ -269,7 +267,6 @@ class _Topic:
 
     Attributes:
         types: Message types, one in nearly every bag.
-        count: Number of messages.
         times: Time stamp (0 without one) and log time of each decoded message, ns.
         layouts: Indices and rows of these by the names in them, nearly always the same.
         refused: Numbers of messages left out, by reason.
@@ -278,43 +275,40 @@ class _Topic:
     types: dict[str, None] = field(default_factory=dict)
     count: int = 0
     times: list[tuple[int, int]] = field(default_factory=list)
-    layouts: dict[tuple[str, ...], tuple[list[int], list["FloatArray"]]] = field(
-        default_factory=dict
-    )
+    layouts: dict[tuple[str, ...], list[tuple[int, "FloatArray"]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
 
     def add(self, item: _Stored, *, decoded: bool) -> None:
         """Adds a message, or an announcement."""
         package, _, name = item.type.rpartition("/")
         kind = item.type if package.endswith("/msg") else f"{package}/msg/{name}"  # old bags
-        known = item.encoding in (CDR, ROS1)
+        known = item.encoding in (messages.CDR, messages.ROS1)
         self.types[(kind if package else name) + ("" if known else f" in {item.encoding!r}")] = None
         if item.data is None:
             return
         self.count += 1
-        if decoded and known and kind in DECODERS:
+        if decoded and known and kind in messages.DECODERS:
             try:
-                stamp, (names, rows) = decode(item.data, kind, item.encoding)
-            except RefusedError as refused:
+                stamp, (names, rows) = messages.decode(item.data, kind, item.encoding)
+            except messages.RefusedError as refused:
                 self.refused[str(refused)] += 1
                 return
-            indices, blocks = self.layouts.setdefault(names, ([], []))
-            indices.append(len(self.times))
-            blocks.append(rows)
+            self.layouts.setdefault(names, []).append((len(self.times), rows))
             self.times.append((stamp, item.time))
 
     def series(self) -> Series:
         """Returns the messages as arrays; a column may be in messages of several layouts."""
-        parts: dict[str, list[tuple[list[int], FloatArray]]] = {}
-        for names, (indices, blocks) in self.layouts.items():
-            rows = np.array(blocks)
+        parts: dict[str, list[Column]] = {}
+        for names, decoded in self.layouts.items():
+            indices, blocks = zip(*decoded, strict=True)
+            index, rows = np.array(indices, dtype=np.int64), np.array(blocks)
             for k, name in enumerate(names):
-                parts.setdefault(name, []).append((indices, rows[:, k]))
+                parts.setdefault(name, []).append(Column(index, rows[:, k]))
         columns = {}
         for name, some in parts.items():
-            index = np.concatenate([np.array(indices, dtype=np.int64) for indices, _ in some])
-            values = np.concatenate([values for _, values in some])
+            index = np.concatenate([part.index for part in some])
             order = np.argsort(index)
+            values = np.concatenate([part.values for part in some])
             columns[name] = Column(index[order], values[order])
         stamps, logged = np.array(self.times, dtype=np.int64).reshape(-1, 2).T
         kind = " and ".join(self.types)

@@ -16,6 +16,9 @@ IntArray = NDArray[np.int64]
 TABLE = "table"
 """Topic of all columns of a table, which have their times in common."""
 
+MAX_TIME = 2**62
+"""Magnitude of a time above which it is refused, ns: the year 2116; sums still fit 64 bits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Column:
