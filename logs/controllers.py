@@ -134,13 +134,18 @@ def read_arrays(data: bytes, limit: int) -> dict[str, NDArray[Any]]:
     if len(data) > limit:
         raise ValueError(f"it has more than {limit} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = archive.infolist()
-        if sum(info.file_size for info in members) > limit:
+        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        if sum(info.file_size for info in members.values()) > limit:
             raise ValueError(f"it unpacks to more than {limit} bytes")
-        names = [info.filename.removesuffix(".npy") for info in members]
-        if len(set(names)) != len(names):
-            raise ValueError("it holds an array twice")
-        return {name: _array(archive.read(info)) for name, info in zip(names, members, strict=True)}
+        return {name: _array(archive.read(info)) for name, info in members.items()}
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    file = io.BytesIO(data)
+    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    if file.tell() != len(data):
+        raise ValueError("bytes follow an array")
+    return array
 
 
 def check_types(
@@ -152,19 +157,3 @@ def check_types(
     types = {name: type_of(array) for name, array in arrays.items()}
     if types != expected:
         raise ValueError(f"its arrays have the types and ranks {types}")
-
-
-def _array(data: bytes) -> NDArray[Any]:
-    """Array of an ``.npy`` file, of version 1.0 and without objects."""
-    file = io.BytesIO(data)
-    if np.lib.format.read_magic(file) != (1, 0):
-        raise ValueError("it has arrays of another version than 1.0")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    count = 1
-    for length in shape:
-        count *= length
-    if dtype.hasobject or dtype.itemsize * count != len(data) - file.tell():
-        raise ValueError(f"an array of shape {shape} and type {dtype} does not fit its size")
-    file.seek(0)
-    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-    return array

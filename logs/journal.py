@@ -26,9 +26,7 @@ OPTIONS = "options.json"
 
 @dataclass(frozen=True, eq=False)
 class FolderJournal:
-    """Journal of a recovery in a folder; ``create_journal`` makes the folder.
-
-    See ``selfmodel.recovery.Journal``.
+    """Journal of a recovery in a folder, which ``create_journal`` makes; see ``recovery.Journal``.
 
     Attributes:
         folder: Folder with ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
@@ -83,10 +81,6 @@ def create_journal(
         kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
         calibrated: Whether the self-model is fitted to the trials before the failure: whether
             ``recover`` gets ``calibrate``. A report of an unfinished run repeats the fit.
-
-    Raises:
-        InputError: The folder is not empty, or a file.
-        LogWriteError: The disk is full, or failed.
     """
     try:
         holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
@@ -124,12 +118,7 @@ def trial_order(path: Path) -> tuple[int, str]:
 
 
 def read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
-    """Returns the diagnoses in the folder of a run; none if the run has none yet.
-
-    Args:
-        folder: The folder.
-        space: Hypotheses that the diagnoses may name.
-    """
+    """Returns the diagnoses in the folder of a run; none if the run has none yet."""
     path = folder / DIAGNOSES
     if not path.exists():
         return ()

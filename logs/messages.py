@@ -63,11 +63,7 @@ def is_known(kind: str) -> bool:
 
 
 def schema_text(kind: str) -> str:
-    """Returns the definition of a message type, with the definitions of all nested types.
-
-    Args:
-        kind: Message type, such as ``sensor_msgs/msg/JointState``.
-    """
+    """Returns the definition of a message type, with the definitions of all nested types."""
     short = kind.replace("/msg/", "/")
     nested = [f"MSG: {part}\n{DEFINITIONS[part]}" for part in _nested(short)]
     return f"{'=' * 80}\n".join([DEFINITIONS[short], *nested])
@@ -156,11 +152,9 @@ class Template:
             self._blocks.append((offset, count))
 
     def encode(self, nanoseconds: IntArray, values: FloatArray) -> list[bytes]:
-        """Returns one message per row of values.
+        """Returns one message per row of values, ``(steps, width)``.
 
-        Args:
-            nanoseconds: Non-negative times, ``(steps,)`` ns, written into every stamp of a message.
-            values: Numbers, ``(steps, width)``.
+        Each has its time, ``(steps,)`` ns, not negative, in all its stamps.
         """
         messages = np.tile(np.frombuffer(self.payload, np.uint8), (len(values), 1))
         seconds = np.column_stack(np.divmod(nanoseconds, _BILLION))
@@ -175,11 +169,7 @@ class Template:
         return [row.tobytes() for row in messages]
 
     def decode(self, payloads: Sequence[bytes]) -> tuple[IntArray, FloatArray]:
-        """Returns the times and numbers of messages; the inverse of ``encode``.
-
-        Returns:
-            Times, ``(steps,)`` ns, and numbers, ``(steps, width)``.
-        """
+        """Returns the times and numbers of messages; the inverse of ``encode``."""
         length = len(self.payload)
         for index, payload in enumerate(payloads):
             if len(payload) != length:
@@ -188,10 +178,8 @@ class Template:
                 )
         messages = np.frombuffer(b"".join(payloads), np.uint8).reshape(-1, length)
         fixed = np.ones(length, dtype=np.bool_)
-        gaps = [(offset, 8) for offset in self._stamps]
-        gaps += [(offset, 8 * count) for offset, count in self._blocks]
-        for offset, size in gaps:
-            fixed[offset : offset + size] = False
+        for offset, count in (*((stamp, 1) for stamp in self._stamps), *self._blocks):
+            fixed[offset : offset + 8 * count] = False
         wrong = np.any(messages[:, fixed] != np.frombuffer(self.payload, np.uint8)[fixed], axis=1)
         if np.any(wrong):
             raise ValueError(f"message {np.argmax(wrong)} has another layout than expected")
@@ -272,9 +260,8 @@ class Topic:
 
     def pack(self, rows: Mapping[Part, FloatArray]) -> FloatArray:
         """Returns the numbers of the messages, ``(steps, width)``."""
-        return np.concatenate(
-            [rows[part][:, _order(part, width)] for part, width in self.parts.items()], axis=1
-        )
+        parts = [rows[part][:, _order(part, width)] for part, width in self.parts.items()]
+        return np.concatenate(parts, axis=1)
 
     def unpack(self, values: FloatArray) -> dict[Part, FloatArray]:
         """Returns the parts of the numbers, ``(steps, ...)`` each; the inverse of ``pack``."""
@@ -348,12 +335,7 @@ TIMING = Topic(
 
 
 def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
-    """Returns the topic of the poses of all bodies, for other tools.
-
-    Args:
-        bodies: Names of the bodies' frames.
-        parents: Names of their parents' frames.
-    """
+    """Returns the topic of the poses of all bodies, by their frames and those of the parents."""
     content = [
         {"header": {"frame_id": parent}, "child_frame_id": body}
         for body, parent in zip(bodies, parents, strict=True)

@@ -29,11 +29,6 @@ def run_trial(
         path: Name of the log; it must not exist.
         robot: Robot as its model describes it.
         header: Other content of the log's preamble; ``timed`` is taken from the physical robot.
-
-    Raises:
-        InputError: The file exists, or the plan does not fit the robot.
-        LogError: The robot stopped early, or the log failed its verification.
-        LogWriteError: The disk is full, or failed.
     """
     timed = isinstance(physical, TimedRobot)
     samples = physical.run(plan.controller, plan.steps)

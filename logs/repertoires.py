@@ -66,11 +66,7 @@ def repertoire_bytes(repertoire: Repertoire) -> bytes:
 
 
 def save_repertoire(path: Path, repertoire: Repertoire) -> None:
-    """Writes a repertoire, or replaces the file.
-
-    Raises:
-        LogWriteError: Writing failed; the file keeps its old content.
-    """
+    """Writes a repertoire, or replaces the file."""
     replace_file(path, repertoire_bytes(repertoire))
 
 

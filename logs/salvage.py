@@ -55,11 +55,7 @@ def salvage(path: Path, out: Path) -> Salvaged:
 
 
 def salvageable_steps(path: Path) -> int:
-    """Returns the number of steps that ``salvage`` would write, of a log that is only read.
-
-    Raises:
-        InputError: The file does not exist.
-    """
+    """Returns the number of steps that ``salvage`` would write, of a log that is only read."""
     try:
         return _saved(path)[2].steps
     except LogError:
@@ -77,11 +73,9 @@ def _saved(path: Path) -> tuple[Contents, records.ResultRecord, Salvaged]:
     result = records.ResultRecord(
         records.INTERRUPTED, steps, float(forward_displacement(trajectory))
     )
-    contents.metadata = {
-        name: texts
-        for name, texts in contents.metadata.items()
-        if name.startswith(records.OWN) and name != _SEALED
-    } | {
+    every = contents.metadata.items()
+    own = {k: texts for k, texts in every if k.startswith(records.OWN) and k != _SEALED}
+    contents.metadata = own | {
         records.TRIAL: records.texts_of(record),
         records.RESULT: records.texts_of(result),
         records.SALVAGE: {

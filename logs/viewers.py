@@ -158,11 +158,7 @@ def parent_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 class Kinematics:
-    """Forward kinematics of a nominal model, like ROS's robot_state_publisher.
-
-    Args:
-        robot: Robot without faults, also for a damaged physical robot.
-    """
+    """Forward kinematics of a robot without faults, like ROS's robot_state_publisher."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
@@ -172,10 +168,7 @@ class Kinematics:
         self._write = state_writer(robot, fields.__getitem__)
 
     def transforms(self, rows: Mapping[Part, FloatArray]) -> FloatArray:
-        """Returns the pose of each body in the frame of its parent.
-
-        Args:
-            rows: The signals of ``POSE``, ``(steps, width)`` each.
+        """Returns the pose of each body in the frame of its parent, given the signals of ``POSE``.
 
         Returns:
             Position x y z in metres and quaternion x y z w of each body, ``(steps, 7 bodies)``,

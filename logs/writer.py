@@ -45,7 +45,7 @@ def write_trial(
     """Writes the log of a trial while the trial runs; see ``TrialWriter``.
 
     Args:
-        path: Name of the log; the unfinished file is ``path.part``.
+        path: Name of the log, which is returned; the unfinished file is ``path.part``.
         robot: Robot as its model describes it.
         plan: Plan of the trial.
         samples: Samples, one per control step as they happen; at most ``plan.steps`` are read.
@@ -53,9 +53,6 @@ def write_trial(
             which stops the robot. A ``map`` over a generator has no ``close``: to process samples
             before they are logged, use ``TrialWriter``.
         header: Other content of the log's preamble.
-
-    Returns:
-        ``path``.
 
     Raises:
         InputError: The file exists, or the plan or a sample does not fit the robot.
@@ -86,15 +83,6 @@ class TrialWriter:
     complete log with the status ``stopped``, and so does any exception in the trial of a robot with
     its own clock, which cannot be repeated. If there is no step yet, such a trial leaves no file,
     so that it can be repeated under its name.
-
-    Args:
-        path: Name of the log.
-        robot: Robot as its model describes it.
-        plan: Plan of the trial.
-        header: Other content of the log's preamble.
-
-    Raises:
-        InputError: The plan does not fit the robot.
     """
 
     def __init__(self, path: Path, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
@@ -273,17 +261,15 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         controller_sha256=records.sha256(controller) if controller else "",
         model_sha256=records.sha256(model),
     )
+    software = {
+        "selfmodel": __version__,
+        "mujoco": mujoco.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "mcap": mcap.__version__,
+    }
     log.metadata(records.TRIAL, records.texts_of(record))
-    log.metadata(
-        records.SOFTWARE,
-        {
-            "selfmodel": __version__,
-            "mujoco": mujoco.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-            "mcap": mcap.__version__,
-        },
-    )
+    log.metadata(records.SOFTWARE, software)
     truths = {records.TRUTH: header.hidden, records.GAP: header.gap}
     if known := {name: text for name, text in truths.items() if text is not None}:
         log.metadata(records.HIDDEN, known)

@@ -32,7 +32,7 @@ TIMES: Mapping[str, int] = MappingProxyType({"s": 10**9, "ms": 10**6, "us": 10**
 Keys = tuple[str, ...]
 """Path of an entry: names of its tables, then its key."""
 
-_VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = MappingProxyType(
+VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = MappingProxyType(
     {
         "base": {
             "position": (0, 3),
@@ -260,7 +260,7 @@ class Trial(Section, kw_only=True):
 def _vectors(body: str, section: Imu | None) -> Places:
     if section is None:
         return
-    for key, numbers in _VECTORS[body].items():
+    for key, numbers in VECTORS[body].items():
         scale = 1.0
         if isinstance(section, Base) and key in ("position", "linear_velocity"):
             scale = UNITS[section.unit]

@@ -13,7 +13,15 @@ from msgspec import Struct
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.logs.recordings.mapping import NONE, UNKNOWN, Angles, Keys, Place, Trial
+from selfmodel.logs.recordings.mapping import (
+    NONE,
+    UNKNOWN,
+    VECTORS,
+    Angles,
+    Keys,
+    Place,
+    Trial,
+)
 from selfmodel.logs.recordings.messages import ARRAY, TYPES
 from selfmodel.logs.recordings.recording import TABLE, Recording
 from selfmodel.robot.anatomy import Anatomy
@@ -21,13 +29,7 @@ from selfmodel.robot.anatomy import Anatomy
 
 @dataclass(frozen=True)
 class RecordingMapping:
-    """Mapping that was read, checked for internal consistency.
-
-    Attributes:
-        name: Name of the file in errors.
-        text: Its text.
-        trial: Its content.
-    """
+    """Mapping that was read: name of its file, its text, and its content, which is consistent."""
 
     name: str
     text: str
@@ -76,39 +78,27 @@ def parse_mapping(text: str, name: str) -> RecordingMapping:
     return mapping
 
 
-_BAG_KEYS: Mapping[str, Keys] = {
-    "": ("clock",),
-    "joints": ("topic",),
-    "commands": ("topic", "order"),
-    "base": ("topic",),
-    "imu": ("topic",),
-    "touch": ("topic", "index"),
+_OWN_KEYS: Mapping[str, tuple[Keys, Keys]] = {
+    "": (("clock",), ("sensors",)),
+    "joints": (("topic",), ("velocities", "efforts")),
+    "commands": (("topic", "order"), ()),
+    "base": (("topic",), (*VECTORS["base"], "velocity_frame")),
+    "imu": (("topic",), tuple(VECTORS["imu"])),
+    "touch": (("topic", "index"), ("column",)),
 }
-"""Keys of each table of the mapping of a bag, which that of a table does not have."""
-
-_TABLE_KEYS: Mapping[str, Keys] = {
-    "": ("sensors",),
-    "joints": ("velocities", "efforts"),
-    "base": (
-        *("position", "orientation", "linear_velocity", "angular_velocity"),
-        "velocity_frame",
-    ),
-    "imu": ("orientation", "angular_velocity"),
-    "touch": ("column",),
-}
-"""Keys of each table of the mapping of a table, which that of a bag does not have."""
+"""Keys that a table of the file has in the mapping of a bag only, and of a table only."""
 
 
 def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
     """Checks that the keys are those of a table, whose mapping has ``[time]``, or of a bag."""
     trial, is_table = mapping.trial, mapping.trial.time is not None
     use = "a bag: remove it" if is_table else "a table: remove it, or add [time]"
-    for role, keys in (_BAG_KEYS if is_table else _TABLE_KEYS).items():
+    for role, (of_bag, of_table) in _OWN_KEYS.items():
         sections: dict[Keys, Any] = {(role,): tables.get(role, {})} if role else {(): tables}
         if role == "touch":
-            sections = {("touch", name): section for name, section in sections["touch",].items()}
+            sections = {(role, name): section for name, section in sections[role,].items()}
         for path, section in sections.items():
-            for key in keys:
+            for key in of_bag if is_table else of_table:
                 if key in section:
                     raise mapping.error((*path, key), f"{key} is a key of the mapping of {use}")
     base = trial.base
@@ -190,7 +180,7 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
     """Checks that a recording has what a mapping names, of a type that can play its role."""
     for place in mapping.places.values():
         _check_topic(mapping, recording, place)
-    order = getattr(mapping.trial.commands, "order", ())
+    order = mapping.trial.commands.order
     for place in mapping.places.values():
         columns = recording.series[place.topic].names
         if place.role == ("commands",) and order:
