@@ -40,9 +40,6 @@ TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]] = {
 }
 """Task names by domain."""
 
-FILE_TASKS: tuple[str, ...] = ("walk",)
-"""Tasks of a robot from an MJCF or URDF file."""
-
 
 def entry(name: str) -> Entry:
     """Returns the entry of a robot: one of ``ROBOTS``, or a body of dm_control's suite.
@@ -60,8 +57,11 @@ def entry(name: str) -> Entry:
             f"{name} is a task, and its body is no robot of selfmodel: {reason}; "
             f"selfmodel.tasks.load({suite_bodies.PREFIX + domain!r}, {task!r}) makes the task"
         )
+    bodies = [suite_bodies.name(*body) for body in suite_bodies.BODIES]
+    if name in bodies:
+        return suite_bodies.entry(domain, task)
     if domain in suite_bodies.DOMAINS:
-        return suite_bodies.entry(*suite_bodies.parse_name(name))
+        raise unknown_name("robot", name, bodies)
     raise unknown_name("robot", name, (*ROBOTS, "suite-DOMAIN-TASK"))
 
 
@@ -117,29 +117,25 @@ def constructor(domain_name: str | Path, task_name: str) -> Callable[..., "contr
         InputError: The robot or the task is unknown, or the file cannot be a robot.
     """
     if isinstance(domain_name, Path) or Path(domain_name).suffix:
-        if task_name not in FILE_TASKS:
-            raise unknown_name(f"task of {domain_name}", task_name, FILE_TASKS)
+        if task_name != "walk":
+            raise unknown_name(f"task of {domain_name}", task_name, ("walk",))
         # Imported here, because dm_control's physics initialises a display when imported.
         from selfmodel.tasks import walking  # noqa: PLC0415  # see the line above
 
         return partial(walking.environment, load_mjcf(domain_name))
-    if domain_name in SUITE:
-        if task_name not in SUITE[domain_name]:
-            raise unknown_name(f"task of {domain_name}", task_name, SUITE[domain_name])
-        return SUITE[domain_name][task_name]
-    domain = domain_name.removesuffix(f"-{task_name}")
-    if domain in SUITE and domain.startswith(suite_bodies.PREFIX) and task_name in SUITE[domain]:
-        return SUITE[domain][task_name]
-    body, _, own = domain_name.removeprefix(suite_bodies.PREFIX).partition("-")
-    known = SUITE.get(f"{suite_bodies.PREFIX}{body}", {})
-    if domain_name.startswith(suite_bodies.PREFIX) and own in known:
-        raise unknown_name(f"task of {domain_name}", task_name, (own,))
-    raise unknown_name("robot", domain_name, (*SUITE, "a path that ends in .xml"))
+    domain, _, task = domain_name.rpartition("-")  # of a body, such as suite-walker-walk
+    known = SUITE.get(domain_name)
+    if known is None and task in SUITE.get(domain, ()):
+        known = {task: SUITE[domain][task]}
+    if known is None:
+        raise unknown_name("robot", domain_name, (*SUITE, "a path that ends in .xml"))
+    if task_name not in known:
+        raise unknown_name(f"task of {domain_name}", task_name, known)
+    return known[task_name]
 
 
 __all__ = [
     "ALL_TASKS",
-    "FILE_TASKS",
     "ROBOTS",
     "SUITE",
     "TASKS_BY_DOMAIN",

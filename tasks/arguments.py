@@ -1,9 +1,11 @@
-"""Arguments that all tasks have: their checks, random numbers and start noise."""
+"""Arguments that all tasks have: their checks, and what is drawn from them once."""
 
 import copy
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError, unknown_name
@@ -11,9 +13,33 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.simulation.domain import ANGLE_DEVIATION
+from selfmodel.simulation.reality_gap import RealityGap, draw_gap_of
 
 NAMES = ("hypothesis", "time_limit", "random", "gap", "start_noise")
 """Arguments of every task."""
+
+MAX_START_NOISE = 1.0
+"""Largest standard deviation of the initial joint angles, rad."""
+
+Seed = int | np.random.RandomState | np.random.Generator | None
+"""Seed or generator of a task's random numbers; None for another seed each time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reality:
+    """The body of a task as it differs from its model, for all episodes.
+
+    Attributes:
+        hypothesis: Its faults.
+        gap: Its reality gap; the level 0 is none.
+        seed: Seed of the random parts of the faults, such as terrain.
+        start: Noise of the initial pose, as a level of the reality gap.
+    """
+
+    hypothesis: Hypothesis
+    gap: RealityGap
+    seed: int
+    start: float
 
 
 def check_names(task_kwargs: Mapping[str, Any]) -> None:
@@ -31,19 +57,77 @@ def check_names(task_kwargs: Mapping[str, Any]) -> None:
             raise unknown_name("argument of the task", str(name), NAMES)
 
 
-def parsed(hypothesis: str | Hypothesis, anatomy: Anatomy) -> Hypothesis:
-    """Returns the hypothesis of a task.
+def check_time_limit(time_limit: float) -> None:
+    """Raises ``InputError`` unless the length of an episode is a number above 0."""
+    _check_number("time_limit", time_limit)
+    if not time_limit > 0:
+        raise InputError(
+            f"expected a time_limit above 0 s, such as 10 or float('inf'), got {time_limit!r}"
+        )
+
+
+def _check_number(name: str, value: float) -> None:
+    if not hasattr(value, "__float__") or isinstance(value, bool):
+        raise InputError(f"expected a number as {name}, such as 0.05, got {value!r}")
+
+
+def random_streams(random: Seed) -> tuple[np.random.RandomState, np.random.Generator]:
+    """Returns the generators of the episodes, as dm_control's tasks have it, and of a ``Reality``.
+
+    The second depends on the state of the first, which is not advanced: the initial states of
+    a healthy and a damaged robot with the same seed come from the same random numbers.
 
     Args:
-        hypothesis: A hypothesis, or its notation with built-in kinds.
-        anatomy: Parts of the body.
+        random: A ``RandomState`` is returned itself; a ``Generator`` is advanced by one number.
+
+    Raises:
+        InputError: The seed is out of range, or is no whole number.
+    """
+    if isinstance(random, np.random.Generator):
+        random = int(random.integers(2**32))
+    try:
+        episodes = (
+            random if isinstance(random, np.random.RandomState) else np.random.RandomState(random)
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"expected random as a whole number from 0 to {2**32 - 1}, a numpy RandomState or "
+            f"Generator, or None, got {random!r}"
+        ) from error
+    seed = copy.deepcopy(episodes).randint(2**32, size=4, dtype=np.uint64)
+    return episodes, np.random.default_rng(seed)
+
+
+def next_seed(episodes: np.random.RandomState) -> int:
+    """Returns the seed of the next episode; the generator of the episodes is advanced."""
+    return int(episodes.randint(2**32, dtype=np.uint64))
+
+
+def draw_reality(
+    model: mujoco.MjModel,
+    anatomy: Anatomy,
+    hypothesis: str | Hypothesis,
+    *,
+    gap: float,
+    start_noise: float | None,
+    rng: np.random.Generator,
+) -> Reality:
+    """Returns the body of a task as its arguments describe it.
+
+    Args:
+        model: The healthy body.
+        anatomy: Its parts.
+        hypothesis: Its faults, or their notation with built-in kinds.
+        gap: Level of the reality gap.
+        start_noise: Standard deviation of the initial joint angles, rad; None for that of the gap.
+        rng: Source of the random numbers.
 
     Raises:
         InputError: The hypothesis cannot be parsed, has another type, or names a part that the
-            body does not have.
+            body does not have; or a number is none, or out of range.
     """
     if isinstance(hypothesis, str):
-        return parse(hypothesis, anatomy)
+        hypothesis = parse(hypothesis, anatomy)
     if not isinstance(hypothesis, Hypothesis):
         raise InputError(
             f"expected a hypothesis in notation or as a Hypothesis, such as 'wind=5' or 'intact', "
@@ -53,100 +137,15 @@ def parsed(hypothesis: str | Hypothesis, anatomy: Anatomy) -> Hypothesis:
         known = fault.kind.parts(anatomy)
         if fault.part not in known:
             raise unknown_name(f"part of {fault.kind.name} in this body", fault.part, known)
-    return hypothesis
-
-
-def check_time_limit(time_limit: float) -> None:
-    """Checks the length of an episode.
-
-    Raises:
-        InputError: It is no number above 0.
-    """
-    check_number("time_limit", time_limit)
-    if not time_limit > 0:
-        raise InputError(
-            f"expected a time_limit above 0 s, such as 10 or float('inf'), got {time_limit!r}"
-        )
-
-
-def check_number(name: str, value: float) -> None:
-    """Checks that an argument is a number, of Python or numpy.
-
-    Raises:
-        InputError: It is not.
-    """
-    if not hasattr(value, "__float__") or isinstance(value, bool):
-        raise InputError(f"expected a number as {name}, such as 0.05, got {value!r}")
-
-
-Seed = int | np.random.RandomState | np.random.Generator | None
-"""Seed or generator of a task's random numbers; None for another seed each time."""
-
-
-def episode_numbers(random: Seed) -> np.random.RandomState:
-    """Returns the generator of the episodes, as dm_control's tasks have it.
-
-    Args:
-        random: A ``RandomState`` is returned itself; a ``Generator`` is advanced by one number.
-
-    Raises:
-        InputError: The seed is out of range, or is no whole number.
-    """
-    if isinstance(random, np.random.RandomState):
-        return random
-    if isinstance(random, np.random.Generator):
-        return np.random.RandomState(int(random.integers(2**32)))
-    try:
-        return np.random.RandomState(random)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"expected random as a whole number from 0 to {2**32 - 1}, a numpy RandomState or "
-            f"Generator, or None, got {random!r}"
-        ) from error
-
-
-def construction_numbers(episodes: np.random.RandomState) -> np.random.Generator:
-    """Returns the generator of what is drawn once: the reality gap and the terrain.
-
-    It depends on the state of the episodes' generator, which is not advanced: the initial states of
-    a healthy and a damaged robot with the same seed come from the same random numbers.
-
-    Args:
-        episodes: Generator of the episodes.
-    """
-    seed = copy.deepcopy(episodes).randint(2**32, size=4, dtype=np.uint64)
-    return np.random.default_rng(seed)
-
-
-def next_seed(episodes: np.random.RandomState) -> int:
-    """Returns the seed of the next episode.
-
-    Args:
-        episodes: Generator of the episodes, which is advanced.
-    """
-    return int(episodes.randint(2**32, dtype=np.uint64))
-
-
-MAX_START_NOISE = 1.0
-"""Largest standard deviation of the initial joint angles, rad."""
-
-
-def start_level(start_noise: float | None, gap: float) -> float:
-    """Returns the noise of the initial pose as a level of the reality gap.
-
-    Args:
-        start_noise: Standard deviation of the initial joint angles, rad; None for that of the gap.
-        gap: Level of the reality gap.
-
-    Raises:
-        InputError: The noise is no number, or out of range.
-    """
-    if start_noise is None:
-        return gap
-    check_number("start_noise", start_noise)
-    if not 0 <= start_noise <= MAX_START_NOISE:
-        raise InputError(
-            f"expected a start_noise from 0 to {MAX_START_NOISE:g} rad, such as 0.02, got "
-            f"{start_noise}"
-        )
-    return start_noise / ANGLE_DEVIATION
+    _check_number("gap", gap)
+    drawn = draw_gap_of(model, anatomy, gap, rng)
+    start = gap
+    if start_noise is not None:
+        _check_number("start_noise", start_noise)
+        if not 0 <= start_noise <= MAX_START_NOISE:
+            raise InputError(
+                f"expected a start_noise from 0 to {MAX_START_NOISE:g} rad, such as 0.02, got "
+                f"{start_noise}"
+            )
+        start = start_noise / ANGLE_DEVIATION
+    return Reality(hypothesis, drawn, int(rng.integers(2**32)), start)

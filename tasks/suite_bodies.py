@@ -12,7 +12,6 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
-from selfmodel.errors import unknown_name
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
@@ -64,26 +63,13 @@ Tasks with a ball are omitted, because the ball is a second free body, and so is
 """
 
 
-def names() -> tuple[str, ...]:
-    """Returns the names of all robots of the suite."""
-    return tuple(name(domain, task) for domain, tasks in DOMAINS.items() for task in tasks)
+BODIES = tuple((domain, task) for domain, tasks in DOMAINS.items() for task in tasks)
+"""Domain and task of each body."""
 
 
 def name(domain: str, task: str) -> str:
     """Returns the robot's name of the body of a task."""
     return f"{PREFIX}{domain}-{task}"
-
-
-def parse_name(text: str) -> tuple[str, str]:
-    """Returns the domain and the task of a robot's name.
-
-    Raises:
-        InputError: The name is unknown; the message contains the nearest one.
-    """
-    domain, _, task = text.removeprefix(PREFIX).partition("-")
-    if not text.startswith(PREFIX) or task not in DOMAINS.get(domain, ()):
-        raise unknown_name("robot", text, names())
-    return domain, task
 
 
 def entry(domain: str, task: str) -> Entry:
@@ -97,41 +83,30 @@ def entry(domain: str, task: str) -> Entry:
 
 @lru_cache
 def robot(domain: str, task: str) -> Robot:
-    """Returns the healthy body of a task, with the suite's own time steps.
+    """Returns the healthy body of a task of ``DOMAINS``, with the suite's own time steps.
 
     The initial pose is that of ``Physics.reset``, without the random pose of the suite's episodes.
     A swimmer is rotated by a right angle, so that its nose points forward.
-
-    Args:
-        domain: One of ``DOMAINS``.
-        task: One of its tasks.
     """
     mjcf, assets = _model(domain, task)
     text = mjcf.decode() if isinstance(mjcf, bytes) else mjcf
     keyframe = "none"
     if domain == "swimmer":
-        keyframe, text = _FORWARD, text.replace("</mujoco>", _swimmer_keyframe(_links(task)))
-    settings = MjcfSettings(keyframe=keyframe, control_timestep=control_timestep(domain))
+        keyframe, others = "forward", " 0" * (_links(task) - 1)
+        key = f'<key name="{keyframe}" qpos="0 0 {math.pi / 2!r}{others}"/>'
+        text = text.replace("</mujoco>", f"<keyframe>{key}</keyframe></mujoco>")
+    # Without it, the control time step is the physics time step.
+    timestep: float | None = getattr(_module(domain), "_CONTROL_TIMESTEP", None)
+    settings = MjcfSettings(keyframe=keyframe, control_timestep=timestep)
     return adapt_text(name(domain, task), text, assets, settings)
 
 
 def specification(domain: str, task: str) -> mujoco.MjSpec:
-    """Returns the suite's own model of a task, as an editable specification.
-
-    Args:
-        domain: One of ``DOMAINS``.
-        task: One of its tasks.
-    """
+    """Returns the suite's own model of a task of ``DOMAINS``, as an editable specification."""
     mjcf, assets = _model(domain, task)
     work = read_mjcf(parse_xml(mjcf), InMemory(assets))
     with loading_a_model():
         return mujoco.MjSpec.from_string(work.text, assets=dict(work.assets))
-
-
-def control_timestep(domain: str) -> float | None:
-    """Returns the control time step of a domain, s; None if it is the physics time step."""
-    found: float | None = getattr(_module(domain), "_CONTROL_TIMESTEP", None)
-    return found
 
 
 def _model(domain: str, task: str) -> tuple[str | bytes, Mapping[str, bytes]]:
@@ -152,15 +127,6 @@ def _links(task: str) -> int:
     return int(task.removeprefix("swimmer"))
 
 
-def _swimmer_keyframe(links: int) -> str:
-    """A keyframe of a swimmer rotated by a right angle; its ``links - 1`` other joints are at 0."""
-    qpos = f"0 0 {math.pi / 2!r}" + " 0" * (links - 1)
-    return f'<keyframe><key name="{_FORWARD}" qpos="{qpos}"/></keyframe></mujoco>'
-
-
-_FORWARD = "forward"
-
-
 def _module(domain: str) -> Any:  # noqa: ANN401  # modules of dm_control have no types
     # Imported here, because dm_control's physics initialises a display when imported.
     return importlib.import_module(f"dm_control.suite.{domain}")
@@ -176,14 +142,32 @@ STATE: tuple[Signal, ...] = (
 )
 
 
+class SuiteTask:
+    """A task of the suite whose commands are delayed by some control steps.
+
+    All other attributes are those of the suite's task.
+    """
+
+    def __init__(self, task: "Task", delay: int) -> None:
+        self._task, self._delay = task, delay
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
+        if name == "_task":  # a copy has no attributes yet
+            raise AttributeError(name)
+        return getattr(self._task, name)
+
+    def initialize_episode(self, physics: "Physics") -> None:
+        """Starts the delay line."""
+        self._delayed = deque(np.zeros((self._delay, physics.model.nu)))
+
+    def before_step(self, action: FloatArray, physics: "Physics") -> None:
+        """Applies the commands of some control steps ago."""
+        self._delayed.append(np.array(action, dtype=np.float64))
+        self._task.before_step(self._delayed.popleft(), physics)
+
+
 class SuiteRobot:
     """A physical robot in an environment of the suite, stepped through the dm_env interface.
-
-    Args:
-        domain: Domain of the suite.
-        task: Task of the domain.
-        robot: The healthy body.
-        hidden: Faults of the physical robot.
 
     Attributes:
         returns: Sum of the environment's rewards, per run so far.
@@ -192,10 +176,10 @@ class SuiteRobot:
     def __init__(self, domain: str, task: str, robot: Robot, hidden: Hypothesis) -> None:
         variant = build(robot, hidden, OWN_SEED)
         physics, rewarding = episode_parts(domain, task)
-        stepped = _Stepped(rewarding, robot, variant)
+        observed = _ObservedTask(rewarding, robot, variant)
         control = importlib.import_module("dm_control.rl.control")
-        env = control.Environment(physics(variant.model), stepped, n_sub_steps=robot.substeps)
-        self.returns = stepped.returns
+        env = control.Environment(physics(variant.model), observed, n_sub_steps=robot.substeps)
+        self.returns = observed.returns
         # A simulation needs no stop command, whose step would add a reward.
         self._robot = EnvironmentRobot(
             env, robot, stop=lambda: None, silent_neurons=variant.silent_neurons
@@ -207,36 +191,21 @@ class SuiteRobot:
         return self._robot.run(controller, steps)
 
 
-class _Stepped:
-    """A task of the suite with a fixed initial pose and with the robot's own observations.
-
-    Args:
-        task: The suite's task after one reset; all other attributes are delegated to it.
-        robot: The healthy robot.
-        variant: The robot with its faults.
-    """
+class _ObservedTask(SuiteTask):
+    """A task of the suite, which was reset once, with the robot's initial pose and observations."""
 
     def __init__(self, task: "Task", robot: Robot, variant: ModelVariant) -> None:
-        self._task = task
+        super().__init__(task, added_steps(robot.control_delay, float(variant.added_delay[0])))
         self._robot, self._variant = robot, variant
         joints = observed_fields(robot, [variant])["joint_positions"]
         self._fields = {**signal_fields(robot), "joint_positions": joints}
         self.returns: list[float] = []
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
-        return getattr(self._task, name)
-
-    def initialize_episode(self, _physics: "Physics") -> None:
+    def initialize_episode(self, physics: "Physics") -> None:
         """Keeps the pose of the physics' reset and starts a new return."""
+        super().initialize_episode(physics)
         self._reader = SensorReader(self._variant.model, self._robot.anatomy, [self._variant])
         self.returns.append(0.0)
-        delay = added_steps(self._robot.control_delay, float(self._variant.added_delay[0]))
-        self._delayed = deque(np.zeros((delay, self._variant.model.nu)))
-
-    def before_step(self, action: FloatArray, physics: "Physics") -> None:
-        """Applies the commands of some control steps ago."""
-        self._delayed.append(np.array(action, dtype=np.float64))
-        self._task.before_step(self._delayed.popleft(), physics)
 
     def get_reward(self, physics: "Physics") -> float:
         """Returns the suite's reward, and adds it to the return."""

@@ -2,14 +2,12 @@
 
 import importlib
 import inspect
-from collections import deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
 from selfmodel.faults.hypothesis import Hypothesis
@@ -19,18 +17,9 @@ from selfmodel.robot.anatomy_reader import read_anatomy
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import loading_a_model, mujoco_errors_as_input_errors
 from selfmodel.simulation.domain import randomize_joint_angles, start_spread
-from selfmodel.simulation.reality_gap import draw_gap_of, perturbed_model
-from selfmodel.tasks import suite_bodies
-from selfmodel.tasks.arguments import (
-    Seed,
-    check_number,
-    check_time_limit,
-    construction_numbers,
-    episode_numbers,
-    next_seed,
-    parsed,
-    start_level,
-)
+from selfmodel.simulation.reality_gap import perturbed_model
+from selfmodel.tasks import arguments, suite_bodies
+from selfmodel.tasks.arguments import Reality, Seed
 
 if TYPE_CHECKING:
     from dm_control.mujoco import Physics
@@ -102,36 +91,35 @@ def environment(
         InputError: The hypothesis cannot be parsed or does not apply, or another argument is out of
             range.
     """
+    limit: dict[str, Any] = {}
     if time_limit is not None:
-        check_time_limit(time_limit)
-    check_number("gap", gap)
+        arguments.check_time_limit(time_limit)
+        limit = {"time_limit": time_limit}
     suite = importlib.import_module("dm_control.suite")
-    episodes = episode_numbers(random)
-    construction = construction_numbers(episodes)
-    limit: dict[str, Any] = {} if time_limit is None else {"time_limit": time_limit}
+    episodes, rng = arguments.random_streams(random)
     extra = dict(environment_kwargs or {})
     with loading_a_model():  # MuJoCo warns about the cheetah
         env = suite.load(domain, task, {"random": episodes, **limit}, extra)
-    anatomy = _anatomy(domain, task, env.physics.model.ptr)
-    hypothesis = parsed(hypothesis, anatomy)
-    drawn = draw_gap_of(env.physics.model.ptr, anatomy, gap, construction)
-    start = start_level(start_noise, gap)
-    if not hypothesis.faults and gap == 0 and start == 0:
+    own = env.physics.model.ptr
+    anatomy = _anatomy(domain, task, own)
+    reality = arguments.draw_reality(
+        own, anatomy, hypothesis, gap=gap, start_noise=start_noise, rng=rng
+    )
+    if not reality.hypothesis.faults and gap == 0 and reality.start == 0:
         return env
-    _check_effect(f"{suite_bodies.PREFIX}{domain} {task}", hypothesis)
-    seed = int(construction.integers(2**32))
-    model = _compiled(domain, task, env.physics.model.ptr, hypothesis, seed)
-    with loading_a_model():
-        variant = apply_faults(perturbed_model(model, drawn), anatomy, hypothesis, seed)
-    delay = drawn.delay + added_steps(0, float(variant.added_delay[0]))
+    _check_effect(f"{suite_bodies.PREFIX}{domain} {task}", reality.hypothesis)
+    variant = _variant(domain, task, own, anatomy, reality)
+    delay = reality.gap.delay + added_steps(0, float(variant.added_delay[0]))
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
     extra.pop("n_sub_steps", None)  # is in the control time step of the suite's environment
     constructor = importlib.import_module("dm_control.rl.control").Environment
+    module = importlib.import_module(f"dm_control.suite.{domain}")
+    default = inspect.signature(module.SUITE[task]).parameters["time_limit"].default
     return constructor(
         type(env.physics).from_model(wrapper.MjModel(variant.model)),
-        DamagedTask(env.task, variant, anatomy, delay, start),
+        DamagedTask(env.task, variant, anatomy, delay, reality.start),
         **{
-            "time_limit": _default_time_limit(domain, task),
+            "time_limit": float(default),
             **limit,
             **extra,
             "control_timestep": env.control_timestep(),
@@ -157,47 +145,35 @@ def _check_effect(name: str, hypothesis: Hypothesis) -> None:
             )
 
 
-def _compiled(
-    domain: str, task: str, own: mujoco.MjModel, hypothesis: Hypothesis, seed: int
-) -> mujoco.MjModel:
-    """Returns the suite's model with the faults that edit the specification.
-
-    Args:
-        domain: Domain of the suite.
-        task: Task of the domain.
-        own: The suite's compiled model, which is returned without such faults.
-        hypothesis: The hypothesis.
-        seed: Seed of the random parts of the faults.
-    """
-    edits = hypothesis.spec_part.faults
-    if not edits:
-        return own
-    if task not in suite_bodies.DOMAINS.get(domain, ()):
+def _variant(
+    domain: str, task: str, own: mujoco.MjModel, anatomy: Anatomy, reality: Reality
+) -> ModelVariant:
+    """Returns the suite's compiled model of a task with the faults and the gap."""
+    edits, seed = reality.hypothesis.spec_part.faults, reality.seed
+    if edits and task not in suite_bodies.DOMAINS.get(domain, ()):
         raise InputError(
             f"{edits[0].kind.name} replaces flat ground, and {domain} {task} has other ground "
             f"or further bodies: use it with a task of {', '.join(suite_bodies.DOMAINS)} that "
             f"selfmodel suite list names"
         )
-    spec = suite_bodies.specification(domain, task)
-    for fault in edits:
-        fault.kind.edit_specification(spec, fault, seed)
-    with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
-        return spec.compile()
+    if edits:
+        spec = suite_bodies.specification(domain, task)
+        for fault in edits:
+            fault.kind.edit_specification(spec, fault, seed)
+        with mujoco_errors_as_input_errors(f"compile the model of {reality.hypothesis}"):
+            own = spec.compile()
+    with loading_a_model():
+        perturbed = perturbed_model(own, reality.gap)
+        return apply_faults(perturbed, anatomy, reality.hypothesis, seed)
 
 
-def _default_time_limit(domain: str, task: str) -> float:
-    """Returns the suite's length of an episode, s."""
-    module = importlib.import_module(f"dm_control.suite.{domain}")
-    return float(inspect.signature(module.SUITE[task]).parameters["time_limit"].default)
-
-
-class DamagedTask:
+class DamagedTask(suite_bodies.SuiteTask):
     """A task of the suite with welded joints at their angles, a control delay and start noise.
 
     Observations, rewards and the end of an episode are the suite's.
 
     Args:
-        task: The suite's task; all other attributes are delegated to it.
+        task: The suite's task.
         variant: The body with its faults.
         anatomy: Parts of the body.
         delay: Control delay, control steps.
@@ -207,14 +183,8 @@ class DamagedTask:
     def __init__(
         self, task: "Task", variant: ModelVariant, anatomy: Anatomy, delay: int, start: float
     ) -> None:
-        self._task = task
-        self._variant, self._anatomy = variant, anatomy
-        self._delay, self._start = delay, start
-
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # attributes of the suite's task
-        if name == "_task":  # a copy has no attributes yet
-            raise AttributeError(name)
-        return getattr(self._task, name)
+        super().__init__(task, delay)
+        self._variant, self._anatomy, self._start = variant, anatomy, start
 
     @property
     def visualize_reward(self) -> bool:
@@ -237,17 +207,12 @@ class DamagedTask:
 
     def initialize_episode(self, physics: "Physics") -> None:
         """Draws the suite's initial state, adds the start noise and keeps welded joints welded."""
+        super().initialize_episode(physics)
         self._task.initialize_episode(physics)
         model, data = physics.model.ptr, physics.data.ptr
         if self._start > 0:
-            rng = np.random.default_rng(next_seed(self._task.random))
+            rng = np.random.default_rng(arguments.next_seed(self._task.random))
             spread = start_spread(self._start)
             randomize_joint_angles(self._anatomy, model, data, spread.angles, rng)
         for position, velocity, angle in self._variant.welded:
             data.qpos[position], data.qvel[velocity] = angle, 0.0
-        self._delayed = deque(np.zeros((self._delay, model.nu)))
-
-    def before_step(self, action: FloatArray, physics: "Physics") -> None:
-        """Applies the commands of some control steps ago."""
-        self._delayed.append(np.array(action, dtype=np.float64))
-        self._task.before_step(self._delayed.popleft(), physics)

@@ -14,30 +14,13 @@ from dm_control.suite import base
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.physical.simulated import (
-    Measurement,
-    NoisyMeasurement,
-    detached_limbs,
-    draw_gap,
-    physical_variant,
-    place_debris,
-)
+from selfmodel.physical import simulated
 from selfmodel.robot.anatomy import CONTROL_DELAY, added_steps, split_delay
-from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, current_value, observed_fields
 from selfmodel.simulation.domain import randomize_initial_pose, start_spread
-from selfmodel.simulation.reality_gap import RealityGap
-from selfmodel.tasks.arguments import (
-    Seed,
-    check_number,
-    check_time_limit,
-    construction_numbers,
-    episode_numbers,
-    next_seed,
-    parsed,
-    start_level,
-)
+from selfmodel.tasks import arguments
+from selfmodel.tasks.arguments import Reality, Seed
 from selfmodel.trials.signals import Signal
 
 TIME_LIMIT = 10.0
@@ -86,20 +69,15 @@ def environment(
             f"dm_control applies commands at control steps, and the control delay of {robot.name} "
             f"is {robot.control_delay:g} of them: set {CONTROL_DELAY} to a whole number"
         )
-    hypothesis = parsed(hypothesis, robot.anatomy)
-    check_time_limit(time_limit)
-    check_number("gap", gap)
-    episodes = episode_numbers(random)
-    construction = construction_numbers(episodes)
-    drawn = draw_gap(robot, gap, construction)
-    own = drawn if gap > 0 else None
-    seed = int(construction.integers(2**32))
-    variant = physical_variant(robot, hypothesis, seed, own)
-    limbs = () if own is None else detached_limbs(robot, hypothesis)
-    start = start_level(start_noise, gap)
+    arguments.check_time_limit(time_limit)
+    episodes, rng = arguments.random_streams(random)
+    reality = arguments.draw_reality(
+        robot.model, robot.anatomy, hypothesis, gap=gap, start_noise=start_noise, rng=rng
+    )
+    walk = Walk(robot, reality, episodes)
     return control.Environment(
-        mujoco.Physics.from_model(core.MjModel(variant.model)),
-        Walk(robot, variant, episodes, gap=own, limbs=limbs, start=start),
+        mujoco.Physics.from_model(core.MjModel(walk.variant.model)),
+        walk,
         time_limit=time_limit,
         control_timestep=robot.control_timestep,
         **(environment_kwargs or {}),
@@ -134,51 +112,46 @@ class Walk(base.Task):
 
     Args:
         robot: The healthy robot.
-        variant: The robot with its faults and its gap.
+        reality: Its faults and its gap.
         random: Generator of the episodes.
-        gap: Reality gap, for its delay and its measurement noise; None for no gap.
-        limbs: Root body of each detached limb that the model has debris of.
-        start: Noise of the initial pose, as a gap level.
+
+    Attributes:
+        variant: The robot with its faults and its gap.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        variant: ModelVariant,
-        random: np.random.RandomState,
-        *,
-        gap: RealityGap | None,
-        limbs: tuple[str, ...],
-        start: float,
-    ) -> None:
+    def __init__(self, robot: Robot, reality: Reality, random: np.random.RandomState) -> None:
         super().__init__(random=random)
-        self._robot, self._variant = robot, variant
-        self._gap, self._limbs, self._start_level = gap, limbs, start
-        self._fields = observed_fields(robot, [variant])
+        self._robot, self._start_level = robot, reality.start
+        self._gap = reality.gap if reality.gap.level > 0 else None
+        hidden = reality.hypothesis
+        self._limbs = simulated.detached_limbs(robot, hidden) if self._gap else ()
+        self.variant = simulated.physical_variant(robot, hidden, reality.seed, self._gap)
+        self._fields = observed_fields(robot, [self.variant])
         self._start = self._end = 0.0
         self._begin(np.random.default_rng(0))  # for the specs, before the first episode
 
     def _begin(self, rng: np.random.Generator) -> None:
         """Starts the random number streams and the delay line of an episode."""
-        variant = dataclasses.replace(self._variant, seed=int(rng.integers(2**32)))
+        variant = dataclasses.replace(self.variant, seed=int(rng.integers(2**32)))
         self._reader = SensorReader(variant.model, self._robot.anatomy, [variant])
-        self._measurement = Measurement()
+        self._measurement = simulated.Measurement()
         delay = int(self._robot.control_delay)
         delay += added_steps(delay, float(variant.added_delay[0]))
         if self._gap is not None:
-            self._measurement = NoisyMeasurement(self._gap.level, self._robot, variant, rng)
+            measured = self._gap.level, self._robot, variant, rng
+            self._measurement = simulated.NoisyMeasurement(*measured)
             delay += self._gap.delay
         self._delayed = deque(np.zeros((delay, variant.model.nu)))
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Sets the initial pose, with its noise, and the position for the reward."""
-        rng = np.random.default_rng(next_seed(self.random))
+        rng = np.random.default_rng(arguments.next_seed(self.random))
         self._begin(rng)
         model, data = physics.model.ptr, physics.data.ptr
         if self._start_level > 0:
             spread = start_spread(self._start_level)
             randomize_initial_pose(self._robot, model, data, spread, rng)
-        place_debris(model, data, self._limbs)
+        simulated.place_debris(model, data, self._limbs)
         super().initialize_episode(physics)
         self._start = self._end = self._forward(physics)
 
