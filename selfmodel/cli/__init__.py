@@ -24,7 +24,7 @@ SUITE = group(
     "suite",
     "Fail and recover the bodies of dm_control's suite, selfmodel's robots and your own.",
     {
-        "list": ("List the domains and their cases.", "studies:list_bodies", "ListSuite"),
+        "list": ("List the domains and their cases.", "robots:list_bodies", "ListSuite"),
         "run": ("Run a study: bodies x cases x seeds.", "studies:run_suite", "RunSuite"),
     },
 )

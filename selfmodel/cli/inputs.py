@@ -12,12 +12,7 @@ Number = TypeVar("Number", int, float)
 
 
 def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None) -> str:
-    """Returns the notation of a failure that is given by its case number or by its notation.
-
-    Args:
-        cases: Notation per case number of Table I.
-        case: Value of ``--case``.
-        damage: Value of ``--damage``.
+    """Returns the notation of a failure, given as ``--case`` of Table I or as ``--damage``.
 
     Raises:
         InputError: Neither or both are given, or there is no case of that number.
@@ -29,19 +24,15 @@ def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None
             f"expected either --case N or --damage NOTATION, got {given}: cases are {numbers}, a "
             f"notation is like {example}"
         )
-    if damage is not None:
-        return damage
-    if case is None or case not in cases:
+    if case is None:
+        return str(damage)
+    if case not in cases:
         raise unknown_name("case of Table I", str(case), map(str, cases))
     return cases[case]
 
 
 def stage(name: str) -> Stage:
-    """Returns the stage of that name.
-
-    Raises:
-        InputError: There is no such stage; the message contains the nearest names.
-    """
+    """Returns the stage of that name, or raises ``InputError`` with the nearest names."""
     found = stage_of(name)
     if found is None:
         raise unknown_name("stage", name, STAGES)
@@ -90,11 +81,7 @@ def _numbers(
 
 
 def share(option: str, given: str) -> tuple[int, int]:
-    """Returns ``(i, n)`` of the text ``i/n``: every n-th run, from the i-th.
-
-    Raises:
-        InputError: The text has another form, or i is not between 1 and n.
-    """
+    """Returns ``(i, n)`` of the text ``i/n``, every n-th run from the i-th, or an InputError."""
     first, _, count = given.partition("/")
     is_pair = first.isdecimal() and count.isdecimal() and len(given) <= 20
     if not (is_pair and 1 <= int(first) <= int(count)):
@@ -103,16 +90,6 @@ def share(option: str, given: str) -> tuple[int, int]:
             f"got {given!r}"
         )
     return int(first), int(count)
-
-
-def check_folder(path: Path) -> None:
-    """Checks that the folder of a file to be written exists.
-
-    Raises:
-        InputError: The folder is missing.
-    """
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
 
 
 def check_new_file(path: Path, *endings: str) -> None:
@@ -124,15 +101,12 @@ def check_new_file(path: Path, *endings: str) -> None:
     if path.suffix.lower() not in endings:
         expected = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
         raise InputError(f"--out needs a name that ends in {expected}, got {str(path)!r}")
-    check_folder(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
     refuse_existing(path)
 
 
 def check_log_name(path: Path) -> None:
-    """Checks the name of a log to be written.
-
-    Raises:
-        InputError: The name does not end in ``.mcap``.
-    """
+    """Raises ``InputError`` if the name of a log to be written does not end in ``.mcap``."""
     if path.suffix != ".mcap":
         raise InputError(f"--out needs a name that ends in .mcap, got {str(path)!r}")

@@ -1,18 +1,12 @@
-"""Progress on standard error: a line per finished search, trial or run, and a bar on a terminal."""
+"""Progress on standard error: lines of what is finished, and a bar on a terminal."""
 
 import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TaskID,
-    TextColumn,
-)
+import rich.progress as bars
 
 from selfmodel.cli.output import counted, plain
 from selfmodel.cli.tables import text_console
@@ -21,6 +15,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
+from selfmodel.studies.grid import CellEnds, GridBegins
 from selfmodel.trials.trial import Trial
 
 _SEARCHES = {"repair": "repair", "diagnostic": "diagnostic EA"}
@@ -32,20 +27,10 @@ def displacement_text(trial: Trial) -> str:
     return f"{trial.displacement:.3f} m forward"
 
 
-@contextmanager
-def progress_bar(*columns: ProgressColumn) -> Iterator[Progress | None]:
-    """Yields a progress bar on standard error; None where that is no terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    with Progress(*columns, console=text_console(stderr=True), expand=True) as progress:
-        yield progress
+class Display:
+    """Prints lines above a progress bar, or alone where standard error is no terminal."""
 
-
-class Lines:
-    """Prints lines above a bar, or alone."""
-
-    def __init__(self, bar: Progress | None) -> None:
+    def __init__(self, bar: bars.Progress | None) -> None:
         self.bar = bar
         self._console = bar.console if bar else text_console(stderr=True)
 
@@ -55,26 +40,35 @@ class Lines:
 
 
 @contextmanager
+def _bar(*columns: bars.ProgressColumn) -> Iterator[bars.Progress | None]:
+    """Yields a progress bar on standard error; None where that is no terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with bars.Progress(*columns, console=text_console(stderr=True), expand=True) as progress:
+        yield progress
+
+
+@contextmanager
 def display(
     describe: Callable[[Trial], str] = displacement_text,
 ) -> Iterator[Callable[[Event], None]]:
     """Yields a function that displays the events of a recovery or a diagnosis.
 
-    Args:
-        describe: Returns the result of a trial as text.
+    ``describe`` returns the result of a trial as text.
     """
-    best, rate = TextColumn("best {task.fields[best]}"), TextColumn("{task.fields[rate]}/s")
-    text = TextColumn("{task.description}")
-    with progress_bar(text, BarColumn(bar_width=None), MofNCompleteColumn(), best, rate) as bar:
+    names = ("{task.description}", "best {task.fields[best]}", "{task.fields[rate]}/s")
+    text, best, rate = map(bars.TextColumn, names)
+    with _bar(text, bars.BarColumn(bar_width=None), bars.MofNCompleteColumn(), best, rate) as bar:
         yield _Events(bar, describe)
 
 
-class _Events(Lines):
-    def __init__(self, bar: Progress | None, describe: Callable[[Trial], str]) -> None:
+class _Events(Display):
+    def __init__(self, bar: bars.Progress | None, describe: Callable[[Trial], str]) -> None:
         super().__init__(bar)
         self._describe = describe
         self._search = ""
-        self._task: TaskID | None = None
+        self._task: bars.TaskID | None = None
 
     def __call__(self, event: Event) -> None:
         match event:
@@ -109,8 +103,8 @@ class _Events(Lines):
         rate = f"{now.evaluations / now.seconds:.0f}" if now.seconds else "-"
         ends = now.number == now.total
         if self.bar and self._task is not None:
-            shown = {"best": f"{now.best:.3f}", "rate": rate}
-            self.bar.update(self._task, total=now.total, completed=now.number, **shown)  # type: ignore[arg-type]
+            self.bar.update(self._task, total=now.total, completed=now.number)
+            self.bar.update(self._task, best=f"{now.best:.3f}", rate=rate)
             if ends:
                 self.bar.remove_task(self._task)
         if ends:
@@ -133,3 +127,58 @@ def _fit_lines(fit: Calibration) -> list[str]:
         *(f"calibration: {line}" for line in fit.contacts),
         *([] if fit.suspicion is None else [f"warning: {fit.suspicion}"]),
     ]
+
+
+@contextmanager
+def grid_display() -> Iterator["GridDisplay"]:
+    """Yields a display of grid events on standard error."""
+    count, time = bars.MofNCompleteColumn(), bars.TimeElapsedColumn()
+    speed = bars.TextColumn("{task.description}")
+    with _bar(bars.BarColumn(bar_width=None), count, time, speed) as bar:
+        yield GridDisplay(bar)
+
+
+class GridDisplay(Display):
+    """Displays the events of a grid: above a bar, only failures are lines.
+
+    ``done`` cells of the ``total`` are done or have failed.
+    """
+
+    def __init__(self, bar: bars.Progress | None) -> None:
+        super().__init__(bar)
+        self.done = self.total = 0
+        self._before, self._start = 0, monotonic()
+
+    def __call__(self, event: GridBegins | CellEnds) -> None:
+        """Displays an event."""
+        if isinstance(event, GridBegins):
+            self.done, self.total = event.finished, event.total
+            self._before, self._start = event.finished, monotonic()
+            if self.bar:
+                self.bar.add_task("", total=event.total, completed=event.finished)
+            elif event.finished:
+                self.print_line(f"{event.finished} of {event.total} were done before")
+            return
+        self.done = event.number
+        seconds = monotonic() - self._start
+        speed = pace(event.number - self._before, event.total - event.number, seconds)
+        if self.bar:
+            self.bar.update(self.bar.task_ids[0], completed=event.number, description=speed)
+        if event.error is not None or not self.bar:
+            end = f"failed: {event.error}" if event.error else f"done in {event.seconds:.1f} s"
+            line = f"[{event.number}/{event.total}] {event.name}: {end}"
+            self.print_line("; ".join(filter(None, (line, speed))))
+
+
+def pace(done: int, left: int, seconds: float) -> str:
+    """Returns the rate of cells and the time left as text; nothing at the end.
+
+    Examples:
+        >>> pace(10, 35, 600.0)
+        '60 an hour, 0 h 35 min left'
+    """
+    if not (done and left and seconds > 0):
+        return ""
+    rate = done / seconds
+    minutes = math.ceil(left / rate / 60)
+    return f"{3600 * rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"

@@ -1,36 +1,61 @@
-"""``selfmodel robots``: the robots of selfmodel, and the parts of a robot or a file."""
+"""``selfmodel robots`` and ``suite list``: the robots, their parts, faults and cases of Table I."""
 
+from itertools import groupby
 from typing import Any
 
-from selfmodel.arguments import is_model, robot_entry
-from selfmodel.cli.commands import Robots
+from selfmodel import arguments
+from selfmodel.cli.commands import ListSuite, Robots
 from selfmodel.cli.output import print_json, print_lines
-from selfmodel.cli.tables import folding, print_tables
+from selfmodel.cli.tables import folding, print_tables, show
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.actuators import command_ranges, motor_joints
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import FixedBase, FreeBase, read_base
+from selfmodel.studies import plans
 from selfmodel.tasks import ROBOTS, Entry
 
 
 def robots(options: Robots) -> None:
     """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
     if options.robot is None:
-        every = [_facts(robot_entry(name)) for name in ROBOTS]
+        every = [_facts(arguments.robot_entry(name)) for name in ROBOTS]
         if options.as_json:
             print_json({"robots": every})
         else:
             _print_all(every)
         return
-    entry = robot_entry(options.robot, options.model_settings or ())
-    notes = entry.robot().notes if is_model(options.robot) else ()
+    entry = arguments.robot_entry(options.robot, options.model_settings or ())
+    notes = entry.robot().notes if arguments.is_model(options.robot) else ()
     facts = {**_facts(entry), **_parts(entry.robot()), "notes": list(notes)}
     if options.as_json:
         print_json(facts)
         return
     _print_parts(facts)
     print_lines(*(f"note: {note}" for note in notes))
+
+
+def list_bodies(options: ListSuite) -> None:
+    """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
+    found = [_domain_facts(domain) for domain in plans.DOMAINS]
+    if options.as_json:
+        print_json({"domains": found})
+        return
+    rows = [
+        [
+            one["domain"],
+            ", ".join(one["tasks"]),
+            _ranges([int(number) for number in one["cases"]]),
+            *(str(one[key]) for key in ("joints", "sensors", "motors", "weights")),
+            f"{one['physics_timestep']:g} x {one['substeps']}",
+        ]
+        for one in found
+    ]
+    columns = ("domain", "tasks", "cases", "joints", "sensors", "motors", "weights", "step, s")
+    show(columns, rows, texts=3)
+    print_lines(
+        "Robots of the suite are called DOMAIN-TASK: `selfmodel robots NAME` lists the parts."
+    )
 
 
 def _facts(entry: Entry) -> dict[str, Any]:
@@ -48,6 +73,30 @@ def _facts(entry: Entry) -> dict[str, Any]:
         "tasks": list(entry.suite),
         "cases": {str(number): notation for number, notation in entry.cases.items()},
     }
+
+
+def _domain_facts(domain: str) -> dict[str, Any]:
+    entry = arguments.robot_entry(plans.bodies_of([domain], None)[0])
+    facts, robot = _facts(entry), entry.robot()
+    return {
+        "domain": domain,
+        "tasks": list(plans.DOMAINS[domain]),
+        "robots": list(plans.bodies_of([domain], plans.DOMAINS[domain])),
+        **{parts: len(facts[parts]) for parts in ("joints", "hinges", "sensors", "motors")},
+        "weights": facts["weights"],
+        "physics_timestep": float(robot.model.opt.timestep),
+        "substeps": robot.substeps,
+        **{key: facts[key] for key in ("control_timestep", "cases")},
+    }
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Returns ascending numbers as text, with three or more consecutive ones as ``1 to 3``."""
+    runs = groupby(enumerate(numbers), key=lambda item: item[1] - item[0])
+    found = [[number for _, number in run] for _, run in runs]
+    return ", ".join(
+        f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in found
+    )
 
 
 def _print_all(facts: list[dict[str, Any]]) -> None:

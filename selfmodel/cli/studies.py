@@ -1,54 +1,29 @@
-"""Commands that run and compare studies: ``ablate``, ``suite``, ``paper`` and ``compare``."""
+"""Commands that run studies: ``ablate``, ``suite run`` and ``paper``."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from itertools import groupby
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
-import pandas as pd
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from selfmodel.arguments import robot_entry
 from selfmodel.cli import inputs
-from selfmodel.cli.commands import (
-    Ablate,
-    ListSuite,
-    RepeatPaper,
-    RunSuite,
-    Study as StudyOptions,
-    settings_of,
-)
+from selfmodel.cli.commands import Ablate, RepeatPaper, RunSuite, Study as Options, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.cli.progress import Lines, progress_bar
+from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.registry import kind_names
-from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies import figures, plans
+from selfmodel.studies import figures, plans, rows as loaded, tables as formats
 from selfmodel.studies.comparisons import balance_warnings
-from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor
+from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.paper_page import tables_of, write_results
-from selfmodel.studies.rows import outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import Interval
 from selfmodel.studies.study import Row, Study
-from selfmodel.studies.tables import (
-    Table,
-    ablation_scores,
-    as_json as json_of,
-    check_format,
-    results_files,
-    suite_summaries,
-    table_files,
-    table_of,
-    write_files,
-)
 from selfmodel.tasks import ROBOTS
 
 PROCESSES, DASK = EXECUTORS = ("processes", "dask")
@@ -57,9 +32,8 @@ PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 
 def ablate(options: Ablate) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds."""
-    cases = options.cases
-    check_format(options.table)
-    cases = cases.strip()
+    formats.check_format(options.table)
+    cases = options.cases.strip()
     numbers = () if cases in ("all", "none") else inputs.whole_numbers("--case", cases, ())
     study = plans.ablation(
         options.out,
@@ -79,15 +53,17 @@ def ablate(options: Ablate) -> None:
         only=inputs.share("--only", options.only),
     )
     failed = run_shown(study, options)
-    rows = study_rows(study.name, options.out)
-    scores = ablation_scores(rows)
+    rows = loaded.study_rows(study.name, options.out)
+    scores = formats.ablation_scores(rows)
     ends = {one["trials"] for one in scores}
     shown = [one for one in scores if one["trials"] in (min(ends), max(ends))]
-    notes = balance_warnings(whole(outcomes_of(study.name, rows)))
+    drawn = figures.of_ablation(rows, scores)
+    notes = balance_warnings(loaded.whole(loaded.outcomes_of(study.name, rows)))
     _finish(
         study,
         failed,
-        results_files(study.name, rows, "scores", scores) | figures_of(rows, scores),
+        formats.results_files(study.name, rows, "scores", scores)
+        | {f"figures/{name}": data for name, data in drawn.items()},
         [_score_table(scores)],
         {"rows": rows, "scores": scores},
         options=options,
@@ -97,15 +73,9 @@ def ablate(options: Ablate) -> None:
     )
 
 
-def figures_of(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
-    """Returns the files of the figures of an ablation, in their folder."""
-    found = figures.of_ablation(rows, scores)
-    return {f"figures/{name}": data for name, data in found.items()}
-
-
 def run_suite(options: RunSuite) -> None:
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds."""
-    check_format(options.table)
+    formats.check_format(options.table)
     names = inputs.texts("--domains", options.domains, plans.DOMAINS)
     wanted = (
         None
@@ -132,13 +102,13 @@ def run_suite(options: RunSuite) -> None:
         only=inputs.share("--only", options.only),
     )
     failed = run_shown(study, options)
-    rows = study_rows(study.name, options.out)
-    summaries = suite_summaries(rows)
-    found = table_of("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
+    rows = loaded.study_rows(study.name, options.out)
+    summaries = formats.suite_summaries(rows)
+    found = formats.table_of("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
     _finish(
         study,
         failed,
-        results_files(study.name, rows, "summaries", summaries),
+        formats.results_files(study.name, rows, "summaries", summaries),
         [found],
         {"rows": rows, "summaries": summaries},
         options=options,
@@ -147,32 +117,9 @@ def run_suite(options: RunSuite) -> None:
     )
 
 
-def list_bodies(options: ListSuite) -> None:
-    """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
-    found = [_domain_facts(domain) for domain in plans.DOMAINS]
-    if options.as_json:
-        print_json({"domains": found})
-        return
-    columns = ("domain", "tasks", "cases", "joints", "sensors", "motors", "weights", "step, s")
-    rows = [
-        [
-            one["domain"],
-            ", ".join(one["tasks"]),
-            _ranges([int(number) for number in one["cases"]]),
-            *(str(one[key]) for key in ("joints", "sensors", "motors", "weights")),
-            f"{one['physics_timestep']:g} x {one['substeps']}",
-        ]
-        for one in found
-    ]
-    show(columns, rows, texts=3)
-    print_lines(
-        "Robots of the suite are called DOMAIN-TASK: `selfmodel robots NAME` lists the parts."
-    )
-
-
 def paper(options: RepeatPaper) -> None:
     """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown."""
-    check_format(options.table)
+    formats.check_format(options.table)
     study = plans.paper(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
@@ -199,13 +146,13 @@ def paper(options: RepeatPaper) -> None:
 
 def _finish(
     study: Study,
-    failed: Sequence[Any],
+    failed: Sequence[CellEnds],
     results: Mapping[str, bytes],
-    tables: Sequence[Table],
+    tables: Sequence[formats.Table],
     facts: Mapping[str, Any],
     *,
-    options: StudyOptions,
-    shown: Table,
+    options: Options,
+    shown: formats.Table,
     legend: str,
     notes: Sequence[str] = (),
     written: Sequence[Path] = (),
@@ -224,27 +171,29 @@ def _finish(
         notes: Lines on standard error.
         written: Files that were written before.
     """
-    paths = [*written, *write_files(study.folder, results)]
+    paths = [*written, *formats.write_files(study.folder, results)]
     if options.table is not None:
-        paths += write_files(study.folder / "tables", table_files(tables, options.table))
+        content = formats.table_files(tables, options.table)
+        paths += formats.write_files(study.folder / "tables", content)
     files = [str(path) for path in paths]
     if options.as_json:
         failures = [{"run": one.name, "error": one.error} for one in failed]
-        print_json(json_of({**facts, "failures": failures, "files": files}), indent=1)
+        print_json(formats.as_json({**facts, "failures": failures, "files": files}), indent=1)
     else:
         if len(shown.shown):
-            _show(shown.shown, shown.texts)
+            show(list(shown.shown.columns), shown.shown.to_numpy().tolist(), texts=shown.texts)
             print_lines(legend)
         print_notes(*notes)
         print_lines(*files)
-    end(failed)
+    if failed:
+        print_notes(
+            f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
+            f"same command tries them again"
+        )
+        raise typer.Exit(1)
 
 
-def _show(frame: pd.DataFrame, texts: int) -> None:
-    show(list(frame.columns), frame.to_numpy().tolist(), texts=texts)
-
-
-def _score_table(scores: Sequence[Row]) -> Table:
+def _score_table(scores: Sequence[Row]) -> formats.Table:
     has_recovery = any(one["recovery"] for one in scores)
     texts = [
         {
@@ -259,7 +208,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
         }
         for one in scores
     ]
-    return table_of("scores", scores, texts, texts=3)
+    return formats.table_of("scores", scores, texts, texts=3)
 
 
 def _summary_texts(one: Row) -> dict[str, str]:
@@ -277,34 +226,6 @@ def _summary_texts(one: Row) -> dict[str, str]:
     }
 
 
-def _domain_facts(domain: str) -> dict[str, Any]:
-    entry = robot_entry(plans.bodies_of([domain], None)[0])
-    robot = entry.robot()
-    return {
-        "domain": domain,
-        "tasks": list(plans.DOMAINS[domain]),
-        "robots": list(plans.bodies_of([domain], plans.DOMAINS[domain])),
-        "joints": len(robot.anatomy.joints),
-        "hinges": len(robot.anatomy.hinges),
-        "sensors": len(robot.anatomy.sensors),
-        "motors": len(robot.anatomy.motors),
-        "weights": network_for(robot).weights,
-        "physics_timestep": float(robot.model.opt.timestep),
-        "substeps": robot.substeps,
-        "control_timestep": robot.control_timestep,
-        "cases": {str(number): notation for number, notation in entry.cases.items()},
-    }
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Returns ascending numbers as text, with three or more consecutive ones as ``1 to 3``."""
-    runs = groupby(enumerate(numbers), key=lambda item: item[1] - item[0])
-    found = [[number for _, number in run] for _, run in runs]
-    return ", ".join(
-        f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in found
-    )
-
-
 def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -> str:
     if interval is None:
         return "-"
@@ -315,7 +236,7 @@ def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -
     return f"{estimate} ({low} to {high})" if known else estimate
 
 
-def run_shown(study: Study, options: StudyOptions) -> Sequence[CellEnds]:
+def run_shown(study: Study, options: Options) -> Sequence[CellEnds]:
     """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.
@@ -343,81 +264,3 @@ def run_shown(study: Study, options: StudyOptions) -> Sequence[CellEnds]:
                 f"command continues with the rest"
             )
             raise
-
-
-@contextmanager
-def grid_display() -> Iterator["GridDisplay"]:
-    """Yields a display of grid events on standard error."""
-    speed = TextColumn("{task.description}")
-    bar = BarColumn(bar_width=None)
-    with progress_bar(bar, MofNCompleteColumn(), TimeElapsedColumn(), speed) as progress:
-        yield GridDisplay(progress)
-
-
-class GridDisplay(Lines):
-    """Displays the events of a grid: above a bar, only failures are lines.
-
-    Attributes:
-        done: Cells that are done or have failed.
-        total: All cells.
-    """
-
-    def __init__(self, bar: Progress | None) -> None:
-        super().__init__(bar)
-        self.done = self.total = 0
-        self._before, self._start = 0, monotonic()
-
-    def __call__(self, event: GridBegins | CellEnds) -> None:
-        """Displays an event."""
-        match event:
-            case GridBegins():
-                self.done, self.total = event.finished, event.total
-                self._before, self._start = event.finished, monotonic()
-                if self.bar:
-                    self.bar.add_task("", total=event.total, completed=event.finished)
-                elif event.finished:
-                    self.print_line(f"{event.finished} of {event.total} were done before")
-            case CellEnds():
-                self.done = event.number
-                seconds = monotonic() - self._start
-                speed = pace(event.number - self._before, event.total - event.number, seconds)
-                if self.bar:
-                    task = self.bar.task_ids[0]
-                    self.bar.update(task, completed=event.number, description=speed)
-                if event.error is not None or not self.bar:
-                    end = (
-                        f"failed: {event.error}"
-                        if event.error
-                        else f"done in {event.seconds:.1f} s"
-                    )
-                    line = f"[{event.number}/{event.total}] {event.name}: {end}"
-                    self.print_line("; ".join(filter(None, (line, speed))))
-
-
-def pace(done: int, left: int, seconds: float) -> str:
-    """Returns the rate of cells and the time left as text; nothing at the end.
-
-    Args:
-        done: Cells that ended since the start.
-        left: Cells that have not ended.
-        seconds: Time since the start, s.
-
-    Examples:
-        >>> pace(10, 35, 600.0)
-        '60 an hour, 0 h 35 min left'
-    """
-    if not (done and left and seconds > 0):
-        return ""
-    rate = done / seconds
-    minutes = math.ceil(left / rate / 60)
-    return f"{3600 * rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
-
-
-def end(failed: Sequence[CellEnds]) -> None:
-    """Ends the command with status 1 and a line if a cell failed."""
-    if failed:
-        print_notes(
-            f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
-            f"same command tries them again"
-        )
-        raise typer.Exit(1)

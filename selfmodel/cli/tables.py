@@ -1,7 +1,7 @@
 """Tables and consoles of rich, which keep every character on a narrow terminal."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal
+from typing import Any
 
 from rich.console import Console
 from rich.measure import Measurement
@@ -22,49 +22,22 @@ def text_console(*, stderr: bool = False) -> Console:
     return console
 
 
-def show(columns: Sequence[str], rows: Iterable[Sequence[str]], *, texts: int = 1) -> None:
-    """Prints a table; if it is too wide, each row as one line per cell.
-
-    Args:
-        columns: Titles of the columns.
-        rows: A text per column.
-        texts: Number of leading columns that are left-justified texts; the others are numbers.
-    """
-    rows = list(rows)
-    table = Table()
-    for place, title in enumerate(columns):
-        table.add_column(title, justify="left" if place < texts else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(plain, row))
-    console = text_console()
-    unbounded = console.options.update(width=10_000)
-    if Measurement.get(console, unbounded, table).maximum <= console.width:
-        console.print(table)
-        return
-    for row in rows:
-        cells = zip(columns[1:], row[1:], strict=True)
-        print_lines(f"{columns[0]}: {row[0]}", *(f"  {title}: {cell}" for title, cell in cells))
-
-
 def folding(
     columns: Sequence[str],
     rows: Iterable[Sequence[str]],
     *,
-    title: str | None = None,
+    title: str = "",
     texts: int | None = None,
+    **look: Any,  # noqa: ANN401  # as of rich's columns
 ) -> Table:
-    """Returns a table whose cells are wrapped where they are too wide.
+    """Returns a table whose cells are wrapped where they are too wide, a text per cell.
 
-    Args:
-        columns: Titles of the columns.
-        rows: A text per column.
-        title: Title of the table.
-        texts: Number of leading columns that are left-justified texts; None for all.
+    The first ``texts`` columns, or all, are left-justified texts, the others numbers.
     """
-    table = Table(title=plain(title) if title else None)
+    table = Table(title=plain(title) or None)
     for place, name in enumerate(columns):
-        justify: Literal["left", "right"] = "left" if texts is None or place < texts else "right"
-        table.add_column(name, overflow="fold", justify=justify)
+        is_text = texts is None or place < texts
+        table.add_column(name, justify="left" if is_text else "right", overflow="fold", **look)
     for row in rows:
         table.add_row(*map(plain, row))
     return table
@@ -73,6 +46,20 @@ def folding(
 def print_tables(*tables: Table) -> None:
     """Prints tables on standard output."""
     text_console().print(*tables)
+
+
+def show(columns: Sequence[str], rows: Iterable[Sequence[str]], *, texts: int = 1) -> None:
+    """Prints a table as ``folding``; if it is too wide, each row as one line per cell."""
+    rows = list(rows)
+    table = folding(columns, rows, texts=texts, no_wrap=True)
+    console = text_console()
+    unbounded = console.options.update(width=10_000)
+    if Measurement.get(console, unbounded, table).maximum <= console.width:
+        console.print(table)
+        return
+    for row in rows:
+        cells = zip(columns[1:], row[1:], strict=True)
+        print_lines(f"{columns[0]}: {row[0]}", *(f"  {title}: {cell}" for title, cell in cells))
 
 
 def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:

@@ -10,7 +10,7 @@ import pytest
 from mcap.records import Attachment, Channel, McapRecord, Metadata
 
 from selfmodel.cli.output import counted_warnings, print_json, print_lines, print_notes
-from selfmodel.cli.studies import grid_display, pace
+from selfmodel.cli.progress import grid_display, pace
 from selfmodel.cli.tables import WIDTH, folding, print_tables, show, text_console
 from selfmodel.logs import records
 from selfmodel.studies.grid import CellEnds, GridBegins
