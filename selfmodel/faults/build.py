@@ -68,13 +68,9 @@ def compile_model(
 def apply_faults(
     model: MjModel, anatomy: Anatomy, hypothesis: Hypothesis, seed: int = 0
 ) -> ModelVariant:
-    """Returns the variant of a compiled model with the faults of a hypothesis applied.
+    """Returns the variant of a model of ``compile_model`` with the faults of a hypothesis applied.
 
-    Args:
-        model: The model as ``compile_model`` returns it; it is not changed.
-        anatomy: The robot's parts.
-        hypothesis: Hypothesis in canonical form.
-        seed: Seed of the random parts of the faults.
+    The model is not changed. The seed is that of the random parts of the faults.
     """
     variant = ModelVariant.of(model, anatomy, seed)
     if not hypothesis.faults:

@@ -43,14 +43,10 @@ class HypothesisSpace:
 
     @classmethod
     def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
-        """Returns the search space of the kinds that apply to a robot.
+        """Returns the search space of the kinds that apply to a robot, in their order.
 
-        The kinds that a fault degenerates to at some severities are included: ``jam-angle``
-        implies ``jam``, and ``sensor-gain`` implies ``sensor``.
-
-        Args:
-            kinds: Requested kinds; they come first, in their order.
-            anatomy: The robot's parts.
+        Then come the kinds that a fault degenerates to at some severities: ``jam-angle`` implies
+        ``jam``, and ``sensor-gain`` implies ``sensor``.
 
         Raises:
             InputError: No kind applies to the robot, or a kind is not searchable.
@@ -103,11 +99,7 @@ class HypothesisSpace:
         return (*spaced, *(fault for fault in self.observed if fault.kind in self.kinds))
 
     def decode(self, genome: FloatArray) -> Hypothesis:
-        """Returns the hypothesis that a genome encodes.
-
-        Args:
-            genome: Values in [0, 1), ``(genes * GENE_VALUES,)``.
-        """
+        """Returns the hypothesis of a genome, values in [0, 1), ``(genes * GENE_VALUES,)``."""
         faults = []
         for active, kind_value, part_value, severity_value in genome.reshape(-1, GENE_VALUES):
             if active >= 0.5:
@@ -176,7 +168,7 @@ class HypothesisSpace:
             (*faults[:i], dataclasses.replace(fault, severity=severity), *faults[i + 1 :])
             for i, fault in enumerate(faults)
             if fault.severity not in fault.kind.degenerates_alone_to
-            for severity in fault.kind.degenerate_severities
+            for severity in (*fault.kind.degenerates_to, *fault.kind.degenerates_alone_to)
         ]
         return self._others(hypothesis, [*fewer, *simpler])
 

@@ -16,12 +16,29 @@ ANGLE_LEVELS = 12
 degrees."""
 
 
-class BrokenJoint(FaultKind):
-    """A joint with the bodies beyond it detached."""
+class JointFault(FaultKind):
+    """A fault of a joint."""
 
     def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the joints whose bodies all have names: faults refer to bodies by name."""
-        return tuple(joint.name for joint in anatomy.joints if "" not in joint.bodies)
+        """Returns the names of the joints that can have the fault."""
+        return tuple(joint.name for joint in anatomy.joints if self._fits(joint, anatomy))
+
+    def _fits(self, _joint: Joint, _anatomy: Anatomy) -> bool:
+        return True
+
+
+class MotorFault(JointFault):
+    """A fault of a joint with motors; a motor of several joints belongs to the first joint."""
+
+    def _fits(self, joint: Joint, _anatomy: Anatomy) -> bool:
+        return bool(joint.motors)
+
+
+class BrokenJoint(JointFault):
+    """A joint with the bodies beyond it detached; faults refer to bodies by name."""
+
+    def _fits(self, joint: Joint, _anatomy: Anatomy) -> bool:
+        return "" not in joint.bodies
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Detaches the bodies of the limb and zeroes the readings of its sensors."""
@@ -37,35 +54,16 @@ class BrokenJoint(FaultKind):
         if other.part == fault.part:
             return other.kind != fault.kind
         broken = anatomy.joint(fault.part)
-        if other.kind == WEAK_MOTOR and broken.motors_lost_if_broken.issuperset(
-            anatomy.joint(other.part).motors
-        ):
-            return True
-        return other.part in broken.descendants
+        if other.part in broken.descendants or other.kind != WEAK_MOTOR:
+            return other.part in broken.descendants
+        return broken.motors_lost_if_broken.issuperset(anatomy.joint(other.part).motors)
 
 
-class JointFault(FaultKind):
-    """A fault of any joint."""
+class JammedAtAngle(JointFault):
+    """A joint whose hinges are welded at one angle, rad, other than that of ``JAMMED``."""
 
-    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the names of the joints that can fail."""
-        return tuple(joint.name for joint in anatomy.joints)
-
-
-class MotorFault(FaultKind):
-    """A fault of a joint with motors."""
-
-    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the joints with motors; a motor of several joints belongs to the first joint."""
-        return tuple(joint.name for joint in anatomy.joints if joint.motors)
-
-
-class JammedAtAngle(FaultKind):
-    """A joint whose hinges are welded at one angle, rad."""
-
-    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the joints with a common angle of all hinges other than that of ``JAMMED``."""
-        return tuple(joint.name for joint in anatomy.joints if self.levels_at(anatomy, joint.name))
+    def _fits(self, joint: Joint, anatomy: Anatomy) -> bool:
+        return bool(self.levels_at(anatomy, joint.name))
 
     def bounds_at(self, anatomy: Anatomy, part: str) -> tuple[float, float]:
         """Returns the range that all hinges of a joint have, rad."""
@@ -90,12 +88,8 @@ class JammedAtAngle(FaultKind):
 
         The motors of a welded joint have no effect unless they move another joint too.
         """
-        if other.part != fault.part:
-            return False
-        if other.kind in (DAMPED_JOINT, JOINT_FRICTION):
-            return True
-        if other.kind != WEAK_MOTOR:
-            return False
+        if other.part != fault.part or other.kind != WEAK_MOTOR:
+            return other.part == fault.part and other.kind in (DAMPED_JOINT, JOINT_FRICTION)
         joint = anatomy.joint(fault.part)
         return joint.motors_lost_if_jammed.issuperset(joint.motors)
 
@@ -199,9 +193,8 @@ class EncoderSlip(EncoderOffset):
     that the slip adds, as all of its force.
     """
 
-    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the joints with motors with position feedback."""
-        return tuple(joint.name for joint in anatomy.joints if joint.servos)
+    def _fits(self, joint: Joint, _anatomy: Anatomy) -> bool:
+        return bool(joint.servos)
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Shifts what the encoders of the joint measure, and the feedback of its servos."""
@@ -210,20 +203,15 @@ class EncoderSlip(EncoderOffset):
             variant.shift_feedback(hinge, fault.severity)
 
 
-class LostGrip(FaultKind):
+class LostGrip(JointFault):
     """A foot, what the last joint of a limb moves, whose sliding friction is scaled by a factor.
 
     The friction of the ground, ``friction``, applies to all feet, and the factor to what results.
     """
 
-    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
-        """Returns the last joints of the limbs."""
-        names = {joint.name for joint in anatomy.joints}
-        return tuple(
-            joint.name
-            for joint in anatomy.joints
-            if "" not in joint.bodies and not joint.descendants & names
-        )
+    def _fits(self, joint: Joint, anatomy: Anatomy) -> bool:
+        ends_limb = joint.descendants.isdisjoint(other.name for other in anatomy.joints)
+        return ends_limb and "" not in joint.bodies
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the friction of the bodies of the foot."""

@@ -141,11 +141,6 @@ class FaultKind:
         return type(self).adapt_to_contacts is not FaultKind.adapt_to_contacts
 
     @property
-    def degenerate_severities(self) -> tuple[float, ...]:
-        """Severities at which the fault is equivalent to one of another kind, or to none."""
-        return (*self.degenerates_to, *self.degenerates_alone_to)
-
-    @property
     def degenerate_kinds(self) -> tuple["FaultKind", ...]:
         """Kinds that a fault of this kind degenerates to."""
         kinds = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())

@@ -3,81 +3,50 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
-from selfmodel.faults.joints import (
-    BROKEN,
-    DAMPED_JOINT,
-    ENCODER_OFFSET,
-    ENCODER_SLIP,
-    JAMMED,
-    JAMMED_AT_ANGLE,
-    JOINT_FRICTION,
-    LOST_GRIP,
-    WEAK_MOTOR,
-)
+from selfmodel.faults import joints, sensors, world
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.sensors import (
-    FAILED_SENSOR,
-    SENSOR_BIAS,
-    SENSOR_GAIN,
-    SENSOR_NOISE,
-    SILENT_NEURON,
-)
-from selfmodel.faults.world import (
-    CROSSWIND,
-    FRICTION,
-    GROWN_DELAY,
-    PAYLOAD,
-    ROUGHNESS,
-    SLOPE,
-    WIND,
-)
 from selfmodel.robot.anatomy import Anatomy, Joint
 
 KINDS: Mapping[str, FaultKind] = {
     kind.name: kind
     for kind in (
-        *(BROKEN, JAMMED, FAILED_SENSOR, SILENT_NEURON),
-        *(JAMMED_AT_ANGLE, WEAK_MOTOR, SENSOR_GAIN, SENSOR_BIAS, SENSOR_NOISE),
-        *(FRICTION, SLOPE, ROUGHNESS, WIND, CROSSWIND),
-        *(PAYLOAD, DAMPED_JOINT, JOINT_FRICTION, LOST_GRIP, GROWN_DELAY),
-        *(ENCODER_OFFSET, ENCODER_SLIP),
+        *(joints.BROKEN, joints.JAMMED, sensors.FAILED_SENSOR, sensors.SILENT_NEURON),
+        *(joints.JAMMED_AT_ANGLE, joints.WEAK_MOTOR),
+        *(sensors.SENSOR_GAIN, sensors.SENSOR_BIAS, sensors.SENSOR_NOISE),
+        *(world.FRICTION, world.SLOPE, world.ROUGHNESS, world.WIND, world.CROSSWIND),
+        *(world.PAYLOAD, joints.DAMPED_JOINT, joints.JOINT_FRICTION, joints.LOST_GRIP),
+        *(world.GROWN_DELAY, joints.ENCODER_OFFSET, joints.ENCODER_SLIP),
     )
 }
 """All built-in kinds by name."""
 
-PAPER_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, FAILED_SENSOR)
+PAPER_KINDS: tuple[FaultKind, ...] = (joints.BROKEN, joints.JAMMED, sensors.FAILED_SENSOR)
 """Kinds of the paper's diagnosis, in the order of its genome."""
 
-BODY_KINDS: tuple[FaultKind, ...] = (BROKEN, JAMMED, JAMMED_AT_ANGLE, FAILED_SENSOR, WEAK_MOTOR)
-"""Kinds of faults of the robot itself that are common."""
-
-ENVIRONMENT_KINDS: tuple[FaultKind, ...] = (FRICTION, SLOPE, WIND, PAYLOAD)
-"""Kinds of changes of the robot's environment that are common."""
+_BODY_KINDS = tuple(KINDS[name] for name in ("break", "jam", "jam-angle", "sensor", "motor"))
+_ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload"))
 
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)
 """All built-in kinds that a diagnosis may propose."""
 
 KIND_SETS: Mapping[str, tuple[FaultKind, ...]] = {
     "paper": PAPER_KINDS,
-    "body": BODY_KINDS,
-    "environment": ENVIRONMENT_KINDS,
-    "default": (*BODY_KINDS, *ENVIRONMENT_KINDS),
+    "body": _BODY_KINDS,
+    "environment": _ENVIRONMENT_KINDS,
+    "default": (*_BODY_KINDS, *_ENVIRONMENT_KINDS),
     "all": ALL_KINDS,
 }
-"""Sets of kinds, by the names that ``--kinds`` accepts in place of their kinds."""
+"""Sets of kinds, by the names that ``--kinds`` accepts in place of their kinds. ``body`` and
+``environment`` are the common faults of the robot itself and changes of its environment."""
 
 DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["default"]
 """Kinds that a diagnosis, a recovery or an ablation searches if none are given."""
 
 
 def kind_names(names: str) -> str:
-    """Returns names of kinds with the names of sets replaced by those of their kinds.
+    """Returns names of kinds and sets, as for ``--kinds``, as names of kinds, each once.
 
-    Args:
-        names: Names of kinds and sets, separated by commas, as for ``--kinds``.
-
-    Returns:
-        Names of kinds, each once, separated by commas; unknown names are unchanged.
+    They are separated by commas; unknown names are unchanged.
     """
     single: list[str] = []
     for name in (each.strip() for each in names.split(",")):
@@ -86,11 +55,7 @@ def kind_names(names: str) -> str:
 
 
 def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:
-    """Returns the kinds that notation may name: the built-in ones, and those of a search.
-
-    Args:
-        kinds: Kinds of the search, built-in or third-party; their degenerate kinds are included.
-    """
+    """Returns the built-in kinds, and those of a search with their degenerate kinds."""
     named = [kind for each in kinds for kind in (each, *each.degenerate_kinds)]
     return tuple(dict.fromkeys((*KINDS.values(), *named)))
 
