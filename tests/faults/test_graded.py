@@ -183,8 +183,8 @@ def test_noise_has_its_deviation_and_is_the_same_whatever_else_is_wrong(quadrupe
     noisy = "sensor:front_left_angle=noise0.2"
     texts = ["intact", noisy, f"{noisy}+sensor:back_left_angle=noise0.1", "slope=0.1"]
     runs = [(parse(text, quadruped.anatomy), controller) for text in texts]
-    ran = Simulator(quadruped, 2).run(runs, 1000, ["sensors", "joint_positions"]).trajectory
-    alone = Simulator(quadruped, 1).run(runs[1:2], 1000, ["sensors"]).trajectory
+    ran = Simulator(quadruped, 2).run(runs, 400, ["sensors", "joint_positions"]).trajectory
+    alone = Simulator(quadruped, 1).run(runs[1:2], 400, ["sensors"]).trajectory
     hinge = quadruped.anatomy.hinges.index("front_left_shoulder")
     half = quadruped.anatomy.sensor("front_left_angle").half_range
     noise = ran["sensors"][:, :, 4] - ran["joint_positions"][:, :, hinge] / half

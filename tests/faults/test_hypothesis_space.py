@@ -72,7 +72,7 @@ def test_what_no_genome_can_express_is_refused(text: str):
 
 
 @pytest.mark.parametrize("kinds", [PAPER_KINDS, ALL_KINDS], ids=["paper", "all"])
-@settings(max_examples=15)
+@settings(max_examples=5)
 @given(data=st.data())
 def test_neighbours_are_canonical_and_differ_from_the_hypothesis_by_one_fault(
     kinds: tuple[FaultKind, ...], data: st.DataObject

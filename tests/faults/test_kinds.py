@@ -43,7 +43,13 @@ def example(name: str) -> ModuleType:
 GRAVITY = example("gravity").GRAVITY
 
 
-@pytest.mark.parametrize("kind", [*KINDS.values(), GRAVITY], ids=lambda kind: kind.name)
+EVERY_KIND = [
+    pytest.param(kind, marks=[] if kind.searchable else pytest.mark.search, id=kind.name)
+    for kind in (*KINDS.values(), GRAVITY)
+]
+
+
+@pytest.mark.parametrize("kind", EVERY_KIND)
 def test_a_kind_keeps_its_contract(kind: FaultKind):
     # Its joints have several hinges.
     check_fault_kind(kind, Robot("biped", MJCF, 0.01))
@@ -55,10 +61,10 @@ def test_the_registry_knows_each_kind_by_its_name():
     assert set(KINDS.values()) - set(ALL_KINDS) == {KINDS["neuron"]}
 
 
-def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
+def test_what_a_joint_absorbs_would_not_move_the_robot(quadruped: Robot):
     """Checks that the pair of faults moves like its canonical form."""
-    anatomy = robot.anatomy
-    driver = Playback(anatomy.motors, random_motion(robot, 60))
+    anatomy = quadruped.anatomy
+    driver = Playback(anatomy.motors, random_motion(quadruped, 60))
     first = anatomy.joints[0]
     faults = [
         fault
@@ -77,7 +83,7 @@ def test_what_a_joint_absorbs_would_not_move_the_robot(robot: Robot):
     runs = [
         (Hypothesis(tuple(sorted(said))), driver) for pair in absorbed for said in (pair, pair[:1])
     ]
-    path = Simulator(robot, 2).run(runs, 60, ["base_position"]).trajectory["base_position"]
+    path = Simulator(quadruped, 2).run(runs, 60, ["base_position"]).trajectory["base_position"]
 
     for pair, said, meant in zip(absorbed, path[::2], path[1::2], strict=True):
         np.testing.assert_allclose(said, meant, atol=1e-9, rtol=0, err_msg=str(pair))

@@ -26,7 +26,7 @@ def reference(model: mujoco.MjModel) -> np.ndarray:
     return data.efc_KBIP[0, :2].copy()
 
 
-@pytest.mark.parametrize("timestep", [0.002, 0.005, 0.01])
+@pytest.mark.parametrize("timestep", [0.002, 0.01])
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 1", "0.005 1", "0.001 0.5", "0.04 0.3"])
 @pytest.mark.parametrize("factors", [(1, 0.5), (4, 1), (0.25, 0.5), (1, 2), (2, 0.25), (4, 2)])
 def test_a_time_constant_that_mujoco_limits_has_the_scaled_stiffness_and_damping(

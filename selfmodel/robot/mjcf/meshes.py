@@ -44,7 +44,6 @@ def drop_textures(work: Work) -> None:
                     texture.set(side, str(_MAX_PATTERN_PIXELS))
     if _asset_bytes(work) > MAX_ASSET_BYTES:
         _drop_image_textures(work)
-    _drop_unnamed_files(work)
 
 
 def _drop_image_textures(work: Work) -> None:
@@ -64,19 +63,10 @@ def _drop_image_textures(work: Work) -> None:
 
 
 def _asset_bytes(work: Work) -> int:
-    return sum(map(len, work.assets.values()))
-
-
-def _drop_unnamed_files(work: Work) -> None:
-    """Removes the files that no element names."""
-    named = {
-        value
-        for element in work.root.iter()
-        for attribute, value in element.attrib.items()
-        if attribute.startswith("file")
-    }
-    for name in work.assets.keys() - named:
-        work.assets.pop(name)
+    """Returns the size of the files that the elements name."""
+    attributes = (item for element in work.root.iter() for item in element.attrib.items())
+    named = {name for attribute, name in attributes if attribute.startswith("file")}
+    return sum(len(work.assets[name]) for name in named if name)
 
 
 def reduce_meshes(work: Work) -> None:
@@ -104,7 +94,6 @@ def reduce_meshes(work: Work) -> None:
             f"{len(drawn)} visual meshes are drawn as convex hulls of about {DRAWN_POINTS} points, "
             f"because their files are too large for a log"
         )
-    _drop_unnamed_files(work)
     if _asset_bytes(work) > MAX_ASSET_BYTES:
         solid = [m for m in colliding if model.mesh_graphadr[m] >= 0 and meshes[m].get("file")]
         for mesh in solid:
@@ -113,11 +102,10 @@ def reduce_meshes(work: Work) -> None:
             f"{len(solid)} meshes with contacts are replaced by their convex hulls, with which "
             f"MuJoCo computes contacts, because their files are too large for a log"
         )
-    _drop_unnamed_files(work)
-    if _asset_bytes(work) > MAX_ASSET_BYTES:
+    if (size := _asset_bytes(work)) > MAX_ASSET_BYTES:
         raise InputError(
             f"expected files of at most {MAX_ASSET_BYTES} bytes, because every trial's log "
-            f"contains them, got {_asset_bytes(work)} bytes: use smaller height fields"
+            f"contains them, got {size} bytes: use smaller height fields"
         )
 
 

@@ -1,6 +1,7 @@
 """Pose of the robot of an MJCF: its base, its keyframe as the reference pose, the ground below."""
 
 import math
+from itertools import product
 from xml.etree import ElementTree as ET  # of checked texts
 
 import mujoco
@@ -125,14 +126,12 @@ def bake_keyframe(work: Work) -> None:
 def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
     """Returns the number of the keyframe, or None for the reference pose."""
     names = [model.key(k).name for k in range(model.nkey)]
-    if wanted == NO_KEYFRAME:
+    if wanted == NO_KEYFRAME or not (wanted or names):
         return None
-    if not wanted:
-        usual = next((names.index(name) for name in STANDING_KEYFRAMES if name in names), 0)
-        return usual if names else None
-    if wanted not in names:
+    chosen = wanted or next(filter(names.__contains__, STANDING_KEYFRAMES), names[0])
+    if chosen not in names:
         raise unknown_name("keyframe", wanted, [*filter(None, names), NO_KEYFRAME])
-    return names.index(wanted)
+    return names.index(chosen)
 
 
 def _place_at(work: Work, model: mujoco.MjModel, qpos: np.ndarray) -> None:
@@ -259,11 +258,11 @@ def _keep_neighbours_apart(work: Work, model: mujoco.MjModel, root: int) -> None
     neighbours = (weld != base) & (weld[model.body_parentid[weld]] == base)
     shaped = model.body_geomnum > 0
     contact = work.section("contact")
-    for fixed in np.flatnonzero(shaped & (weld == base)):
-        for other in np.flatnonzero(shaped & neighbours):
-            pair = {"body1": model.body(int(fixed)).name, "body2": model.body(int(other)).name}
-            if not any(pair.items() <= known.attrib.items() for known in contact):
-                ET.SubElement(contact, "exclude", pair)
+    pairs = product(np.flatnonzero(shaped & (weld == base)), np.flatnonzero(shaped & neighbours))
+    for fixed, other in pairs:
+        pair = {"body1": model.body(int(fixed)).name, "body2": model.body(int(other)).name}
+        if not any(pair.items() <= known.attrib.items() for known in contact):
+            ET.SubElement(contact, "exclude", pair)
 
 
 def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:

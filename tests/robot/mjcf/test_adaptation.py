@@ -168,7 +168,6 @@ def test_the_settings_choose_the_sensors(tmp_path: Path):
         ("control_timestep = -1", "from above 0 to 10 s, got -1"),
         ("control_timestep = true", "got True"),
         ("touch = 'left'", "needs a list of names"),
-        ("neurons = 5", "leave neurons out, and give --neurons N to the command"),
         ("ctrlrange = [1, -1]", "lower end first"),
         ("keyframe = 3", "name of a keyframe"),
         ("forward", "in TOML"),
