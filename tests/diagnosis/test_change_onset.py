@@ -25,8 +25,8 @@ from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
 
-STEPS = 300
-SMALL = dataclasses.replace(Settings().scaled(4), generations=1)
+STEPS = 400
+SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
 JAM = "jam:front_left_knee"
 pytestmark = pytest.mark.search
 

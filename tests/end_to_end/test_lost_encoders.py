@@ -19,11 +19,13 @@ JOINTS: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "joint_effo
 SETTINGS = selfmodel.Settings(generations=2).scaled(8)
 
 
-def lost(robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice) -> Trial:
+def lost(
+    robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice, length: int = 500
+) -> Trial:
     """A trial of a robot in which the encoders of some hinges measure nothing at some steps."""
     physical = selfmodel.simulated_robot(robot, truth, gap=0.05, seed=3)
     gait = random_controllers(robot, 1, seed=5)[0]
-    plan = TrialPlan("after", "after", gait, 500, seed=0)
+    plan = TrialPlan("after", "after", gait, length, seed=0)
     trial = in_memory(robot)(physical, plan)
     signals = {signal: trial.trajectory[signal].copy() for signal in SIGNALS}
     for signal in JOINTS:
@@ -73,7 +75,7 @@ def test_a_fault_is_found_without_the_encoders_of_a_limb(
 def test_every_comparator_of_joints_judges_a_trial_without_an_encoder(
     comparator: str, quadruped: Robot
 ):
-    trial = lost(quadruped, "break:front_left_knee", ("front_left_knee",), slice(None))
+    trial = lost(quadruped, "break:front_left_knee", ("front_left_knee",), slice(None), 120)
     found = diagnosis(trial, quadruped, comparator)
     assert np.isfinite(found.ranked[0].distance)
     assert found.ranked[0].distance < found.intact_distance

@@ -114,9 +114,11 @@ def calibration(quadruped: Robot, healthy: list[Trial]) -> Calibration:
     return calibrate(quadruped, healthy[:1], 1)
 
 
-def posterior(calibration: Calibration, healthy: list[Trial], seed: int = 0) -> Posterior:
-    """The posterior of a small sample: 33 models."""
-    settings = Settings(generations=7).scaled(100)
+def posterior(
+    calibration: Calibration, healthy: list[Trial], seed: int = 0, generations: int = 2
+) -> Posterior:
+    """The posterior of a small sample: 12 models, or 33 of 7 generations."""
+    settings = Settings(generations=generations).scaled(100)
     simulator = Simulator(calibration.robot, 1)
     return Posterior(simulator, healthy, calibration, settings, np.random.default_rng(seed))
 
@@ -179,7 +181,7 @@ def test_a_base_that_was_missed_for_some_steps_is_interpolated(
     walked = healthy[0]
     gappy = lacking(walked, ("base_position", "base_orientation"), slice(50, 55))
     never = lacking(walked, ("base_position", "base_orientation"))
-    own = posterior(calibration, [walked])
+    own = posterior(calibration, [walked], generations=7)
     whole = own.after([walked], INTACT).models.weights
     some = own.after([dataclasses.replace(gappy, path="gappy")], INTACT).models.weights
     none = own.after([dataclasses.replace(never, path="never")], INTACT).models.weights

@@ -77,7 +77,7 @@ def test_an_arm_learns_to_follow_a_table(folder: Path):
     found = run(
         folder,
         *("recover", "arm.xml", "--damage", "jam:joint3", "--score", "tracking"),
-        *("--reference", "wave.npz", "--controller", "cpg", "--steps", "60", "--trials", "1"),
+        *("--reference", "wave.npz", "--controller", "cpg", "--steps", "100", "--trials", "1"),
         *(*SEARCH, "--out", "wave"),
     )
     assert found["correct"]
@@ -103,7 +103,7 @@ def test_suite_run_recovers_arms_and_records_that_they_stayed_upright(folder: Pa
     found = run(
         folder,
         *("suite", "run", "--domains", "arm.xml", "--cases", "6", "--score", "tracking"),
-        *("--controller", "cpg", "--steps", "40", "--trials", "1", *SEARCH, "--workers", "1"),
+        *("--controller", "cpg", "--steps", "100", "--trials", "1", *SEARCH, "--workers", "1"),
         *("--out", "study"),
     )
     (row,) = found["rows"]
