@@ -41,12 +41,11 @@ class Calibration:
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
-        joints: JSON values of the fit of the joints of a robot with a fixed base: its set of
-            parameters, delay and errors, the hinge with the largest error (rad) after the fit, and
-            the ``parameters``: of the gain of each motor and the damping, dry friction and armature
-            of each hinge, in its unit (N m s/rad, N m, kg m^2), the value in the model, the fitted
-            value, the standard deviation of its logarithm, and whether the trials determine it.
-            None for other robots.
+        joints: JSON values of the fit of a robot with a fixed base: its set, delay and errors, the
+            hinge with the largest error (rad), and ``parameters``: of the gain of each motor and
+            the damping, dry friction and armature of each hinge (N m s/rad, N m, kg m^2), the value
+            in the model, the fitted value, the standard deviation of its logarithm, and whether the
+            trials determine it. None for other robots.
         chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
             ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
             or ``joints``.
@@ -67,19 +66,17 @@ class Calibration:
     suspicion: Suspicion | None = None
 
     def __repr__(self) -> str:
-        lines = [
-            f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
-            f"  error {self.error_before:.3g} before, {self.error:.3g} after",
-        ]
-        lines += [f"  {line}" for line in self.contacts]
-        lines += [
-            f"  {row['factor']:6.3f} (log deviation {row['deviation']:.3f})  {row['name']}"
+        factors = [
+            f"{row['factor']:6.3f} (log deviation {row['deviation']:.3f})  {row['name']}"
             + ("" if row["determined"] else f", {UNDETERMINED}")
             for row in self.rows()
         ]
-        if self.suspicion is not None:
-            lines.append(f"  {self.suspicion}")
-        return "\n".join(lines) + ">"
+        lines = (
+            f"<Calibration of {self.robot.name}: control delay {self.parameters.delay}",
+            f"error {self.error_before:.3g} before, {self.error:.3g} after",
+            *(*self.contacts, *factors, *([self.suspicion] if self.suspicion else ())),
+        )
+        return "\n  ".join(map(str, lines)) + ">"
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
@@ -133,9 +130,8 @@ class Calibration:
 def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
-    The result does not depend on the number of threads, of MuJoCo or of the linear algebra, which
-    rounds sums over many errors differently with several threads. A set of parameters is kept only
-    if it predicts segments that were left out of the fit significantly better. A model that none
+    The result does not depend on the number of threads. A set of parameters is kept only if it
+    predicts segments that were left out of the fit significantly better. A model that none
     improves, or that predicts the trials exactly, is returned unchanged, to the bit.
 
     If the base's position and linear velocity were rarely observed together in a trial, the trial
@@ -145,19 +141,13 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
 
     With a fixed base, gain, damping, dry friction and armature are fitted to joint positions.
 
-    Args:
-        robot: The robot as its model describes it.
-        trials: At least one trial with commands and state; the base's position and linear velocity
-            may be NaN.
-        threads: Threads of MuJoCo's steps.
-
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
             diverged.
     """
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
-    with threadpool_limits(1, "blas"):
+    with threadpool_limits(1, "blas"):  # several round sums differently
         segments = _segment_errors(robot, trials, threads)
         before = segments.of([nominal(robot)])[:, 0]
         prior = model_factors.prior_deviations(robot)

@@ -56,10 +56,8 @@ class DomainDistribution:
 
     Attributes:
         models: Distribution of the parameters of the model.
-        reading_noise: Standard deviation of the noise of each reading, ``(sensors,)``; 0 for a
-            touch sensor.
-        wrong_touches: Probability that a reading of a touch sensor is wrong, ``(sensors,)``; 0 for
-            other sensors.
+        reading_noise: Standard deviation of the noise of each reading, ``(sensors,)``.
+        wrong_touches: Probability that a touch reading is wrong, ``(sensors,)``; 0 for others.
         start: Spread of the initial poses.
         delays: Control delays in addition to the self-model's, control steps, equally probable.
     """
@@ -183,9 +181,9 @@ def _is_welded(model: mujoco.MjModel, hinge: str) -> bool:
 
 
 def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Returns the depth of the robot's deepest contact with the world, m.
+    """Returns the depth of the robot's deepest contact with the world, m; 0 without a contact.
 
-    The depth is negative for a contact within its margin, and 0 without a contact.
+    It is negative for a contact within its margin.
     """
     mujoco.mj_fwdPosition(model, data)
     root = model.body(robot.root).id

@@ -29,29 +29,24 @@ NOMINAL, DELAY, CONTACTS = "nominal", "delay", "contacts"
 
 CANDIDATE_STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
 CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
-"""Factors of the stiffness and the damping of contacts in the exhaustive search. Slopes are
-dominated by noise, because both change the times of contacts."""
+"""Factors of the stiffness and the damping of contacts in the exhaustive search."""
 
 FOLDS = 4
 """Consecutive parts of each trial that are left out in turn."""
 
-MIN_Z = 1.645
+MIN_Z, CONTACTS_MIN_Z = 1.645, 3.0
 """Standard errors by which a larger set must predict segments better that it was not fitted to: a
-one-sided level of 5 %."""
-
-CONTACTS_MIN_Z = 3.0
-"""As ``MIN_Z``, for the contacts: the best of 25 candidates gains by chance, too.
-Times the square root of the overlap: segments of a short trial share steps."""
+one-sided level of 5 %. The best of 25 contacts gains by chance, too; theirs is times the square
+root of the overlap, because segments of a short trial share steps."""
 
 INDEPENDENT_ERRORS = 100
 """Independent errors of one unit that all errors together count as in the posterior deviations:
-fewer than in the fit, because no model has a factor for each limb and contact. With 100, the
-intervals of the robots with seeds 0 to 63 of ``benchmarks.calibration.robots`` contained the truth
-at about their rates; with 400, those of determined factors contained it too rarely."""
+fewer than in the fit, because no model has a factor for each limb and contact. With 100, intervals
+contain the truth at about their rates (``benchmarks.calibration``); with 400, too rarely."""
 
 UNDETERMINED_SHARE = 0.7
-"""Deviation of a parameter, relative to that of its prior, from which on the trials count as not
-having determined it: they halve the variance of a parameter that they determine."""
+"""Deviation of a parameter, relative to that of its prior, from which on it is not determined: the
+trials halve the variance of a parameter that they determine."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +89,7 @@ class Fit:
 
     Attributes:
         name: Name of the set.
-        parameters: The parameters.
+        parameters: The fitted parameters.
         deviations: Posterior standard deviation of the logarithm of each factor, by the name of
             its quantity in ``Parameters``; that of the prior for a factor that was not fitted.
         errors: Errors of its predictions, ``(errors,)``.
@@ -120,11 +115,9 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
     robot, best, chosen = segments.robot, first.parameters, [first]
 
     def choose(fit: Fit, min_z: float) -> bool:
-        better = is_better(
-            segments.losses(fit.held_out), segments.losses(chosen[-1].held_out), min_z
-        )
-        if better:
-            chosen.append(fit)
+        losses, others = (segments.losses(own.held_out) for own in (fit, chosen[-1]))
+        better = is_better(losses, others, min_z)
+        chosen.extend([fit] * better)
         return better
 
     if not robot.has_fixed_base:
@@ -178,13 +171,7 @@ def _best_candidate(
 
 @dataclass(frozen=True, eq=False)
 class _Fitter:
-    """Least-squares fits of one set of factors.
-
-    Attributes:
-        segments: Segments of the healthy trials.
-        basis: Coordinates of the set.
-        method: Numbers of the fit.
-    """
+    """Least-squares fits of one set of factors, given by its coordinates."""
 
     segments: SegmentErrors
     basis: Basis
@@ -199,14 +186,11 @@ class _Fitter:
     def solved(
         self, start: Parameters, iterations: int | None = None
     ) -> tuple[Parameters, FloatArray]:
-        """Returns the fit of the factors, from those of the start, and its coordinates.
-
-        Delay and contacts are the start's.
-        """
+        """Returns the fit of the start's factors, with its delay and contacts; its coordinates."""
         basis, width, steps = self.basis, self._widths, np.diag(self._widths)
 
         def residual(logarithms: FloatArray) -> FloatArray:
-            """Returns the residuals of the data, then those of the prior."""
+            # Those of the data, then those of the prior.
             rows = np.reshape(logarithms, (len(logarithms), -1))
             errors = self.segments.of([basis.applied(start, row) for row in rows.T])
             weight = np.sqrt(len(errors)) * self.method.prior_weight / basis.prior
@@ -251,11 +235,11 @@ class _Fitter:
                 solved[delay] = _cost(self.segments.of([point])), point
             return solved[delay][0]
 
-        best = min(range(0, MAX_CONTROL_DELAY * parts + 1, parts), key=cost)
-        step = parts // 2
+        delays, step = range(MAX_CONTROL_DELAY * parts + 1), parts // 2
+        best = min(delays[::parts], key=cost)
         while step:
-            near = (best + move for move in (-step, 0, step))
-            best = min((own for own in near if 0 <= own <= MAX_CONTROL_DELAY * parts), key=cost)
+            near = (best - step, best, best + step)
+            best = min((delay for delay in near if delay in delays), key=cost)
             step //= 2
         return solved[best][1]
 
@@ -265,15 +249,10 @@ class _Fitter:
         The delay moves by a physics step at a time, as long as the fit improves.
         """
         iterations, parts = self.method.delay_iterations, self._delay_parts
-        if not iterations:
-            return start, x
-        best, least = (start, x), _cost(self.segments.of([start]))
-        for direction in (-1, 1):
-            while (
-                0
-                <= (delay := round(best[0].delay * parts) + direction)
-                <= (MAX_CONTROL_DELAY * parts)
-            ):
+        best, delays = (start, x), range(MAX_CONTROL_DELAY * parts + 1)
+        least = _cost(self.segments.of([start])) if iterations else 0.0
+        for direction in (-1, 1) if iterations else ():
+            while (delay := round(best[0].delay * parts) + direction) in delays:
                 moved = self.solved(replace(best[0], delay=as_delay(delay, parts)), iterations)
                 cost = _cost(self.segments.of(moved[:1]))
                 if not cost < least:
@@ -286,13 +265,8 @@ class _Fitter:
 
         Its residuals are linearised around it, with independent segments: long simulations are
         chaotic, so that their derivatives would be meaningless. The fit without a part differs by
-        one Gauss-Newton step, less that of the whole fit, which the solver left.
-
-        Args:
-            name: Name of the set.
-            point: The fitted parameters.
-            x: Their coordinates, ``(coordinates,)``.
-            errors: Errors of their predictions, ``(errors,)``.
+        one Gauss-Newton step, less that of the whole fit, which the solver left. ``x`` are the
+        coordinates of the fitted parameters, ``point``.
         """
         segments, basis, width = self.segments, self.basis, self._widths
         moved = np.concatenate([x + np.diag(width), x - np.diag(width)])
@@ -308,26 +282,18 @@ class _Fitter:
             weight = 1 / (max(len(left), 1) * self.method.prior_weight**2)
             prior = basis.prior**-2
             gradient = slopes.T @ left * weight + prior * x
-            return np.asarray(
-                -np.linalg.solve(slopes.T @ slopes * weight + np.diag(prior), gradient)
-            )
+            information = slopes.T @ slopes * weight + np.diag(prior)
+            return np.asarray(-np.linalg.solve(information, gradient))
 
         parts = segments.folds(FOLDS)[segments.segment_of_error]
         whole = step(np.ones(len(parts), np.bool_))
-        without = [
-            np.clip(x + (step(parts != part) - whole), -basis.bounds, basis.bounds)
-            for part in range(FOLDS)
-        ]
-        every = segments.of([basis.applied(point, own) for own in without])
-        deviations = self._deviations(residuals, ahead, behind)
-        return Fit(
-            name,
-            point,
-            prior_deviations(segments.robot) | basis.by_quantity(deviations),
-            errors,
-            every[np.arange(len(parts)), parts],
-            is_fitted=True,
-        )
+        without = [x + (step(parts != part) - whole) for part in range(FOLDS)]
+        within = np.clip(without, -basis.bounds, basis.bounds)
+        every = segments.of([basis.applied(point, own) for own in within])
+        held_out = every[np.arange(len(parts)), parts]
+        fitted = basis.by_quantity(self._deviations(residuals, ahead, behind))
+        deviations = prior_deviations(segments.robot) | fitted
+        return Fit(name, point, deviations, errors, held_out, is_fitted=True)
 
     def _deviations(
         self, residuals: FloatArray, ahead: FloatArray, behind: FloatArray
@@ -361,12 +327,8 @@ def consistent_information(ahead: FloatArray, behind: FloatArray) -> FloatArray:
     A small change of a parameter changes the times of contacts, and with them the residuals at
     random. The square of one finite difference includes the square of this noise, which is no
     information: a parameter without influence would appear to be known. The noise of the forward
-    and of the backward difference is independent, so their product does not include it. Negative
-    eigenvalues are set to 0.
-
-    Args:
-        ahead: Forward differences of the residuals, ``(residuals, parameters)``.
-        behind: Backward differences.
+    and of the backward difference, ``(residuals, parameters)``, is independent, so their product
+    does not include it. Negative eigenvalues are set to 0.
     """
     product = ahead.T @ behind
     values, vectors = np.linalg.eigh((product + product.T) / 2)

@@ -27,10 +27,9 @@ JOINT_FIELDS = {
     "dry_friction": ("dof_frictionloss", 1.0),
     "armature": ("dof_armature", 0.1),
 }
-"""Quantities of each joint: viscous damping, N m s/rad; dry friction, N m; reflected rotor inertia,
-kg m^2. Each has its field of the model, and the unit of a value that is 0 in the model, relative to
-the joint's inertia: the damping that stops the joint within about 1 s, the friction that slows it
-by 1 rad/s^2, a tenth of its inertia."""
+"""Quantities of each joint: viscous damping, N m s/rad; dry friction, N m; armature, kg m^2. Each
+has its field of the model, and the unit of a value that is 0 in the model, relative to the joint's
+inertia: the damping that stops it within about 1 s, the friction that slows it by 1 rad/s^2."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ class Parameters:
 
 
 def factor_names(robot: Robot) -> tuple[str, ...]:
-    """Returns the names of the scaled quantities, in the order of ``Parameters.factors``."""
+    """Returns the names of ``Parameters.factors``."""
     shared = ("mass of the root", "mass of the limbs", "friction", "damping")
     return (*shared, *(f"motor {motor}" for motor in robot.anatomy.motors))
 
@@ -146,10 +145,9 @@ def joint_values(robot: Robot, parameters: Parameters, quantity: str) -> FloatAr
 
 
 def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
-    """Returns a robot whose MJCF has scaled parameters and their control delay.
+    """Returns a robot whose MJCF has scaled parameters and their control delay, to six digits.
 
-    MuJoCo writes numbers of six digits into an MJCF, so the model of the robot equals that of
-    ``model_with_parameters`` to one part in a million. Other contacts are marked as fitted.
+    Contacts other than the robot's own are marked as fitted.
     """
     fitted = with_model(robot, model_with_parameters(robot, parameters), parameters.delay)
     if robot.has_fitted_contacts or not parameters.has_other_contacts:
@@ -160,11 +158,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
 
 
 def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
-    """Returns a robot whose MJCF has the parameters of an edited copy of its compiled model.
-
-    They are masses, friction, contacts, motor gains, and the damping, dry friction and armature of
-    joints; and the control delay, in control steps.
-    """
+    """Returns a robot whose MJCF has the parameters of an edited model, and a control delay."""
     spec = robot.specification()
     spec.compile()  # assigns the ids of the parts
     compiler = spec.compiler
@@ -205,9 +199,11 @@ def kinds_of_joints(robot: Robot) -> IndexArray:
     model, dofs = robot.model, _dofs(robot)
     bodies = model.dof_bodyid[dofs]
     numbers = (model.body_mass[bodies], model.body_subtreemass[bodies], model.dof_M0[dofs])
-    keys = [tuple(f"{number:.3g}" for number in row) for row in zip(*numbers, strict=True)]
-    first = list(dict.fromkeys(keys))
-    return np.array([first.index(key) for key in keys], dtype=np.intp)
+    keys = [
+        f"{mass:.3g} {carried:.3g} {inertia:.3g}"
+        for mass, carried, inertia in zip(*numbers, strict=True)
+    ]
+    return np.array([keys.index(key) for key in keys], dtype=np.intp)
 
 
 def joint_of_motor(robot: Robot) -> IndexArray:
@@ -283,12 +279,9 @@ def exact(robot: Robot) -> LogNormal:
     return LogNormal(np.zeros(4 + robot.model.nu), np.zeros(robot.model.nbody))
 
 
-FACTORS = "factors"
-"""Name of the set of factors of a robot with a floating base."""
-
-JOINT_SETS = ("shared", "kinds", "joints")
-"""Names of the nested sets of factors of a robot with a fixed base: one per quantity, one per
-quantity and kind of joint, one per quantity and joint."""
+FACTORS, JOINT_SETS = "factors", ("shared", "kinds", "joints")
+"""Names of the set of factors of a robot with a floating base; and of the nested sets of one with a
+fixed base: one factor per quantity, per quantity and kind of joint, per quantity and joint."""
 
 PRIOR_DEVIATIONS = {
     "root_mass": 0.15,
@@ -297,8 +290,8 @@ PRIOR_DEVIATIONS = {
     "damping": 0.3,
     "motor_gains": 0.15,
 }
-"""Standard deviation of the prior on the logarithm of a factor. That of friction and of damping is
-larger: models often contain guesses of them."""
+"""Standard deviation of the prior on the logarithm of a factor. Friction and damping are guesses in
+many models."""
 
 JOINT_PRIOR_DEVIATIONS = {
     "motor_gains": 0.3,
@@ -306,8 +299,7 @@ JOINT_PRIOR_DEVIATIONS = {
     "dry_friction": 1.0,
     "armature": 1.0,
 }
-"""As ``PRIOR_DEVIATIONS``, of a robot with a fixed base. Data sheets state gains; models often
-contain guesses of friction and armature. The gains include the unknown masses."""
+"""As ``PRIOR_DEVIATIONS``, of a robot with a fixed base. The gains include the unknown masses."""
 
 MAX_LOG_FACTOR, MAX_JOINT_LOG_FACTOR = 1.2, 3.0
 """Bound on the absolute logarithm of a factor, 0.3 to 3.3; and of damping, dry friction and
@@ -327,8 +319,8 @@ class Basis:
 
     Attributes:
         groups: For each quantity the coordinate of each of its factors.
-        prior: Standard deviation of the prior of each coordinate, ``(coordinates,)``.
-        bounds: Bound on the absolute value of each coordinate, ``(coordinates,)``.
+        prior: Standard deviation of the prior of each coordinate.
+        bounds: Bound on the absolute value of each coordinate.
     """
 
     groups: dict[str, IndexArray]
@@ -342,7 +334,7 @@ class Basis:
     def applied(self, start: Parameters, logarithms: FloatArray) -> Parameters:
         """Returns parameters with the factors of some logarithms; all else is the start's."""
         factors: dict[str, Any] = {
-            quantity: tuple(values.tolist()) if quantity not in SHARED else float(values[0])
+            quantity: float(values[0]) if quantity in SHARED else tuple(values.tolist())
             for quantity, values in self.by_quantity(np.exp(logarithms)).items()
         }
         return dataclasses.replace(start, **factors)

@@ -28,13 +28,9 @@ from selfmodel.trials.trajectory import Trajectory
 
 @dataclass
 class SimulationStats:
-    """Cumulative statistics of a simulator.
+    """Cumulative numbers of simulations, of control steps, and of simulations that diverged.
 
-    Attributes:
-        runs: Number of simulations.
-        steps: Number of control steps, over all simulations.
-        diverged: Number of simulations that diverged or had a MuJoCo warning.
-        physics_seconds: Wall time of MuJoCo's steps, s.
+    ``physics_seconds`` is the wall time of MuJoCo's steps, s.
     """
 
     runs: int = 0
@@ -86,12 +82,7 @@ class RobotBatch:
     A simulation with a MuJoCo error is stepped no longer. MuJoCo resets a simulation with a
     warning, which continues to be stepped: its values are invalid, but the simulations of a batch
     are independent. Both are recorded as diverged, so the users of a batch do not count MuJoCo's
-    warnings.
-
-    Args:
-        model: Model of the layout of all variants.
-        variants: The robot of each simulation.
-        threads: Threads of the physics.
+    warnings. The model is that of the layout of all variants.
 
     Attributes:
         bind: Returns the array of a field of MjData, ``(simulations, width)``, which changes with
@@ -132,7 +123,7 @@ class RobotBatch:
             self._batch.step(self._ids, nstep=substeps)
 
     def rollout(self, commands: FloatArray, fields: Sequence[str]) -> dict[str, FloatArray]:
-        """Advances the running simulations, ``(simulations, physics steps, motors)``.
+        """Advances the running simulations by commands, ``(simulations, physics steps, motors)``.
 
         Returns:
             Values of bound fields after each physics step, ``(running, physics steps, width)``.
@@ -160,11 +151,7 @@ class RobotBatch:
 def live_signals(
     robot: Robot, bind: Bind, variants: Sequence[ModelVariant], record: Sequence[Signal]
 ) -> dict[Signal, Reader]:
-    """Returns functions that read the current values of recorded signals from fields of a batch.
-
-    The readings and the commands of the controllers are not part of MuJoCo's state, and are
-    omitted.
-    """
+    """Returns functions that read recorded signals of the state from fields of a batch."""
     state = observed_fields(robot, variants)
     return {
         signal: state[signal](bind) for signal in record if signal not in ("sensors", "commands")
@@ -179,7 +166,7 @@ class Rollout:
         variants: The robot of each rollout, with its faults.
         drivers: Source of the commands of each rollout.
         record: Signals that ``live`` reads.
-        threads: Threads of the physics.
+        threads: Threads of MuJoCo's steps.
         stats: Statistics that are updated.
         start: Initial generalised positions, ``(n, nq)``; None for the reference pose.
         disturb: Changes the readings of each step before the controllers receive them,
@@ -270,12 +257,9 @@ MAX_BATCH = 512 * 2**20
 _FREE_SHARE = 0.25
 """Share of the available memory that a batch may take: other processes may run studies beside."""
 
-_NUMBER_BYTES = 8
-_BODY_NUMBERS = 16
-"""Numbers of the pose and the velocity of a body that a batch reads."""
-
-_COPIES = 3
-"""Arrays of a recorded signal at one time: during the run, its result, and a comparison."""
+_NUMBER_BYTES, _BODY_NUMBERS, _COPIES = 8, 16, 3
+"""Bytes of a number; numbers of the pose and the velocity of a body that a batch reads; arrays of a
+recorded signal at one time: during the run, its result, and a comparison."""
 
 
 def batch_bytes() -> int:

@@ -35,12 +35,9 @@ MAX_SEGMENTS = 40
 HORIZON = 10
 """Length of a segment, control steps."""
 
-MIN_BASE_SHARE = 0.25
-"""Smallest share of usable segments with an observed base at which the base is used."""
-
-MIN_COMPLETE_SHARE = 0.25
-"""Smallest share of the known steps at which every hinge is known, for other steps to be left out.
-"""
+MIN_BASE_SHARE, MIN_COMPLETE_SHARE = 0.25, 0.25
+"""Smallest share of usable segments with an observed base at which the base is used; and of known
+steps with all hinges at which others are left out."""
 
 SEGMENT_SECONDS = 1.0
 """Length of a segment of a robot with a fixed base, s, in a trial that is long enough."""
@@ -50,8 +47,8 @@ MIN_SEGMENTS, MIN_HORIZON = 12, 5
 smallest length, control steps."""
 
 MAX_ERROR = 1e6
-"""Bound on the absolute error of a prediction, in ``CALIBRATION_ERROR_SCALES``: the error of a
-simulation that is no longer finite. The solver does not end on numbers that are not finite."""
+"""Bound on the absolute error of a prediction, in its scale: that of a simulation that is no longer
+finite. The solver does not end on numbers that are not finite."""
 
 POSITIONS: Signal = "joint_positions"
 
@@ -64,9 +61,8 @@ class ObservedSegments:
         segments: Initial states and commands.
         observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal
             that is compared.
-        valid: Mask of the steps whose prediction has an error, ``(segments, horizon)``: the state
-            after the step is known, and so are the commands that led there. Single hinges may be
-            unknown; see ``compared``.
+        valid: Mask of the steps after which the state is known, but for single hinges, and so are
+            the commands that led there, ``(segments, horizon)``.
     """
 
     segments: Segments
@@ -123,10 +119,9 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
 
 
 def _spread(trajectory: Trajectory) -> ObservedSegments | None:
-    """Returns segments of the whole state; None if there are too few.
+    """Returns segments of the whole state, spread over the trial; None if there are too few.
 
-    They are independent and spread over the trial. With unknown hinges, which continue from the
-    segment before, they follow each other.
+    With unknown hinges, which continue from the segment before, they follow each other.
     """
     last = trajectory.steps - 1 - HORIZON
     if last < LEAD:
@@ -151,8 +146,7 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     """Returns consecutive segments of the onboard state; None if too few steps are valid.
 
     Every segment with a known initial state and known commands is simulated, because later segments
-    continue from its end. A step is valid if its state was observed and no command before it, in
-    the segment or in its lead, was held for other than a control time step.
+    continue from its end.
     """
     if trajectory.steps <= LEAD + HORIZON:
         return None
@@ -258,14 +252,7 @@ def pseudo_huber(errors: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SegmentErrors:
-    """Errors of predictions of segments with models of a robot.
-
-    Attributes:
-        robot: The robot as its model describes it.
-        data: Segments of at least one trial of the healthy robot.
-        threads: Threads of MuJoCo's steps.
-        stats: Statistics that are updated.
-    """
+    """Errors of predictions of the segments of healthy trials with models of a robot."""
 
     robot: Robot
     data: Sequence[ObservedSegments]
@@ -297,10 +284,7 @@ class SegmentErrors:
         return np.concatenate(parts)
 
     def losses(self, errors: FloatArray) -> FloatArray:
-        """Returns the mean loss of each segment, ``(segments,)``, from errors, ``(errors,)``.
-
-        A segment without a valid step has a loss of 0.
-        """
+        """Returns the mean loss of each segment, ``(segments,)``; 0 without a valid step."""
         number, count = self.segment_of_error, sum(len(own.valid) for own in self.data)
         sums = np.bincount(number, pseudo_huber(errors) ** 2, count)
         return np.asarray(sums / np.maximum(np.bincount(number, minlength=count), 1))
@@ -308,7 +292,7 @@ class SegmentErrors:
     def joint_errors(self, errors: FloatArray) -> FloatArray:
         """Returns the errors of joint positions, ``(valid steps, hinges)``, rad.
 
-        The error of an unknown hinge is 0. ``errors`` are all errors of one model, ``(errors,)``.
+        The error of an unknown hinge is 0.
         """
         masks = [(own, *compared) for own in self.data for compared in own.compared.items()]
         ends = np.cumsum([mask.sum() for _, _, mask in masks])
@@ -323,8 +307,7 @@ class SegmentErrors:
     def of(self, models: Sequence[Parameters]) -> FloatArray:
         """Returns prediction errors divided by their scales, ``(errors, models)``, all finite.
 
-        The models are predicted in batches, so that their memory is bounded; adjacent ones with one
-        control delay share them.
+        Batches bound their memory; adjacent models with one control delay share them.
         """
         size = min(largest_batch(self.robot, own.segments, steps=0) for own in self.data)
         batches = [
@@ -335,10 +318,7 @@ class SegmentErrors:
         return np.concatenate([self._of_batch(batch) for batch in batches], axis=1)
 
     def with_estimated_states(self, parameters: Parameters) -> "SegmentErrors":
-        """Returns the errors of independent segments.
-
-        An unknown state begins as the parameters predict it.
-        """
+        """Returns independent segments: an unknown state begins as the parameters predict it."""
         variants, record = self._variants([parameters]), (*estimation.BASE, *estimation.JOINTS)
         data = []
         for own in self.data:
@@ -372,9 +352,5 @@ class SegmentErrors:
         self, variants: list[ModelVariant], segments: Segments, delay: float
     ) -> Trajectory:
         """Returns predictions of equal delay, ``(models, segments, horizon + 1, width)``."""
-        return predict(
-            *(self.robot, variants, segments),
-            threads=self.threads,
-            stats=self.stats,
-            delay=delay,
-        ).trajectory
+        given, stats = (self.robot, variants, segments), self.stats
+        return predict(*given, threads=self.threads, stats=stats, delay=delay).trajectory
