@@ -25,21 +25,16 @@ from selfmodel.simulation.segments import (
 )
 from selfmodel.trials.estimation import JOINTS
 
-MAX_RATIO = 1.0
-"""Largest root mean square error of a joint relative to that of the prediction of no motion."""
-
-MIN_ERROR = 0.06
-"""Smallest root mean square error of a suspicious joint, rad: the ratio of a joint that rests is
-that of two noises."""
+MAX_RATIO, MIN_ERROR = 1.0, 0.06
+"""Largest root mean square error of a joint relative to that of the prediction of no motion; and
+smallest one of a suspicious joint, rad: the ratio of a joint that rests is that of two noises."""
 
 MAX_BIAS = 0.04
 """Largest absolute mean error of a joint, rad."""
 
-MIN_Z = 3.0
-"""Standard errors by which a correction must predict the segments better."""
-
-WORST = 3
-"""Joints with the largest ratios: an exchange of columns includes one of them."""
+MIN_Z, WORST = 3.0, 3
+"""Standard errors by which a correction must predict the segments better; and joints with the
+largest ratios, of which an exchange of columns includes one."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +80,14 @@ def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
         if correction is not None:
             return correction
     if ratios[worst] > MAX_RATIO and abs(biases[worst]) <= MAX_BIAS:
-        times = f"its error is {ratios[worst]:.1f} times that of no motion"
-        return Suspicion(hinges[worst], times)
+        cause = f"its error is {ratios[worst]:.1f} times that of no motion"
+        return Suspicion(hinges[worst], cause)
     if leans:
-        return Suspicion(
-            hinges[leaning], f"its mean error is {biases[leaning]:.2f} rad: an offset?"
-        )
+        cause = f"its mean error is {biases[leaning]:.2f} rad: an offset?"
+        return Suspicion(hinges[leaning], cause)
     if delay >= MAX_CONTROL_DELAY > segments.robot.control_delay:
-        limit = f"the control delay is {delay} steps, the largest that is fitted"
-        return Suspicion(None, limit)
+        cause = f"the control delay is {delay} steps, the largest that is fitted"
+        return Suspicion(None, cause)
     return None
 
 

@@ -39,8 +39,8 @@ def predict(
     begins in the initial pose.
 
     Welded joints begin at their welded angle. The hinges of a detached limb have no logged motion:
-    if the segments include joint positions, these hinges begin at rest, at their median angle over
-    the last third of the segments; a hinge without a known angle in its initial pose.
+    if the segments include joint positions, they begin at rest, at their median angle over the last
+    third of the segments, or, without a known angle, in the initial pose.
 
     Args:
         robot: The healthy robot.
@@ -195,41 +195,35 @@ class _OpenLoop:
 def _resting_hinges(robot: Robot, segments: Segments) -> dict[str, tuple[int, int, float]]:
     """Returns the ``qpos`` and ``qvel`` index and the resting angle of each hinge, by name.
 
-    The angle is the median at the end, because a limb may be lost during a trial; a hinge without a
-    known one has that of the initial pose. The result is empty without joint positions.
+    The angle is that at the end, because a limb may be lost during a trial. The result is empty
+    without joint positions.
     """
     angles = segments.states.get("joint_positions")
     if angles is None:
         return {}
-    medians = median_of_known(angles[round((1 - END) * len(angles)) :]).tolist()
     hinges = [robot.model.joint(name) for name in robot.anatomy.hinges]
+    medians = median_of_known(angles[round((1 - END) * len(angles)) :])
+    initial = np.array([hinge.qpos0[0] for hinge in hinges])
     return {
-        hinge.name: (
-            int(hinge.qposadr[0]),
-            int(hinge.dofadr[0]),
-            float(hinge.qpos0[0]) if np.isnan(angle) else angle,
-        )
-        for hinge, angle in zip(hinges, medians, strict=True)
+        hinge.name: (int(hinge.qposadr[0]), int(hinge.dofadr[0]), float(angle))
+        for hinge, angle in zip(hinges, np.where(np.isnan(medians), initial, medians), strict=True)
     }
 
 
 def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArray:
     """Returns the activations of the motors (MuJoCo's ``act``) before each command of a trial.
 
-    Activations are not logged. That of a motor with the ``dyntype`` filter follows its command with
-    a time constant, and that of an integrator is the sum of its commands. Both are zero at the
-    start of a trial, so they follow from the commands since. MuJoCo computes them, on a model that
-    has only motors, so that they are those of the robot's own model to the bit: where a solver
-    switches its active constraints, a rounding error has visible effects.
+    Activations, ``(steps, na)``, are not logged. That of a motor with the ``dyntype`` filter
+    follows its command with a time constant, and that of an integrator is the sum of its commands.
+    Both are zero at the start of a trial, so they follow from the commands since. MuJoCo computes
+    them, on a model that has only motors, so that they are those of the robot's own model to the
+    bit: where a solver switches its active constraints, a rounding error has visible effects.
 
     Args:
         robot: The healthy robot: no fault changes the activation dynamics.
         commands: Commands since the start of the trial, ``(steps, motors)``; an unknown one (NaN)
             is taken as the one before it.
         delay: Control delay, control steps.
-
-    Returns:
-        ``(steps, na)``.
     """
     states = np.zeros((len(commands), robot.model.na))
     if robot.model.na:

@@ -68,8 +68,7 @@ def draw_gap_of(
     uniform. The draws do not depend on the level, so two levels with the same random numbers
     describe the same robot at different distances from its model.
 
-    Source of the idea of randomising simulation errors: Jakobi, Husbands and Harvey, "Noise and
-    the reality gap" (ECAL 1995).
+    Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
 
     Raises:
         InputError: The level is out of range.
@@ -104,9 +103,7 @@ def draw_gap_of(
 def perturbed_model(model: mujoco.MjModel, gap: RealityGap) -> mujoco.MjModel:
     """Returns a copy of a robot's model with the masses, friction, damping and motors of a gap.
 
-    The layout of the copy is the model's: ``apply_faults`` applies a hypothesis to it, and such
-    copies share a batch. A body or motor without a factor in the gap is unchanged. The delay and
-    the measurement noise are not part of a model.
+    A body or motor without a factor in the gap is unchanged.
     """
     if gap.level == 0:
         return copy.copy(model)
@@ -129,9 +126,8 @@ def perturbed_model(model: mujoco.MjModel, gap: RealityGap) -> mujoco.MjModel:
 def perturbed_models(
     robot: Robot, spec_part: Hypothesis, members: int, level: float
 ) -> tuple[mujoco.MjModel, ...]:
-    """Returns models of one robot, each perturbed by a different reality gap.
+    """Returns models of one robot, each perturbed by a different gap, whatever the hypothesis.
 
-    The gaps do not depend on the hypothesis, so hypotheses are compared on common random numbers.
     Only the faults that edit the model's specification are applied.
     """
     rng, model = np.random.default_rng(members), compile_model(robot, spec_part)

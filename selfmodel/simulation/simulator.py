@@ -36,17 +36,9 @@ from selfmodel.trials.trajectory import Trajectory
 Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
 
-MAX_CACHED_VARIANTS = 1024
-"""Largest number of cached models, if the memory does not limit it."""
-
-MAX_CACHED_ENSEMBLES = 16
-"""Largest number of cached ensembles, of about ``_ENSEMBLE_MODELS`` models, and of trials with
-cached ground contact points."""
-
-CACHED_SHARE = 0.5
-"""Size of the cached models, and of the cached ensembles, relative to the models of a batch."""
-
-_ENSEMBLE_MODELS = 8
+MAX_CACHED_VARIANTS, MAX_CACHED_ENSEMBLES = 1024, 16
+"""Largest numbers of cached models, and of cached ensembles of about 8 models, if the memory does
+not limit them: each takes up to half of that of a batch. A dog with its meshes has 5 MB."""
 
 
 def thread_count(requested: int) -> int:
@@ -79,14 +71,12 @@ class Simulator:
         self.robot = robot
         self.threads = thread_count(threads)
         self.stats = SimulationStats() if stats is None else stats
-        # A quadruped or hexapod has 0.3 MB, a dog with its meshes 5 MB.
-        affordable = int(CACHED_SHARE * batch_bytes()) // int(robot.model.nbuffer)
+        affordable = batch_bytes() // (2 * int(robot.model.nbuffer))
         models = max(1, min(MAX_CACHED_VARIANTS, affordable))
-        ensembles = max(1, min(MAX_CACHED_ENSEMBLES, affordable // _ENSEMBLE_MODELS))
+        ensembles = max(1, min(MAX_CACHED_ENSEMBLES, affordable // 8))
         self._variant = lru_cache(models)(partial(build, robot))
         self._members = lru_cache(ensembles)(partial(perturbed_models, robot))
-        points = partial(ground_contact_points, robot)
-        self._contact_points = lru_cache(MAX_CACHED_ENSEMBLES)(points)
+        self._contact_points = lru_cache(16)(partial(ground_contact_points, robot))
 
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``."""
@@ -101,12 +91,8 @@ class Simulator:
     ) -> SimulationResult:
         """Predicts segments of a trial under each hypothesis; see ``prediction.predict``.
 
-        Args:
-            hypotheses: At least one hypothesis.
-            segments: Initial states and commands.
-            observed: Trajectory of the trial, for fault kinds whose model adapts to its ground
-                contacts. If None, or without the base's position in the segments, such a fault
-                has the self-model's own ground.
+        Fault kinds whose model adapts to ground contacts have those of the trial, ``observed``; if
+        it is None, or without the base's position in the segments, the self-model's own ground.
         """
         variants = [self._variant(hypothesis) for hypothesis in hypotheses]
         if observed is not None and "base_position" in segments.states:
@@ -118,14 +104,11 @@ class Simulator:
                     points = self._contact_points(observed)
                     fault.kind.adapt_to_contacts(variants[number], fault, points)
         first: dict[Hypothesis, int] = {}
-        same_dynamics_as = [
-            first.setdefault(hypothesis.dynamics_part, i) for i, hypothesis in enumerate(hypotheses)
-        ]
         return predict(
-            self.robot,
-            variants,
-            segments,
-            same_dynamics_as=same_dynamics_as,
+            *(self.robot, variants, segments),
+            same_dynamics_as=[
+                first.setdefault(own.dynamics_part, i) for i, own in enumerate(hypotheses)
+            ],
             threads=self.threads,
             stats=self.stats,
         )

@@ -72,12 +72,7 @@ class Replay:
         Raises:
             InputError: pandas is not installed.
         """
-        return data_frame(
-            [
-                {"step": step, **{name: float(rows[step]) for name, rows in self.errors.items()}}
-                for step in range(self.simulated.steps)
-            ]
-        )
+        return data_frame({"step": np.arange(self.simulated.steps), **self.errors})
 
 
 def replay(
