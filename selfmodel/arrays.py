@@ -59,7 +59,7 @@ def held(values: FloatArray) -> FloatArray:
 
 
 def data_frame(
-    content: Sequence[Mapping[str, Any]] | Mapping[str, FloatArray],
+    content: Sequence[Mapping[str, Any]] | Mapping[str, FloatArray | IndexArray],
 ) -> Any:  # noqa: ANN401  # pandas is optional
     """Returns a ``pandas.DataFrame`` of rows, with one column per key, or of columns by name.
 

@@ -72,7 +72,8 @@ class Replay:
         Raises:
             InputError: pandas is not installed.
         """
-        return data_frame({"step": np.arange(self.simulated.steps), **self.errors})
+        steps = np.arange(self.simulated.steps)
+        return data_frame({"step": steps, **{str(name): own for name, own in self.errors.items()}})
 
 
 def replay(
