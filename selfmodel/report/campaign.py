@@ -3,8 +3,7 @@
 The reader is narrow on purpose: it takes every table (``*.csv``, ``*.jsonl``, and the lists of
 ``results.json``) and every figure (``*.png``, ``*.svg``) in the folder or in its folder
 ``figures``, whatever study wrote them. Cells are shown as they are in their files: JSON gives each
-value its type; a column of a CSV file has numbers if each filled cell is one, and none would lose a
-digit (``_is_numeric``); other columns have texts. A cell ``true`` or ``false`` is a truth value.
+value its type, and ``_column`` those of a CSV file theirs.
 """
 
 import base64
@@ -106,23 +105,18 @@ def _shares(rows: Sequence[Record]) -> Section:
         for row in (row for row in rows if factor in row):
             groups.setdefault(str(row[factor]), []).append(bool(row[CORRECT]))
         if len(groups) > 1:
-            charts.append(_share_chart(factor, groups))
+            title = f"Share of right diagnoses by {factor}, with 95 % intervals"
+            found = tuple(_share(name, groups[name]) for name in sorted(groups, key=_numbers_first))
+            charts.append(
+                IntervalChart(title, "share of right diagnoses", found, limits=(0.0, 1.0))
+            )
     text = "Marginal shares: cells of a campaign that is not finished are not balanced."
     return Section("shares", "Right diagnoses", (text,), tuple(charts))
 
 
-def _share_chart(factor: str, groups: Mapping[str, Sequence[bool]]) -> IntervalChart:
-    estimates = []
-    for name in sorted(groups, key=_numbers_first):
-        count = len(groups[name])
-        share = proportion(sum(groups[name]), count)
-        estimates.append(Estimate(f"{name} (n = {count})", share.estimate, share.low, share.high))
-    return IntervalChart(
-        title=f"Share of right diagnoses by {factor}, with 95 % intervals",
-        x_label="share of right diagnoses",
-        estimates=tuple(estimates),
-        limits=(0.0, 1.0),
-    )
+def _share(name: str, right: Sequence[bool]) -> Estimate:
+    share = proportion(sum(right), len(right))
+    return Estimate(f"{name} (n = {len(right)})", share.estimate, share.low, share.high)
 
 
 def _numbers_first(name: str) -> tuple[float, str]:
@@ -169,16 +163,15 @@ def _table_files(folder: Path) -> list[Path]:
 
 
 def read_table(path: Path) -> list[dict[str, Cell]]:
-    """Returns the rows of a CSV file, or of a file with a JSON object per line, ``.jsonl``.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
+    """Returns the rows of a CSV file, or of a file with a JSON object per line, ``.jsonl``."""
     data = read_file(path, "a table of results", MAX_FILE_BYTES)
     try:
         text = data.decode("utf-8-sig")  # spreadsheets begin a CSV file with a byte order mark
         if path.suffix == ".csv":
-            return _typed(list(csv.DictReader(io.StringIO(text))))
+            rows = list(csv.DictReader(io.StringIO(text)))
+            names = [name for name in (rows[0] if rows else ()) if name]
+            columns = [_column(name, [row[name] for row in rows]) for name in names]
+            return [dict(zip(names, cells, strict=True)) for cells in zip(*columns, strict=True)]
         items = [parse_json(line.encode()) for line in text.split("\n") if line.strip()]
         return [_flat(item) for item in items if isinstance(item, dict)]
     except (ValueError, RecursionError, csv.Error) as error:
@@ -186,11 +179,7 @@ def read_table(path: Path) -> list[dict[str, Cell]]:
 
 
 def other_lists(folder: Path) -> dict[str, list[dict[str, Cell]]]:
-    """Returns the lists of ``results.json`` that are in no other table, such as summaries.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
+    """Returns the lists of ``results.json`` that are in no other table, such as summaries."""
     path = folder / "results.json"
     if not path.exists():
         return {}
@@ -232,39 +221,26 @@ def _flat(item: Mapping[str, Any], prefix: str = "") -> dict[str, Cell]:
     return flat
 
 
-def _typed(rows: Sequence[Mapping[str, str | None]]) -> list[dict[str, Cell]]:
-    """Returns the rows of a CSV file with numbers and truth values."""
-    columns = [name for name in (rows[0] if rows else ()) if name]
-    numeric = {name for name in columns if _is_numeric(name, [row[name] for row in rows])}
-    return [{name: _cell(row[name], numeric=name in numeric) for name in columns} for row in rows]
+def _column(name: str, texts: Sequence[str | None]) -> list[Cell]:
+    """Returns a column of a CSV file: truth values, numbers, texts, or None for an empty cell.
 
-
-def _is_numeric(name: str, cells: Sequence[str | None]) -> bool:
-    """Returns whether each filled cell of a column is a number that keeps all of its digits.
-
-    An integer beyond ``MAX_INTEGER`` does not, nor a version, by the name of its column: 3.10 is
-    not 3.1.
+    It has numbers if each filled cell is one and keeps all of its digits, unlike an integer beyond
+    ``MAX_INTEGER`` and a version, by the name of its column: 3.10 is not 3.1.
     """
-    return "version" not in name.lower() and all(
-        NUMBER.fullmatch(cell) and not (_is_whole(cell) and abs(float(cell)) > MAX_INTEGER)
-        for cell in cells
-        if cell
-    )
+    filled = [text for text in texts if text]
+    large = any(_is_whole(text) and abs(float(text)) > MAX_INTEGER for text in filled)
+    if "version" not in name.lower() and all(map(NUMBER.fullmatch, filled)) and not large:
+        return [_number(text) if text else None for text in texts]
+    truths = {"true": True, "True": True, "false": False, "False": False}  # pandas' and ours
+    return [truths.get(text, text) if text else None for text in texts]
 
 
-def _is_whole(text: str) -> bool:
-    return text.lstrip("+-").isdigit()
-
-
-def _cell(text: str | None, *, numeric: bool) -> Cell:
-    """Returns a cell of a CSV file: a number, a truth value, a text, or None if it is empty."""
-    if not text:
-        return None
-    if text in ("true", "false", "True", "False"):  # pandas writes the latter
-        return text.lower() == "true"
-    if not numeric:
-        return text
+def _number(text: str) -> Cell:
     value = int(text) if _is_whole(text) else float(text)
     if math.isinf(value):  # JSON has no infinity
         return text
     return None if math.isnan(value) else value
+
+
+def _is_whole(text: str) -> bool:
+    return text.lstrip("+-").isdigit()

@@ -87,14 +87,7 @@ class Estimate(msgspec.Struct, frozen=True):
 
 
 class IntervalChart(Item, frozen=True, tag="intervals"):
-    """Values with intervals, one below the other.
-
-    Attributes:
-        x_label: Label of the values.
-        estimates: The values.
-        reference: Value that is marked, such as 1 for factors; None without one.
-        limits: Ends of the axis, such as 0 and 1 for shares; None for those of the values.
-    """
+    """Values with intervals, one below the other, with a marked value and ends of the axis."""
 
     x_label: str
     estimates: tuple[Estimate, ...]
@@ -110,17 +103,7 @@ class Row(msgspec.Struct, frozen=True):
 
 
 class HeatMap(Item, frozen=True, tag="heat"):
-    """Values by row and time.
-
-    Attributes:
-        x_label: Label of the horizontal axis.
-        value_label: Label of the values.
-        begin: Beginning of each column on the horizontal axis.
-        end: End of each column.
-        rows: The rows.
-        largest: Value with the strongest colour.
-        marks: Marked positions on the horizontal axis.
-    """
+    """Values by row and column; ``largest`` has the strongest colour, columns begin and end."""
 
     x_label: str
     value_label: str
@@ -176,16 +159,7 @@ class Section(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True):
-    """A report.
-
-    Attributes:
-        title: Title of the page.
-        headline: What happened, in one sentence.
-        verdict: Further sentences about the result.
-        sections: The sections, in order.
-        scene: Robots on one timeline, ``scene.scene_of``; None without one.
-        made_with: Versions by the name of the software.
-    """
+    """A report: a headline, further sentences, sections, ``scene_of`` robots, and versions."""
 
     format: str = FORMAT
     title: str

@@ -44,14 +44,9 @@ LEVELS = 65535
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One motion of the robot in a trial.
+    """One motion of the robot in a trial; its signals are invalid if the simulation diverged.
 
-    Attributes:
-        name: Name in legends, such as ``measured`` or ``best hypothesis``.
-        hypothesis: Faults of the robot in this motion; of the measured robot, those of the best
-            hypothesis.
-        trajectory: The motion, with the signals of a pose.
-        diverged: Whether a simulation diverged; its signals are then invalid.
+    The measured robot has the faults of the best hypothesis.
     """
 
     name: str
@@ -73,14 +68,9 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A trial with the simulations of it.
+    """A trial, its simulations in closed loop, and the time of a change of the robot, s, or None.
 
-    Attributes:
-        name: Name of the trial.
-        trial: The trial.
-        rollouts: The trial simulated in closed loop from the initial pose, with all signals, best
-            hypothesis first; a healthy trial by the self-model.
-        mark: Time of a change of the robot, s; None without one.
+    The best hypothesis is first; a healthy trial is simulated by the self-model.
     """
 
     name: str
@@ -135,16 +125,17 @@ def geometry_of(robot: Robot) -> dict[str, Any]:
             }
             for shape in shapes
         ],
-        "meshes": [_mesh(*simplified(*triangles_of(model, mesh), faces)) for mesh in meshes],
+        "meshes": [
+            {"vertices": quantised(vertices), "faces": _base64(corners.astype("<u4"))}
+            for vertices, corners in (
+                simplified(*triangles_of(model, one), faces) for one in meshes
+            )
+        ],
         "hinges": list(robot.anatomy.hinges),
         "turned": list(_turned(robot, index)),
         "height": robot.standing_height,
         "root": index[int(model.body(robot.root).id)],
     }
-
-
-def _mesh(vertices: FloatArray, faces: IndexArray) -> dict[str, Any]:
-    return {"vertices": quantised(vertices), "faces": _base64(faces.astype("<u4"))}
 
 
 def _turned(robot: Robot, index: Mapping[int, int]) -> Iterator[dict[str, Any]]:

@@ -63,9 +63,9 @@ class Subject:
         robot: The nominal robot.
         healthy: Trials of the healthy robot.
         damaged: Trials to explain, in order.
-        diagnoses: Diagnoses, at least one; the last is of all trials to explain.
+        diagnoses: At least one; the last is of all trials to explain.
         comparator: Comparator of the diagnoses.
-        calibration: Fit of the self-model to the healthy trials; None without one.
+        calibration: Fit of the self-model to the healthy trials.
         result: Result of a run; None for logs, and for a run that is not finished.
         searches: Progress of the searches; empty if it was not recorded.
         made_with: Versions by the name of the software.
@@ -174,14 +174,9 @@ def subject_of_run(
     logs = arguments.read_logs(paths)
     robot = arguments.robot_of_logs(logs, None)
     damaged, healthy = by_stage([log.trial for log in logs])
-    count, space, file = thread_count(threads), hypothesis_space(robot, kinds), None
-    if (folder / RESULT).exists():
-        file = DiagnosisFile(
-            folder / RESULT,
-            RecoveryResult,
-            "the result of a recovery",
-            "move it away, and the report is made of the logs and diagnoses",
-        )
+    count, space = thread_count(threads), _hypothesis_space(robot, kinds)
+    file = DiagnosisFile(folder / RESULT, RecoveryResult) if (folder / RESULT).exists() else None
+    if file is not None:
         comparator, space = file.comparator_name(comparator), file.space(robot, kinds)
     diagnoses = read_diagnoses(folder, space)
     if not diagnoses or not damaged:
@@ -189,13 +184,12 @@ def subject_of_run(
             f"{folder}: expected a run with a diagnosis, got none yet: wait for its first "
             f"diagnosis, or give its logs"
         )
-    _check_counts(folder / DIAGNOSES, diagnoses, len(damaged))
+    _check_counts(folder, diagnoses, len(damaged))
     explained = damaged[: diagnoses[-1].trials]
     if file is not None:
         calibration = file.calibration(robot, healthy, count)
     else:
-        fits = bool(healthy) and is_calibrated(folder)
-        calibration = fitted(robot, healthy, count) if fits else None
+        calibration = fitted(robot, healthy, count) if healthy and is_calibrated(folder) else None
     return Subject(
         name=folder.resolve().name,
         robot=robot,
@@ -204,29 +198,24 @@ def subject_of_run(
         diagnoses=diagnoses,
         comparator=comparator_choice(comparator)(robot, [*healthy, *explained]).comparator,
         calibration=calibration,
-        result=None if file is None else file.result,
+        result=file and file.result,
         searches=read_searches(folder),
         made_with=logs[0].software,
         threads=count,
     )
 
 
-def _check_counts(path: Path, diagnoses: Sequence[Diagnosis], trials: int) -> None:
-    """Checks that each diagnosis is of logs that are there: a damaged run may lack some.
-
-    Raises:
-        InputError: A diagnosis is of no or of more trials, or has a change in none of its trials.
-    """
+def _check_counts(folder: Path, diagnoses: Sequence[Diagnosis], trials: int) -> None:
+    """Checks that each diagnosis, and its change, is of logs that a damaged run still has."""
     for diagnosis in diagnoses:
         change = diagnosis.change
-        if not 1 <= diagnosis.trials <= trials or (
-            change is not None and not 0 <= change.index < diagnosis.trials
-        ):
-            place = "" if change is None else f", with a change in trial {change.index}"
+        index = 0 if change is None else change.index
+        if not (1 <= diagnosis.trials <= trials and 0 <= index < diagnosis.trials):
+            place = "" if change is None else f", with a change in trial {index}"
             raise InputError(
-                f"{path}: expected diagnoses of 1 to {trials} trials, as many as the folder "
-                f"{TRIALS} has after the failure, got one of {diagnosis.trials}{place}: put back "
-                f"the logs that were moved away, or give the logs instead of the folder"
+                f"{folder / DIAGNOSES}: expected diagnoses of 1 to {trials} trials, as many as the "
+                f"folder {TRIALS} has after the failure, got one of {diagnosis.trials}{place}: put "
+                f"back the logs that were moved away, or give the logs instead of the folder"
             )
 
 
@@ -254,7 +243,7 @@ def subject_of_logs(
         InputError: The diagnosis is of other logs, of another self-model or with another
             comparator, or a file is damaged.
     """
-    file: DiagnosisFile[DiagnosisResult] = DiagnosisFile(diagnosis)
+    file = DiagnosisFile(diagnosis, DiagnosisResult)
     explained, intact = file.matched(paths)
     logs = arguments.read_logs([*explained, *intact])
     model = arguments.robot_of_logs(logs, robot)
@@ -276,9 +265,22 @@ def subject_of_logs(
     )
 
 
-def hypothesis_space(robot: Robot, kinds: Iterable[FaultKind]) -> HypothesisSpace:
+def _hypothesis_space(robot: Robot, kinds: Iterable[FaultKind]) -> HypothesisSpace:
     """Returns the hypotheses of built-in and of given kinds."""
     return HypothesisSpace(robot.anatomy, tuple(dict.fromkeys((*ALL_KINDS, *kinds))))
+
+
+WORDS = {
+    DiagnosisResult: (
+        "the output of `selfmodel diagnose --json`, or the result.json of a recovery",
+        "leave --diagnosis out, and the logs are diagnosed",
+    ),
+    RecoveryResult: (
+        "the result of a recovery",
+        "move it away, and the report is made of the logs and diagnoses",
+    ),
+}
+"""What a file is expected to be, and the remedy if it is not, by the class of its content."""
 
 
 class DiagnosisFile(Generic[Result]):
@@ -287,22 +289,14 @@ class DiagnosisFile(Generic[Result]):
     Args:
         path: Output of ``diagnose --json``, or a run's ``result.json``.
         kind: Class of the content.
-        what: Expected content, for errors.
-        remedy: Remedy, for errors.
 
     Raises:
         InputError: The file cannot be read, or is no such file, or was altered.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        kind: type[Result] = DiagnosisResult,  # type: ignore[assignment]  # the default of Result
-        what: str = "the output of `selfmodel diagnose --json`, or the result.json of a recovery",
-        remedy: str = "leave --diagnosis out, and the logs are diagnosed",
-    ) -> None:
-        self.path, self._what, self._remedy = path, what, remedy
-        self.result = read_as(path, kind, what, remedy)
+    def __init__(self, path: Path, kind: type[Result]) -> None:
+        self.path, (self._what, self._remedy) = path, WORDS[kind]
+        self.result = read_as(path, kind, self._what, self._remedy)
         if not self.result.explained:
             raise self._error("it explains no log")
 
@@ -310,11 +304,7 @@ class DiagnosisFile(Generic[Result]):
         return InputError(f"{self.path}: expected {self._what}: {cause}; {self._remedy}")
 
     def diagnosis(self, space: HypothesisSpace) -> Diagnosis:
-        """Returns the diagnosis, of hypotheses of a space.
-
-        Raises:
-            InputError: A value is missing, or of another type.
-        """
+        """Returns the diagnosis, of hypotheses of a space."""
         count = len(self.result.explained)
         try:
             diagnosis = diagnosis_from_dict({**as_json(self.result), "trials": count}, space.parse)
@@ -327,11 +317,7 @@ class DiagnosisFile(Generic[Result]):
     def matched(self, paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
         """Returns those of some logs that the diagnosis explains, in its order, and the healthy.
 
-        Args:
-            paths: All logs of the diagnosis, in any order and under any names.
-
-        Raises:
-            InputError: The logs are others than those of the diagnosis.
+        The logs are in any order and under any names, and are those of the diagnosis.
         """
         given, files = {file_digest(path): path for path in paths}, self.result.files or {}
         # The paths in a result.json are relative to its folder, and those of its logs are not.
@@ -349,11 +335,7 @@ class DiagnosisFile(Generic[Result]):
         return [given[digest] for digest in explained], [given[digest] for digest in healthy]
 
     def check_self_model(self, robot: Robot) -> None:
-        """Checks that a robot is the self-model of the diagnosis, by its name and its digest.
-
-        Raises:
-            InputError: It is another one.
-        """
+        """Checks that a robot is the self-model of the diagnosis, by its name and its digest."""
         if robot.name != self.result.robot:
             raise InputError(
                 f"{self.path} is a diagnosis of the robot {self.result.robot}, and these logs are "
@@ -373,9 +355,6 @@ class DiagnosisFile(Generic[Result]):
         Args:
             given: Name of ``--comparator``: where the recorded comparator is, such as
                 ``package.module:object``; ``auto`` for one that its own name finds.
-
-        Raises:
-            InputError: The given comparator is another one, or the file names a module.
         """
         recorded = self.result.comparator
         if given == AUTO:
@@ -390,15 +369,11 @@ class DiagnosisFile(Generic[Result]):
         return given
 
     def space(self, robot: Robot, given: Sequence[FaultKind]) -> HypothesisSpace:
-        """Returns the hypotheses of built-in kinds, of those in the file, and of given ones.
-
-        Raises:
-            InputError: The file names a module, or no kind has a name.
-        """
+        """Returns the hypotheses of built-in kinds, of those in the file, and of given ones."""
         known = {kind.name for kind in given}
         named = [self._installed(name) for name in self.result.kinds if name not in known]
         recorded = plugins.kinds(",".join(named)) if named else ()
-        return hypothesis_space(robot, (*recorded, *given))
+        return _hypothesis_space(robot, (*recorded, *given))
 
     def _installed(self, name: str) -> str:
         """Returns a name that imports no code: a file of others may name any module."""
@@ -415,13 +390,10 @@ class DiagnosisFile(Generic[Result]):
         """Returns the calibration; None without healthy trials or without one.
 
         Values of a fit joint by joint do not determine its model: it is fitted again.
-
-        Raises:
-            InputError: A value is missing, of another type, or of another robot.
         """
-        if not healthy or self.result.calibration is None:
-            return None
         values = self.result.calibration
+        if not healthy or values is None:
+            return None
         fit = converted(self.path, values, CalibrationResult, self._what, self._remedy)
         if fit.joints is not None:
             return fitted(robot, healthy, threads)

@@ -13,7 +13,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError
 from selfmodel.files import file_digest
 from selfmodel.logs.journal import OPTIONS
-from selfmodel.logs.results import as_json, result_bytes
+from selfmodel.logs.results import DiagnosisResult, as_json, result_bytes
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.report.subject import DiagnosisFile, Subject, is_run, subject_of_logs, subject_of_run
 
@@ -206,7 +206,7 @@ def test_logs_are_matched_by_their_digests_in_the_order_of_the_diagnosis(
     tmp_path: Path, logs: list[Path], values: dict, names: tuple[str, str]
 ):
     digests = {name: file_digest(path) for name, path in zip(names, logs, strict=True)}
-    file = DiagnosisFile(written(tmp_path, {**values, "files": digests}))
+    file = DiagnosisFile(written(tmp_path, {**values, "files": digests}), DiagnosisResult)
     renamed = logs[0].rename(tmp_path / "walk.mcap")
     assert file.matched([renamed, logs[1]]) == ([logs[1]], [renamed])
     for others in ([logs[1]], [renamed, logs[1], written(tmp_path, {})]):
@@ -222,7 +222,9 @@ def test_logs_are_matched_by_their_digests_in_the_order_of_the_diagnosis(
 def test_another_self_model_of_the_same_name_is_refused(tmp_path: Path):
     own = SimpleNamespace(name="quadruped", mjcf="<mujoco/>", control_timestep=0.01, assets={})
     other = SimpleNamespace(**{**vars(own), "mjcf": '<mujoco model="b"/>'})
-    file = DiagnosisFile(written(tmp_path, {**PRINTED, "model": self_model_digest(own)}))
+    file = DiagnosisFile(
+        written(tmp_path, {**PRINTED, "model": self_model_digest(own)}), DiagnosisResult
+    )
 
     file.check_self_model(own)
 
@@ -244,4 +246,4 @@ def test_another_self_model_of_the_same_name_is_refused(tmp_path: Path):
 )
 def test_other_files_are_no_diagnosis(tmp_path: Path, values: object):
     with pytest.raises(InputError, match=r"found\.json: .*leave --diagnosis"):
-        DiagnosisFile(written(tmp_path, values))
+        DiagnosisFile(written(tmp_path, values), DiagnosisResult)
