@@ -22,7 +22,7 @@ from tests.report.conftest import RECOVER
 
 
 def recorded(folder: Path, robot: Robot) -> Progress:
-    progress = Progress(folder, robot)
+    progress = Progress(folder, robot, reports=True)
     progress(SearchBegins("repair", INTACT))
     progress(Generation(1, 2, 0.1, 20, 1.0))
     progress(Generation(2, 2, 0.30000000000000004, 30, 2.0))
@@ -63,6 +63,8 @@ def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trial
     assert describe(early.value) == "before the first trial"
     assert describe(failure.value) == f"the robot is gone; the finished trials are in {tmp_path}"
     assert read_searches(tmp_path) == progress.searches
+    page = (tmp_path / "report.html").read_text()
+    assert "The recovery is not finished: the trial 00-before was run." in page
 
 
 LONG = '[{"kind": "repair", "hypothesis": "", "best": [1%s], "evaluations": [1]}]' % ("0" * 400)
@@ -112,16 +114,3 @@ def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
     for key in ("seconds", "sha256"):
         del before[key], after[key]
     assert before == after
-
-
-def test_a_recovery_that_is_interrupted_leaves_the_last_report(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    def stopped(*_arguments: object, **_more: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("selfmodel.studies.experiment.is_correct", stopped)
-    done = selfmodel(*RECOVER, "--no-calibrate", "--report", cwd=tmp_path)
-
-    assert done.returncode != 0
-    assert "The recovery is not finished: " in (tmp_path / "run" / "report.html").read_text()
