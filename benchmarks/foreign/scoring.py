@@ -309,14 +309,15 @@ def table(rows: Sequence[Row], by: str) -> str:
                     for key in HEADINGS
                 )
                 cells = (
-                    _median(found) if key in MEDIANS else _rate(found)
+                    _median(found) if key in MEDIANS else rate(found)
                     for key, found in zip(HEADINGS, values, strict=True)
                 )
                 lines.append(f"| {' | '.join((name, gap, str(len(chosen)), *cells))} |")
     return "\n".join(lines)
 
 
-def _rate(values: Sequence[bool]) -> str:
+def rate(values: Sequence[bool]) -> str:
+    """Returns the share of true values with Wilson's 95 % interval, as text."""
     if not values:
         return ""
     found = proportion(sum(values), len(values))

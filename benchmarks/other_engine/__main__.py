@@ -7,6 +7,7 @@ import argparse
 import json
 from pathlib import Path
 
+from benchmarks.foreign.scoring import read_rows
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
@@ -64,7 +65,7 @@ def _run(options: argparse.Namespace) -> None:
             )
             print(json.dumps(row), flush=True)
         case "table":
-            print(recovery.table(recovery.read_rows(options.rows)))
+            print(recovery.table([row for path in options.rows for row in read_rows(path)]))
         case "transfer":
             robot = ROBOTS[options.robot].robot()
             for line in recovery.transfer_lines(robot, options.gaits, range(options.seeds)):

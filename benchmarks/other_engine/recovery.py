@@ -1,8 +1,7 @@
 """Recoveries of robots in PyBullet, walks of given gaits in both engines, and their tables."""
 
 import dataclasses
-import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -10,9 +9,10 @@ from typing import Any
 import numpy as np
 
 import selfmodel
+from benchmarks.foreign.scoring import rate
 from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
 from benchmarks.other_engine.reality import Damage, Reality, damage_of, draw_reality, ideal_reality
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.errors import WorkError, describe
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -23,7 +23,6 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import is_correct
-from selfmodel.studies.statistics import proportion
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import collect, forward_displacement
 from selfmodel.version import __version__
@@ -31,26 +30,11 @@ from selfmodel.version import __version__
 Row = dict[str, Any]
 
 
-def recovered(  # the options of the command
-    name: str,
-    case: int,
-    seed: int,
-    folder: Path,
-    *,
-    settings: Settings | None = None,
-    threads: int = 0,
+def recovered(
+    name: str, case: int, seed: int, folder: Path, *, settings: Settings, threads: int
 ) -> Row:
-    """Runs a recovery and returns its row.
-
-    Args:
-        name: Name of the robot.
-        case: Number of the failure in Table I.
-        seed: Seed of the physical robot, and of the recovery.
-        folder: Folder of the run, new or empty.
-        settings: Parameters of the recovery; None for the paper's.
-        threads: Threads of the self-model's physics; 0 for all processors.
-    """
-    entry, settings = ROBOTS[name], settings or Settings()
+    """Runs a recovery of a robot in PyBullet from a case of Table I, and returns its row."""
+    entry = ROBOTS[name]
     robot, notation = entry.robot(), entry.cases[case]
     reality = draw_reality(robot, seed)
     row: Row = {
@@ -121,10 +105,16 @@ def _simulated(recovery: Recovery, nominal: Simulator) -> Iterator[float | None]
     calibrated = Simulator(fitted.robot, nominal.threads) if fitted else nominal
     for trial, tried in zip(recovery.trials, recovery.tried, strict=True):
         simulator = nominal if trial.plan.stage == "before" else calibrated
-        runs = [(tried, trial.plan.controller)]
-        result = simulator.run(runs, trial.plan.steps, ("base_position",))
-        lost = trial.plan.stage == "after" or bool(result.diverged[0])
-        yield None if lost else float(forward_displacement(result.trajectory)[0])
+        walked = _in_mujoco(simulator, tried, trial.plan.controller, trial.plan.steps)
+        yield None if trial.plan.stage == "after" else walked
+
+
+def _in_mujoco(
+    simulator: Simulator, hypothesis: Hypothesis, driver: CommandSource, steps: int
+) -> float | None:
+    """Returns the displacement of a simulation, m; None if it diverged."""
+    result = simulator.run([(hypothesis, driver)], steps, ("base_position",))
+    return None if result.diverged[0] else float(forward_displacement(result.trajectory)[0])
 
 
 def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) -> Iterator[str]:
@@ -141,10 +131,7 @@ def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) ->
     yield "|---" * len(names) + "|"
     for path in gaits:
         gait = load_controller(path)
-        result = Simulator(robot, threads=1).run(
-            [(INTACT, gait)], Settings().steps, ("base_position",)
-        )
-        found = [forward_displacement(result.trajectory)[0]]
+        found = [_in_mujoco(Simulator(robot, threads=1), INTACT, gait, Settings().steps) or 0.0]
         found += [_in_bullet(robot, gait, reality) for reality in realities]
         yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
 
@@ -159,12 +146,6 @@ HEADINGS = (
     *("recoveries", "diagnosis right", "before, m", "after, m", "recovered, m"),
     *("recovered ÷ before", "first trial ÷ before", "physical ÷ simulated", "upright", "seconds"),
 )
-
-
-def read_rows(paths: Iterable[Path]) -> list[Row]:
-    """Returns the rows of some files, each with a JSON object per line."""
-    texts = [path.read_text(encoding="utf-8") for path in paths]
-    return [json.loads(line) for text in texts for line in text.splitlines() if line.strip()]
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -193,26 +174,18 @@ def _cells(rows: Sequence[Row]) -> list[str]:
     best = [max(_recovery_trials(row), key=lambda trial: trial["displacement"]) for row in complete]
     return [
         str(len(rows)),
-        _rate([row.get("correct", False) for row in rows]),
+        rate([row.get("correct", False) for row in rows]),
         *(_median([row[key] for row in complete]) for key in ("before", "after", "recovered")),
         _median([row["recovered"] / row["before"] for row in forward] + errors),
         _median(first + errors),
         _median(ratios),
-        _rate([trial["upright"] for trial in best] + [False] * len(errors)),
+        rate([trial["upright"] for trial in best] + [False] * len(errors)),
         _median([row["seconds"] for row in rows]),
     ]
 
 
 def _recovery_trials(row: Row) -> list[Row]:
     return [trial for trial in row["trials"] if trial["stage"] == "recovery"]
-
-
-def _rate(values: Sequence[bool]) -> str:
-    found = proportion(sum(values), len(values))
-    return (
-        f"{sum(values)}/{len(values)}, {100 * found.estimate:.0f} % "
-        f"({100 * found.low:.0f} to {100 * found.high:.0f})"
-    )
 
 
 def _median(values: Sequence[float]) -> str:

@@ -89,7 +89,7 @@ def study_of(given: argparse.Namespace) -> Study:
     """Returns the study of the options of the command line."""
     names = ("steps", "trials", "evolution_trials", "evaluations", "population", "period")
     shared = {name: getattr(given, name) for name in names}
-    models = {robot: recoveries.planned(robot) for robot in given.robots.split(",")}
+    models = {robot: recoveries.planned(robot, ROBOTS[robot]) for robot in given.robots.split(",")}
     size = {"steps": given.steps, "evaluations": given.repertoire_evaluations}
     repertoires = {
         robot: Cell(f"{__package__}.__main__:make", robot, {**model, **size}, kind="repertoires")

@@ -165,13 +165,10 @@ def _computed(
                     answers[place] = 0.0, f"not computed: it needs {lost[0]}, which failed"
                 else:
                     running[_submitted(executor, folder, cell)] = place
-            for future in (
-                futures.wait(running, return_when=futures.FIRST_COMPLETED).done
-                if not answers
-                else ()
-            ):
-                place = running.pop(future)
-                answers[place] = _answer(future, folder, place)
+            if not answers:
+                for future in futures.wait(running, return_when=futures.FIRST_COMPLETED).done:
+                    place = running.pop(future)
+                    answers[place] = _answer(future, folder, place)
             for place, answer in answers.items():
                 graph.done(place)
                 failed |= set() if answer[1] is None else {place}
@@ -180,7 +177,10 @@ def _computed(
 
 @contextmanager
 def _until_all_end(executor: Executor, running: Iterable["Future[Answer]"]) -> Iterator[Executor]:
-    """Context manager that leaves no cell behind it, which would still write into the folder."""
+    """Context manager that waits for cells that have begun: they would write into the folder later.
+
+    A call on a cluster is cancelled instead.
+    """
     try:
         yield executor
     finally:

@@ -24,7 +24,7 @@ from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import check_score
 from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, repair_parameters, robot_key
 from selfmodel.studies.study import Point, Study
-from selfmodel.tasks import ROBOTS, suite_bodies
+from selfmodel.tasks import ROBOTS, Entry, suite_bodies
 
 BANK = "bank"
 NEXT_TRIAL = (BANK, *plugins.NEXT_TRIAL)
@@ -123,11 +123,15 @@ def ablation(
             f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
             f"--repair {repair}: leave one of them out, or give --next-trial repair"
         )
-    failures = {robot: _failures(robot, cases, damages, kinds) for robot in robots}
-    for robot in robots:
-        check_score(chosen["score"], robot_entry(robot))
+    entries = {robot: robot_entry(robot) for robot in robots}
+    models = {robot: recoveries.planned(robot, entry) for robot, entry in entries.items()}
+    failures = {
+        robot: _failures(robot, entry, cases, damages, kinds) for robot, entry in entries.items()
+    }
+    for entry in entries.values():
+        check_score(chosen["score"], entry)
     runs = [
-        _point(robot, case, truth, gap, seed)
+        _point(models[robot], case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
         for case, truth in failures[robot]
         for gap in gaps
@@ -139,10 +143,9 @@ def ablation(
 
     @cache
     def gait(robot: str, number: int) -> Cell:
-        model = recoveries.planned(robot)
         if bank is None:
-            return recoveries.gait_cell(model, settings, number, chosen)
-        return recoveries.given_gait_cell(bank, model, number)
+            return recoveries.gait_cell(models[robot], settings, number, chosen)
+        return recoveries.given_gait_cell(bank, models[robot], number)
 
     def needs(point: Point) -> dict[str, Cell]:
         robot, seed = point["robot"], point["seed"]
@@ -201,24 +204,26 @@ def suite(
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score)
-    known = known_cases(bodies)
+    entries = {body: robot_entry(body) for body in bodies}
+    models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
+    known = {case for entry in entries.values() for case in entry.cases}
     for case in cases:
         if case not in known:
-            raise unknown_name("case of these bodies", str(case), map(str, known))
+            raise unknown_name("case of these bodies", str(case), map(str, sorted(known)))
     points: list[Point] = []
     for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
-        entry = robot_entry(body)
+        entry, robot = entries[body], entries[body].robot()
         check_score(chosen["score"], entry)
-        robot = entry.robot()
         hidden = plugins.design(controller, robot, neurons).hidden
         for case in cases:
             truth = entry.cases.get(case)
             # Controllers without hidden neurons have none that could fail.
             if truth and max(silent_neurons(parse(truth, robot.anatomy)), default=-1) < hidden:
-                points.append({**_point(body, case, truth, gap, seed), "comparator": comparator})
+                point = _point(models[body], case, truth, gap, seed)
+                points.append({**point, "comparator": comparator})
     design = {"controller": controller, "neurons": neurons}
     shared = {**_shared(settings, kinds, chosen), **design, "comparator": comparator, "gap": gap}
-    return _study("suite", folder, points, shared, _one_gait(settings, chosen, **design))
+    return _study("suite", folder, points, shared, _one_gait(models, settings, chosen, **design))
 
 
 def paper(
@@ -249,21 +254,27 @@ def paper(
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
         comparator_choice(comparator)
     chosen = repair_parameters(plugins.PAPER, None, None)
+    models = {robot: recoveries.planned(robot, ROBOTS[robot]) for robot in robots}
     points = [
-        {**_point(robot, case, ROBOTS[robot].cases[case], 0.0, seed), "comparator": way}
+        {**_point(models[robot], case, ROBOTS[robot].cases[case], 0.0, seed), "comparator": way}
         for seed, robot, case in itertools.product(seeds, robots, cases)
         for way in (*comparators, ON_ROBOT)
     ]
     shared = {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False}
-    return _study("paper", folder, points, shared, _one_gait(settings, chosen))
+    return _study("paper", folder, points, shared, _one_gait(models, settings, chosen))
 
 
-def _one_gait(settings: Settings, repair: Mapping[str, str], **design: Any) -> Needs:  # noqa: ANN401  # name and neurons
+def _one_gait(
+    models: Mapping[str, Mapping[str, str]],
+    settings: Settings,
+    repair: Mapping[str, str],
+    **design: Any,  # noqa: ANN401  # name and neurons
+) -> Needs:
     """Returns the needs of a recovery: the gait of its robot and seed."""
 
     @cache
     def gait(robot: str, seed: int) -> Cell:
-        return recoveries.gait_cell(recoveries.planned(robot), settings, seed, repair, **design)
+        return recoveries.gait_cell(models[robot], settings, seed, repair, **design)
 
     return lambda point: {"gait": gait(point["robot"], point["seed"])}
 
@@ -277,19 +288,17 @@ def _study(
     *,
     function: str = "recover",
 ) -> Study:
-    """Returns a study at points, which get their models and names.
+    """Returns a study at points, which get their names.
 
     Raises:
         InputError: A gap is out of range, or two robots would have the same file names.
     """
-    planned = cache(recoveries.planned)
     named: dict[str, Point] = {}
-    for given in points:
-        if not 0 <= given["gap"] <= MAX_GAP_LEVEL:
+    for point in points:
+        if not 0 <= point["gap"] <= MAX_GAP_LEVEL:
             raise InputError(
-                f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {given['gap']}"
+                f"expected a gap from 0 to {MAX_GAP_LEVEL}, such as 0.05, got {point['gap']}"
             )
-        point = {**planned(given["robot"]), **given}
         other = named.setdefault(_name(point), point)["robot"]
         if other != point["robot"]:
             raise InputError(
@@ -299,8 +308,10 @@ def _study(
     return Study(name, folder, f"{recoveries.__name__}:{function}", named, shared, needs)
 
 
-def _point(robot: str, case: int | None, truth: str, gap: float, seed: int) -> dict[str, Any]:
-    return {"robot": robot, "case": case, "truth": truth, "gap": gap, "seed": seed}
+def _point(
+    model: Mapping[str, str], case: int | None, truth: str, gap: float, seed: int
+) -> dict[str, Any]:
+    return {**model, "case": case, "truth": truth, "gap": gap, "seed": seed}
 
 
 def _name(run: Point) -> str:
@@ -355,11 +366,10 @@ def _check(
 
 
 def _failures(
-    robot: str, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
+    robot: str, entry: Entry, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
 ) -> list[tuple[int | None, str]]:
     """Returns the failures of a robot: the number in Table I, or None, and the notation."""
-    entry, searched = robot_entry(robot), plugins.kinds(kinds)
-    anatomy = entry.robot().anatomy
+    searched, anatomy = plugins.kinds(kinds), entry.robot().anatomy
     HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
     for case in cases or ():
         if case not in entry.cases:

@@ -66,9 +66,9 @@ Rows = dict[str, list[Row]]
 """Rows by the name of their table."""
 
 
-def planned(robot: str) -> dict[str, str]:
+def planned(name: str, entry: Entry) -> dict[str, str]:
     """Returns the parameters of a cell that determine its robot, which its worker loads."""
-    return {"robot": robot, "model": model_digest(robot_entry(robot).robot())}
+    return {"robot": name, "model": model_digest(entry.robot())}
 
 
 def planned_entry(parameters: Parameters) -> Entry:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.arguments import robot_entry
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from selfmodel.studies.plans import ablation, bodies_of, known_cases, paper, suite
@@ -154,7 +155,7 @@ def test_a_body_whose_model_changed_is_another_cell(
     ):
         for name, text in (files | changed).items():
             (tmp_path / name).write_text(text)
-        models.add(planned("biped.xml")["model"])
+        models.add(planned("biped.xml", robot_entry("biped.xml"))["model"])
 
     assert len(models) == 3
 
