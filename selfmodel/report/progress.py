@@ -8,7 +8,7 @@ from pathlib import Path
 
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.errors import WorkError
+from selfmodel.errors import InputError, WorkError
 from selfmodel.evolution import Generation
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.results import Search, write_searches
@@ -119,6 +119,6 @@ class Progress:
             if self._trials:
                 error.add_note(f"the finished trials are in {self.folder}")
             if self._begun:
-                with suppress(OSError, WorkError):  # the first error is the one to report
+                with suppress(OSError, WorkError, InputError):  # the first error is the one to report
                     write_searches(self.folder, self.searches)
             raise
