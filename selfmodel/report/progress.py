@@ -119,6 +119,6 @@ class Progress:
             if self._trials:
                 error.add_note(f"the finished trials are in {self.folder}")
             if self._begun:
-                with suppress(OSError, WorkError, InputError):  # the first error is the one to report
+                with suppress(OSError, WorkError, InputError):  # the first error counts
                     write_searches(self.folder, self.searches)
             raise
