@@ -198,7 +198,7 @@ def subject_of_run(
         diagnoses=diagnoses,
         comparator=comparator_choice(comparator)(robot, [*healthy, *explained]).comparator,
         calibration=calibration,
-        result=file and file.result,
+        result=None if file is None else file.result,
         searches=read_searches(folder),
         made_with=logs[0].software,
         threads=count,
