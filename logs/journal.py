@@ -26,7 +26,7 @@ OPTIONS = "options.json"
 
 @dataclass(frozen=True, eq=False)
 class FolderJournal:
-    """Journal of a recovery in a folder, which ``create_journal`` makes; see ``recovery.Journal``.
+    """Journal of a recovery in a folder, which ``create_journal`` makes.
 
     Attributes:
         folder: Folder with ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.

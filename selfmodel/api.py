@@ -376,7 +376,7 @@ def recover(
         simulator=Simulator(robot, count),
         choose_comparator=arguments.comparator_choice(comparator),
         run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
-        journal=journal,
+        store_diagnosis=journal.add,
         settings=chosen,
         seed=seed,
         on_event=on_event,

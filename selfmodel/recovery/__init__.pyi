@@ -6,7 +6,6 @@ from .map_elites import (
 )
 from .next_trial import by_disagreement as by_disagreement
 from .recover import (
-    Journal as Journal,
     NextTrial as NextTrial,
     RecoveryLoop as RecoveryLoop,
     by_repair as by_repair,

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -42,14 +42,6 @@ RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 """Runs a physical trial and returns it; with a log, as read back from the log."""
 
 
-class Journal(Protocol):
-    """Storage of the diagnoses of a recovery; ``RunTrial`` stores its trials."""
-
-    def add(self, diagnosis: Diagnosis) -> None:
-        """Stores a diagnosis after the earlier ones."""
-        ...
-
-
 def by_repair(loop: "RecoveryLoop") -> Controller:
     """Returns the best candidate of the repair that was not tried yet, or a mutant of the best."""
     candidates = [candidate.controller for candidate in loop.repaired()]
@@ -68,7 +60,7 @@ class RecoveryLoop:
             chosen with the failing trial as well.
         run_trial: Runs and logs a physical trial. The trial that ``run_trial`` returns is all that
             the algorithm observes of the robot.
-        journal: Storage of the diagnoses.
+        store_diagnosis: Stores a diagnosis after the earlier ones; ``run_trial`` stores the trials.
         settings: The paper's numbers.
         seed: Seed of all random choices.
         on_event: Callback, called with each event as it happens.
@@ -89,7 +81,7 @@ class RecoveryLoop:
     simulator: Simulator
     choose_comparator: ComparatorChoice
     run_trial: RunTrial
-    journal: Journal
+    store_diagnosis: Callable[[Diagnosis], None]
     settings: Settings
     seed: int
     on_event: Callable[[Event], None]
@@ -105,19 +97,12 @@ class RecoveryLoop:
     rng: np.random.Generator = field(init=False)
 
     def run(self, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
-        """Runs the recovery, once.
+        """Runs the recovery, once, with a robot before its failure and after it.
 
         The robot walks with a gait that was evolved in simulation, and the self-model is fitted to
         the log. It fails, and the same gait is logged again. Then diagnosis and trial alternate:
         the diagnosis explains all logs since the failure, and the next trial tries a controller
         that the repair evolved in simulation for the diagnosed robot.
-
-        Args:
-            healthy: Physical robot before the failure.
-            damaged: Physical robot after the failure.
-
-        Returns:
-            The trials, the last diagnosis and the number of evaluations.
         """
         self._begin()
         gait = self.gait or self._evolve_gait()
@@ -210,7 +195,7 @@ class RecoveryLoop:
         number, known = len(self.known.diagnoses) + 1, self.known
         rng = random_stream(self.seed, "diagnosis", number)
         diagnosis = self._search(known.evidence, known.hypotheses, rng, self.on_event)
-        self.journal.add(diagnosis)
+        self.store_diagnosis(diagnosis)
         self.known = replace(known, diagnoses=(*known.diagnoses, diagnosis))
         self.rng = random_stream(self.seed, "choice", number)
         self.on_event(diagnosis)

@@ -119,7 +119,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         run_trial=TrialRunner(
             journal.trials, robot, experiment.settings, hidden=hidden, gap=reality.text
         ),
-        journal=journal,
+        store_diagnosis=journal.add,
         settings=experiment.settings,
         seed=experiment.seed,
         on_event=on_event,

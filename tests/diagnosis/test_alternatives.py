@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import DetectableSeverity, UnsearchedFault
 from selfmodel.diagnosis.losses import LossFunction
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
@@ -26,13 +25,9 @@ from selfmodel.faults.kind import ENVIRONMENT, Fault
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS
 from selfmodel.faults.world import PAYLOAD
-from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.studies.experiment import draw_reality
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.trial import Stage, Trial, TrialPlan
 from tests.diagnosis.synthetic import Synthetic
-from tests.helpers.memory import in_memory
 
 PIECES = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
@@ -281,14 +276,6 @@ def test_only_losses_clearly_worse_than_the_best_show():
 
     assert rows.pop(KNEE) is not None
     assert set(rows.values()) == {None}
-
-
-def trial(robot: Robot, truth: str, gait: Controller, stage: Stage, number: int) -> Trial:
-    """A trial across a small reality gap."""
-    reality = draw_reality(robot, 3, 0.03)
-    physical = reality.robot(robot, parse(truth, robot.anatomy), stream=number)
-    plan = TrialPlan(f"{number:02d}-{stage}", stage, gait, SMALL.steps, 0)
-    return in_memory(robot)(physical, plan)
 
 
 def test_parts_with_a_fault_are_left_out():

@@ -1,6 +1,5 @@
-"""Physical trials and a journal in memory, for tests of the algorithm without files."""
+"""Physical trials in memory, for tests of the algorithm without files."""
 
-from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery.recover import RunTrial
 from selfmodel.robot.robot import Robot
@@ -16,14 +15,3 @@ def in_memory(robot: Robot) -> RunTrial:
         return Trial(plan, robot.name, collect(robot.anatomy.names, samples), plan.name)
 
     return run_trial
-
-
-class MemoryJournal:
-    """Journal that keeps diagnoses in memory; see ``selfmodel.recovery.Journal``."""
-
-    def __init__(self) -> None:
-        self.diagnoses: list[Diagnosis] = []
-
-    def add(self, diagnosis: Diagnosis) -> None:
-        """Stores a diagnosis."""
-        self.diagnoses.append(diagnosis)

@@ -156,7 +156,7 @@ def loop_of(
         Trial(TrialPlan(f"{i:02d}-after", "after", one, 1, 0), robot.name, empty, f"{i:02d}-after")
         for i, one in enumerate(tried)
     ]
-    unused = dict.fromkeys(("choose_comparator", "run_trial", "journal"))
+    unused = dict.fromkeys(("choose_comparator", "run_trial", "store_diagnosis"))
     loop = RecoveryLoop(
         simulator=Simulator(robot, 1), settings=SMALL, seed=0, on_event=on_event, **unused
     )

@@ -49,7 +49,7 @@ from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 from tests.helpers.hostile import lacking
-from tests.helpers.memory import MemoryJournal, in_memory
+from tests.helpers.memory import in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
 TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
@@ -93,7 +93,7 @@ def recovery(
     parts = {
         "choose_comparator": comparator_choice(FORWARD_DISPLACEMENT),
         "run_trial": in_memory(robot),
-        "journal": MemoryJournal(),
+        "store_diagnosis": lambda _diagnosis: None,
         "settings": TINY,
         "seed": 5,
         "on_event": lambda _event: None,
@@ -119,19 +119,20 @@ def watched(quadruped: Robot) -> SimpleNamespace:
             super().__init__(length, draw, settings, rng, seeds)
 
     events: list[Event] = []
-    simulator, journal = Watched(quadruped), MemoryJournal()
+    simulator, diagnoses = Watched(quadruped), []
     batches: list[tuple[Event, set[Hypothesis]]] = []
     simulator.on_run = lambda runs: batches.append((events[-1], {fault for fault, _ in runs}))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("selfmodel.recovery.repair.Evolution", Spy)
         patch.setattr("selfmodel.diagnosis.search.Evolution", Spy)
-        outcome = recovery(quadruped, simulator=simulator, journal=journal, on_event=events.append)
+        kept = {"store_diagnosis": diagnoses.append, "on_event": events.append}
+        outcome = recovery(quadruped, simulator=simulator, **kept)
     return SimpleNamespace(
         outcome=outcome,
         events=events,
         batches=batches,
         seen=simulator.seen,
-        diagnoses=journal.diagnoses,
+        diagnoses=diagnoses,
         started=started,
     )
 
@@ -215,7 +216,7 @@ def test_the_logs_are_all_that_is_known_and_what_they_hide_changes_nothing(
         journal = create_journal(tmp_path / name, quadruped.anatomy, calibrated=False)
         run_trial = TrialRunner(journal.trials, quadruped, TINY, hidden)
         few = dataclasses.replace(TINY, trials=1)
-        given = {"run_trial": run_trial, "journal": SimpleNamespace(add=journal.add)}
+        given = {"run_trial": run_trial, "store_diagnosis": journal.add}
         outcomes.append(recovery(quadruped, settings=few, sealed=False, **given))
         journals.append(journal)
 

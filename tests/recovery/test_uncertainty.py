@@ -17,8 +17,6 @@ from selfmodel.recovery.uncertainty import (
     MIN_EFFECTIVE,
     MODELS,
     Posterior,
-    _path,
-    _track,
     assumed_uncertainty,
     estimated_uncertainty,
     flattened_weights,
@@ -189,15 +187,6 @@ def test_a_base_that_was_missed_for_some_steps_is_interpolated(
     assert np.ptp(whole) > 0.05
     np.testing.assert_allclose(some, whole, atol=0.02)
     np.testing.assert_allclose(none, 1 / len(none))
-
-
-def test_a_path_has_forward_and_sideways_position_and_heading_at_the_marks():
-    turn = np.linspace(0, 4, 101)  # more than half a turn
-    position = np.column_stack([np.sin(turn), 1 - np.cos(turn), np.full(101, 0.3)])
-    orientation = np.column_stack([np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)])
-    marks = slice(20, 101, 20)
-    expected = [position[marks, 0], position[marks, 1], turn[marks]]
-    np.testing.assert_allclose(_path(_track(position, orientation)), np.concatenate(expected))
 
 
 def test_the_healthy_trial_is_simulated_without_the_fault(
