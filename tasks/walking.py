@@ -150,7 +150,7 @@ class Walk(base.Task):
         model, data = physics.model.ptr, physics.data.ptr
         if self._start_level > 0:
             spread = start_spread(self._start_level)
-            randomize_initial_pose(self._robot, model, data, spread, rng)
+            randomize_initial_pose(self._robot, data, spread, rng)
         simulated.place_debris(model, data, self._limbs)
         super().initialize_episode(physics)
         self._start = self._end = self._forward(physics)

@@ -150,7 +150,7 @@ class SimulatedRobot:
             rng = np.random.default_rng(child)
             measurement = NoisyMeasurement(gap.level, robot, variant, rng)
             data = mujoco.MjData(variant.model)
-            randomize_initial_pose(robot, variant.model, data, start_spread(gap.level), rng)
+            randomize_initial_pose(robot, data, start_spread(gap.level), rng)
             place_debris(variant.model, data, self._limbs)
             start = data.qpos[np.newaxis]
         rollout = Rollout(

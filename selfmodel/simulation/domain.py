@@ -6,7 +6,7 @@ approximately.
 Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,13 +22,9 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
 from selfmodel.simulation.model_factors import ModelDistribution, Parameters, model_with_parameters
 
-ANGLE_DEVIATION = 0.2
-"""Standard deviation of the initial joint angles, rad, at a gap level of 1."""
-
-TILT_DEVIATION = 0.1
-"""Standard deviation of the initial roll and pitch of the base, rad, at a gap level of 1."""
-
-_SEEDS = 2**63
+ANGLE_DEVIATION, TILT_DEVIATION = 0.2, 0.1
+"""Standard deviations of the initial joint angles, and of the initial roll and pitch of the base,
+rad, at a gap level of 1."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +110,7 @@ def draw_samples(
             hypotheses[(first + number) % len(hypotheses)],
             uncertainty.models.draw(rng),
             int(rng.choice(uncertainty.delays)),
-            None if certain else int(rng.integers(_SEEDS)),
+            None if certain else int(rng.integers(2**63)),
         )
         for number in range(count)
     )
@@ -131,31 +127,28 @@ def initial_positions(
     if spread != NO_SPREAD:
         for data, condition in zip(states, conditions, strict=True):
             rng = np.random.default_rng((condition.seed or 0, 0))
-            randomize_initial_pose(robot, data.model, data, spread, rng)
+            randomize_initial_pose(robot, data, spread, rng)
     return np.array([data.qpos for data in states])
 
 
 def randomize_initial_pose(
-    robot: Robot,
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    spread: StartSpread,
-    rng: np.random.Generator,
+    robot: Robot, data: mujoco.MjData, spread: StartSpread, rng: np.random.Generator
 ) -> None:
     """Moves a robot from its reference pose to a random pose nearby, above the ground.
 
     Joint angles stay within their limits. Welded joints and the heading are unchanged, and so are
-    degrees of freedom that the base does not have, such as the tilt of a planar base. ``model`` is
-    that of the robot with its faults, and ``data`` its state in the reference pose.
+    degrees of freedom that the base does not have, such as the tilt of a planar base. ``data`` is
+    the reference pose of the robot with its faults.
     """
+    model = data.model
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
-    reference_depth = _penetration_depth(robot, model, data)
+    reference_depth = _penetration_depth(robot, data)
     randomize_joint_angles(robot.anatomy, model, data, spread.angles, rng)
     tilt = np.append(spread.tilt * rng.standard_normal(2), 0.0)
     base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
     # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
-    depth = _penetration_depth(robot, model, data)
+    depth = _penetration_depth(robot, data)
     lift = [0.0, 0.0, max(0.0, depth - reference_depth)]
     write({"base_position": (current_value(fields["base_position"], data) + lift)[np.newaxis]})
 
@@ -180,11 +173,12 @@ def _is_welded(model: mujoco.MjModel, hinge: str) -> bool:
     return bool(model.dof_armature[model.joint(hinge).dofadr[0]] == WELD_ARMATURE)
 
 
-def _penetration_depth(robot: Robot, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+def _penetration_depth(robot: Robot, data: mujoco.MjData) -> float:
     """Returns the depth of the robot's deepest contact with the world, m; 0 without a contact.
 
     It is negative for a contact within its margin.
     """
+    model = data.model
     mujoco.mj_fwdPosition(model, data)
     root = model.body(robot.root).id
     roots = model.body_rootid[model.geom_bodyid[data.contact.geom]]
@@ -202,34 +196,32 @@ def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray
     return result
 
 
-class ReadingNoise:
-    """Adds noise to the readings of a batch of runs, by condition, step by step.
+def reading_noise(
+    anatomy: Anatomy,
+    variants: Sequence[ModelVariant],
+    conditions: Sequence[DomainSample],
+    uncertainty: DomainDistribution,
+) -> Callable[[FloatArray], None]:
+    """Returns a function that adds the noise of the next step to readings, ``(runs, sensors)``.
 
     The noise of a condition is the same in all its runs (common random numbers); dead sensors have
     none. The runs of the conditions are in turn in each group of adjacent rows.
     """
+    silent = np.array([dead_sensors(anatomy, variant) for variant in variants])
+    generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
+    deviations = np.where(silent, 0.0, uncertainty.reading_noise)
+    wrong_touches = np.where(silent, 0.0, uncertainty.wrong_touches)
+    count, sensors = silent.shape
 
-    def __init__(
-        self,
-        anatomy: Anatomy,
-        variants: Sequence[ModelVariant],
-        conditions: Sequence[DomainSample],
-        uncertainty: DomainDistribution,
-    ) -> None:
-        silent = np.array([dead_sensors(anatomy, variant) for variant in variants])
-        self._generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
-        self._deviations = np.where(silent, 0.0, uncertainty.reading_noise)
-        self._wrong = np.where(silent, 0.0, uncertainty.wrong_touches)
-
-    def add(self, readings: FloatArray) -> None:
-        """Adds the noise of the next step to the readings, ``(runs * conditions, sensors)``."""
-        count, sensors = self._deviations.shape
+    def add(readings: FloatArray) -> None:
         by_condition = readings.reshape(len(readings) // count, count, sensors)
-        uniform = np.array([rng.random(sensors) for rng in self._generators])
-        normal = np.array([rng.standard_normal(sensors) for rng in self._generators])
-        by_condition += self._deviations * normal
-        wrong = uniform < self._wrong
+        uniform = np.array([rng.random(sensors) for rng in generators])
+        normal = np.array([rng.standard_normal(sensors) for rng in generators])
+        by_condition += deviations * normal
+        wrong = uniform < wrong_touches
         by_condition[:, wrong] = 1 - by_condition[:, wrong]
+
+    return add
 
 
 def dead_sensors(anatomy: Anatomy, variant: ModelVariant) -> BoolArray:

@@ -21,8 +21,8 @@ from selfmodel.robot.state import bind_data, state_writer, with_known_base
 from selfmodel.simulation.domain import (
     DomainDistribution,
     DomainSample,
-    ReadingNoise,
     initial_positions,
+    reading_noise,
 )
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
@@ -157,7 +157,7 @@ class Simulator:
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            disturb=ReadingNoise(robot.anatomy, variants, conditions, uncertainty).add,
+            disturb=reading_noise(robot.anatomy, variants, conditions, uncertainty),
         )
         return flat.grouped(count, len(conditions))
 

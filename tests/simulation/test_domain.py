@@ -159,7 +159,7 @@ def started(
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = build(robot, parse(text, robot.anatomy)).model
     data = mujoco.MjData(model)
-    randomize_initial_pose(robot, model, data, start_spread(level), np.random.default_rng(seed))
+    randomize_initial_pose(robot, data, start_spread(level), np.random.default_rng(seed))
     mujoco.mj_forward(model, data)
     return model, data
 
