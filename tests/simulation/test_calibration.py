@@ -15,7 +15,7 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
-from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
+from selfmodel.simulation.fit import consistent_information
 from selfmodel.simulation.model_factors import (
     FACTORS,
     MAX_LOG_FACTOR,
@@ -341,10 +341,3 @@ def test_slopes_without_their_noise_are_fisher_information():
     np.testing.assert_allclose(np.diag(found), np.diag(expected), rtol=0.5)
     assert np.abs(consistent_information(*noise)).max() < 2000  # 0.02 of the noise squared
     assert np.linalg.eigvalsh(consistent_information(slopes, -slopes)).min() >= -1e-9
-
-
-def test_a_parameter_is_determined_if_the_trials_halve_its_variance():
-    prior = np.array([0.15, 0.3])
-
-    assert is_determined(UNDETERMINED_SHARE * prior * 0.99, prior).all()
-    assert not is_determined(UNDETERMINED_SHARE * prior * 1.01, prior).any()

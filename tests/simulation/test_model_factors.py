@@ -66,13 +66,9 @@ LEGS = """
 </mujoco>
 """
 NAMED = {"upper": 'name="upper"', "lower": 'name="lower"', "still": 'name="still"'}
-UNNAMED = dict.fromkeys(NAMED, "")
 WAYS = {
     "from the geoms": {},
-    "of bodies without a name": UNNAMED,
-    "by a full matrix": {
-        "inertial": '<inertial mass="3" pos="0 0 .02" fullinertia=".1 .2 .15 .01 .02 .03"/>'
-    },
+    "of bodies without a name": dict.fromkeys(NAMED, ""),
     "by a turned diagonal": {
         "inertial": '<inertial mass="3" pos="0 0 .02" euler="10 20 30" diaginertia=".1 .2 .15"/>'
     },

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.faults.build import apply_faults
-from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import draw_gap
 from selfmodel.recovery.recover import random_stream
 from selfmodel.robot.robot import Robot
@@ -20,9 +18,7 @@ from selfmodel.simulation.reality_gap import (
     RealityGap,
     perturbed_model,
 )
-from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from tests.helpers.drivers import random_controllers
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 DRAWS = 400
@@ -142,25 +138,6 @@ def test_a_weaker_servo_aims_at_the_same_angle():
         forces.append(data.actuator_force)
 
     np.testing.assert_allclose(forces[1], 0.5 * forces[0])
-
-
-def test_perturbed_self_models_share_a_batch(robot: Robot):
-    """An ensemble of self-models runs any hypothesis, and each goes another way."""
-    simulator = Simulator(robot, 1)
-    (controller,) = random_controllers(robot, 1)
-    texts = ["intact", f"break:{robot.anatomy.joints[0].name}"]
-    ends = []
-    for seed in range(2):
-        model = perturbed_model(robot.model, drawn(0.1, seed, robot))
-        simulator._variant = lambda hypothesis, model=model: apply_faults(
-            model, robot.anatomy, hypothesis
-        )
-        runs = [(parse(text, robot.anatomy), controller) for text in texts]
-        outcome = simulator.run(runs, 60, ["base_position"])
-        assert not outcome.diverged.any()
-        ends.append(outcome.trajectory["base_position"][:, -1])
-
-    assert not np.isclose(ends[0], ends[1], atol=1e-6, rtol=0).all(axis=1).any()
 
 
 def test_the_gap_is_drawn_from_a_stream_of_its_own():

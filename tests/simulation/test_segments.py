@@ -62,7 +62,7 @@ def test_where_the_base_was_seen_they_are_spread_over_the_trial_with_all_of_the_
     assert set(found.segments.states) == set(found.observed) == set(STATE)
 
 
-@pytest.mark.parametrize("lost", [BASE, BASE[:1], BASE[1:]], ids=["both", "place", "velocity"])
+@pytest.mark.parametrize("lost", [BASE[:1], BASE[1:]], ids=["place", "velocity"])
 def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[Signal, ...]):
     found = observed_segments(QUADRUPED, lacking(WHOLE, lost))
 
@@ -125,7 +125,7 @@ def test_none_is_predicted_under_commands_that_are_not_known(lost: tuple[Signal,
     assert len(found) >= fewest
 
 
-@pytest.mark.parametrize("phase", range(0, 20, 3))
+@pytest.mark.parametrize("phase", [0, 7])
 def test_a_log_that_is_late_every_twentieth_step_serves(phase: int):
     noisy = lacking(WHOLE, BASE)
     late = np.arange(STEPS) % 20 == phase
