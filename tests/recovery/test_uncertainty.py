@@ -123,7 +123,7 @@ def posterior(
 
 def test_models_that_predict_the_path_weigh_more():
     repeats = np.random.default_rng(0).normal(0, 0.1, (16, 3))
-    paths = np.array([[1.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0], [np.nan] * 3])
+    paths = np.array([[1.0, 0, 0], [0.5, 0, 0], [-1.0, 0, 0], [np.nan] * 3])
     found = log_likelihood(np.array([1.0, 0, 0]), paths, repeats, np.zeros(3))
 
     assert found[0] > found[1] > found[2] >= found[3]
