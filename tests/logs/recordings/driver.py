@@ -1,46 +1,25 @@
-"""A robot's driver: records a simulated trial as ROS 2 would record a real one.
-
-The physics is stepped here, so that the joints can be sampled at a rate that the control loop does
-not have; between two physics steps MuJoCo's integrator moves them along a line, so sampling that
-line at a jittered time invents nothing.
-"""
+"""A robot's driver: records a simulated trial as ROS 2 would record a real one."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import Controller, make_batch
-from selfmodel.faults.build import build
-from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import SensorReader, signal_fields
+from selfmodel.trials.rotation import rotated
+from selfmodel.trials.trajectory import Trajectory
 from tests.logs.recordings.bags import T0, Item, joint_state, odometry, wrench, write_bag
 
 JOINT_PERIOD, JITTER, JOINT_LATENCY = 0.005, 0.0004, 0.002
-ODOMETRY_PERIOD, ODOMETRY_LATENCY = 0.02, 0.015
+ODOMETRY_LATENCY = 0.015
 COMMAND_LATENCY = 0.0005
-BEFORE, AFTER = 0.1, 0.05
-"""Seconds that are recorded before the first command, while the robot is held in its start pose,
-and after the trial, while the controller goes on."""
+BEFORE = 0.1
+"""Seconds that are recorded before the first command, while the robot is held in its start pose."""
 
 
-def record(
-    folder: Path, robot: Robot, hidden: Hypothesis, controller: Controller, steps: int
-) -> Path:
-    """Drives a robot and writes the bag: joints at 200 Hz, odometry at 50, the rest at its own.
-
-    Args:
-        folder: The bag.
-        robot: The robot as its model describes it.
-        hidden: What is wrong with it.
-        controller: What drives it.
-        steps: Control steps.
-    """
-    more = round(AFTER / robot.control_timestep)
-    return write_bag(folder, _driven(robot, hidden, controller, steps + more))
+def record(folder: Path, robot: Robot, trial: Trajectory) -> Path:
+    """Writes the bag of a trial: joints at 200 Hz with jitter, the rest at its own rate."""
+    return write_bag(folder, [*_commands(robot, trial), *_joints(robot, trial), *_odometry(trial)])
 
 
 def mapping(robot: Robot, steps: int, controller: str | None) -> str:
@@ -65,84 +44,50 @@ def mapping(robot: Robot, steps: int, controller: str | None) -> str:
     )
 
 
-def _driven(robot: Robot, hidden: Hypothesis, controller: Controller, steps: int) -> Iterator[Item]:
-    variant = build(robot, hidden)
-    model, data = variant.model, mujoco.MjData(variant.model)
-    mujoco.mj_forward(model, data)
-    senses = SensorReader(model, robot.anatomy, [variant])
-    brain = make_batch([controller], [variant.silent_neurons], len(robot.anatomy.sensors))
-    where = signal_fields(robot)
-    states: list[dict[str, FloatArray]] = []
-
-    def look() -> None:
-        states.append(
-            {
-                signal: getattr(data, place.field)[place.columns].copy()
-                for signal, place in where.items()
-            }
-        )
-
-    look()
+def _commands(robot: Robot, trial: Trajectory) -> Iterator[Item]:
     motors = [_told(motor) for motor in robot.anatomy.motors]
     touches = [sensor.name for sensor in robot.anatomy.sensors if sensor.kind == "touch"]
-    for k in range(steps):
-        senses.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], brain.readings)
-        brain.step(data.ctrl[np.newaxis])
-        stamp = T0 + round(k * robot.control_timestep * 1e9)
+    for time, commands, readings in zip(
+        trial.time, trial["commands"], trial["sensors"], strict=True
+    ):
+        stamp = _stamp(time)
         late = stamp + round(COMMAND_LATENCY * 1e9)
-        yield "/joint_commands", late, joint_state(stamp, motors, data.ctrl)
-        for name, touched in zip(touches, brain.readings[0], strict=False):  # touch comes first
+        yield "/joint_commands", late, joint_state(stamp, motors, commands)
+        for name, touched in zip(touches, readings, strict=False):  # touch comes first
             yield f"/foot/{name}", late, wrench(stamp, (0, 0, 10 * touched))
-        for _ in range(robot.substeps if k + 1 < steps else 0):
-            mujoco.mj_step(model, data)
-            look()
-    rows = {signal: np.array([state[signal] for state in states]) for signal in where}
-    held = round(BEFORE / float(model.opt.timestep))
-    rows = {
-        signal: np.concatenate([values[:1]] * held + [values]) for signal, values in rows.items()
-    }
-    time = (np.arange(len(states) + held) - held) * float(model.opt.timestep)
-    yield from _joints(robot, time, rows)
-    yield from _odometry(time, rows)
 
 
-def _joints(robot: Robot, time: FloatArray, rows: dict[str, FloatArray]) -> Iterator[Item]:
+def _joints(robot: Robot, trial: Trajectory) -> Iterator[Item]:
     rng = np.random.default_rng(0)
-    due = np.arange(time[0] + JITTER, time[-1] - JITTER, JOINT_PERIOD)
-    taken = due + rng.uniform(-JITTER, JITTER, len(due))
+    due = np.arange(JITTER - BEFORE, trial.time[-1] - JITTER, JOINT_PERIOD)
     hinges = range(len(robot.anatomy.hinges))
     order = rng.permutation(len(hinges))
     names = [_told(robot.anatomy.hinges[k]) for k in order]
-    signs = np.array([_sign(k) for k in hinges])
-    offsets = np.array([_offset(k) for k in hinges])
-    for t in taken:
-        stamp = T0 + round(t * 1e9)
+    signs, offsets = (np.array([of(k) for k in hinges]) for of in (_sign, _offset))
+    for time in due + rng.uniform(-JITTER, JITTER, len(due)):
         at, speed = (
-            np.array([np.interp(t, time, rows[signal][:, k]) for k in hinges])
+            np.array([np.interp(time, trial.time, column) for column in trial[signal].T])
             for signal in ("joint_positions", "joint_velocities")
         )
-        late = stamp + round((JOINT_LATENCY + rng.exponential(0.0005)) * 1e9)
+        late = _stamp(time + JOINT_LATENCY + rng.exponential(0.0005))
         position, velocity = signs * (at - offsets), signs * speed
-        yield "/joint_states", late, joint_state(stamp, names, position[order], velocity[order])
+        state = joint_state(_stamp(time), names, position[order], velocity[order])
+        yield "/joint_states", late, state
 
 
-def _odometry(time: FloatArray, rows: dict[str, FloatArray]) -> Iterator[Item]:
-    for k in range(0, len(time), round(ODOMETRY_PERIOD / (time[1] - time[0]))):
-        stamp = T0 + round(time[k] * 1e9)
-        turned, child = rows["base_orientation"][k], np.zeros(3)
-        backward = turned * [1, -1, -1, -1]
-        mujoco.mju_rotVecQuat(child, rows["base_linear_velocity"][k], backward)
-        yield (
-            "/odom",
-            stamp + round(ODOMETRY_LATENCY * 1e9),
-            odometry(
-                stamp,
-                rows["base_position"][k],
-                turned,
-                child,
-                rows["base_angular_velocity"][k],
-            ),
-        )
+def _odometry(trial: Trajectory) -> Iterator[Item]:
+    held = np.arange(-BEFORE, 0, trial.time[1])
+    rows = np.concatenate([np.zeros(len(held), dtype=int), np.arange(trial.steps)])
+    for time, k in zip([*held, *trial.time], rows, strict=True):
+        turned = trial["base_orientation"][k]
+        linear = rotated(trial["base_linear_velocity"][k], turned * [1, -1, -1, -1])
+        spin, place = trial["base_angular_velocity"][k], trial["base_position"][k]
+        message = odometry(_stamp(time), place, turned, linear, spin)
+        yield "/odom", _stamp(time + ODOMETRY_LATENCY), message
+
+
+def _stamp(seconds: float) -> int:
+    return T0 + round(seconds * 1e9)
 
 
 def _told(name: str) -> str:
