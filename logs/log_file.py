@@ -247,10 +247,7 @@ def verified_records(data: bytes) -> Iterator[mcap.McapRecord]:
 
 
 def _check(
-    record: mcap.McapRecord,
-    data: bytes,
-    end: int,
-    counts: Mapping[type[mcap.McapRecord], int],
+    record: mcap.McapRecord, data: bytes, end: int, counts: Mapping[type[mcap.McapRecord], int]
 ) -> None:
     """Checks what mcap does not, of a record that ends at an offset of the file."""
     match record:

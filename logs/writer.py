@@ -36,11 +36,7 @@ FLUSH_STEPS = 50
 
 
 def write_trial(
-    path: Path,
-    robot: Robot,
-    plan: TrialPlan,
-    samples: Iterable[Sample],
-    header: TrialHeader,
+    path: Path, robot: Robot, plan: TrialPlan, samples: Iterable[Sample], header: TrialHeader
 ) -> Path:
     """Writes the log of a trial while the trial runs; see ``TrialWriter``.
 

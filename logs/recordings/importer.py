@@ -10,29 +10,13 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
+from selfmodel.logs.recordings import resample
 from selfmodel.logs.recordings.bags import read_bag
 from selfmodel.logs.recordings.mapping import TIMES, Trial
 from selfmodel.logs.recordings.mapping_file import RecordingMapping, check_recording, check_robot
 from selfmodel.logs.recordings.quality import Quality, notes, quality
 from selfmodel.logs.recordings.recording import TABLE, IntArray, Recording
-from selfmodel.logs.recordings.resample import (
-    NOTHING,
-    Clocked,
-    ClocksApartError,
-    Method,
-    Track,
-    angles,
-    at_steps,
-    clocked,
-    hold,
-    hold_forever,
-    hold_outside_gaps,
-    linear,
-    reach,
-    slerp,
-    slerp_or_sample,
-    track,
-)
+from selfmodel.logs.recordings.resample import NOTHING, Clocked, Method, Track, at_steps
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
@@ -92,12 +76,7 @@ class ImportedTrial:
 
 
 def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> ImportedTrial:
-    """Returns the trial in a recording.
-
-    Args:
-        path: Folder or file of a bag, or a table; see ``is_table``.
-        mapping: Mapping from topics or columns to the parts of the robot.
-        robot: Robot that the mapping names.
+    """Returns the trial in a bag or a table of the robot that a mapping names.
 
     Raises:
         InputError: The recording is damaged or cannot be read, or the mapping does not fit it or
@@ -137,18 +116,14 @@ def write_recording(
     mapping: RecordingMapping,
     controller: Controller | None,
 ) -> Path:
-    """Writes a recording as the log of a trial.
+    """Writes a recording as the log of a trial, with the text of its mapping.
 
     Args:
         path: Name of the log; it must not exist.
         robot: Robot as its model describes it.
         recording: Trial in the recording.
-        mapping: Mapping of the import; the log contains its text.
+        mapping: Mapping of the import.
         controller: Controller of the robot; if not given, a playback of the recorded commands.
-
-    Raises:
-        InputError: The file exists, or the controller does not fit the robot.
-        LogWriteError: The disk is full, or failed.
     """
     trajectory = recording.trajectory
     driver = controller or Playback(robot.anatomy.motors, trajectory["commands"])
@@ -190,8 +165,8 @@ def _clocks(mapping: RecordingMapping, recording: Recording, clock: str) -> dict
     clocks = {}
     for place in mapping.places.values():
         try:
-            clocks[place.topic] = clocked(recording.series[place.topic], clock)
-        except ClocksApartError as error:
+            clocks[place.topic] = resample.clocked(recording.series[place.topic], clock)
+        except ValueError as error:
             raise mapping.error(
                 (*place.role, "topic"),
                 f'{place.topic}: {error}: set clock = "log" to use the log times',
@@ -207,7 +182,9 @@ def _tracks(
     for key, place in mapping.places.items():
         columns = recording.series[place.topic].columns
         known = [columns[name] for name in place.columns if name in columns]
-        raw = track(clocks[place.topic], known, slice(*place.numbers)) if known else NOTHING
+        raw = (
+            resample.track(clocks[place.topic], known, slice(*place.numbers)) if known else NOTHING
+        )
         tracks[key] = raw.scaled(place.scale, place.offset)
     for name, touch in mapping.trial.touch.items():
         force = tracks["touch", name]
@@ -269,8 +246,7 @@ def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float) -> tuple[
         )
     if not 2 <= steps <= MAX_STEPS:
         raise mapping.error(
-            ("duration",),
-            f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration",
+            ("duration",), f"a trial has 2 to {MAX_STEPS} steps, got {steps}: set another duration"
         )
     return origin, np.rint(np.arange(steps) * period).astype(np.int64)
 
@@ -305,7 +281,10 @@ def _lasting(needed: Tracks) -> list[Track]:
         track
         for (quantity, _), track in needed.items()
         if quantity != "commands"
-        and (quantity != "joint_positions" or end - int(track.times[-1]) <= reach(track.times))
+        and (
+            quantity != "joint_positions"
+            or end - int(track.times[-1]) <= resample.reach(track.times)
+        )
     ]
 
 
@@ -327,43 +306,39 @@ def _signals(
     def angle(hinge: str) -> FloatArray:
         # Only the angle of a hinge without limits can wrap around.
         limited = robot.model.joint(hinge).limited[0]
-        return at("joint_positions", hinge, linear if limited else angles)
+        return at("joint_positions", hinge, resample.linear if limited else resample.angles)
 
     positions = np.concatenate([angle(hinge) for hinge in anatomy.hinges], axis=1)
     readings = np.full((len(steps), len(anatomy.sensors)), np.nan)
     for column, sensor in enumerate(anatomy.sensors):
         if ("sensors", sensor.name) in tracks:
-            readings[:, column] = at("sensors", sensor.name, hold_outside_gaps)[:, 0]
+            readings[:, column] = at("sensors", sensor.name, resample.hold_outside_gaps)[:, 0]
         elif sensor.kind == "angle":
             hinge = positions[:, anatomy.hinges.index(sensor.hinge)]
             readings[:, column] = (hinge - sensor.centre) / sensor.half_range
         elif ("touch", sensor.name) in tracks:
-            readings[:, column] = at("touch", sensor.name, hold)[:, 0]
+            readings[:, column] = at("touch", sensor.name, resample.hold)[:, 0]
     # A gyroscope measures the angular velocity; odometry derives it.
     turning = "imu" if len(tracks.get(("imu_angular_velocity", ""), NOTHING)) else "base"
     body = "imu" if trial.base is None else "base"
-    turned = slerp_or_sample if _keeps_samples(trial, body) else slerp
+    turned = resample.slerp_or_sample if _keeps_samples(trial, body) else resample.slerp
     pose = {
-        "base_position": at("base_position", "", linear, 3),
+        "base_position": at("base_position", "", resample.linear, 3),
         "base_orientation": at(f"{body}_orientation", "", turned, 4),
-        "base_linear_velocity": at("base_linear_velocity", "", linear, 3),
+        "base_linear_velocity": at("base_linear_velocity", "", resample.linear, 3),
     }
+    quantities = {"base_position": "base_position", "base_orientation": f"{body}_orientation"}
     observed = {
-        signal
-        for signal, quantity in (
-            ("base_position", "base_position"),
-            ("base_orientation", f"{body}_orientation"),
-        )
-        if len(tracks.get((quantity, ""), NOTHING))
+        signal for signal, name in quantities.items() if len(tracks.get((name, ""), NOTHING))
     }
     return {
         "joint_positions": positions,
-        "joint_velocities": all_of("joint_velocities", anatomy.hinges, linear),
-        "joint_efforts": all_of("joint_efforts", anatomy.hinges, linear),
-        "commands": all_of("commands", anatomy.motors, hold_forever),
+        "joint_velocities": all_of("joint_velocities", anatomy.hinges, resample.linear),
+        "joint_efforts": all_of("joint_efforts", anatomy.hinges, resample.linear),
+        "commands": all_of("commands", anatomy.motors, resample.hold_forever),
         "sensors": readings,
         **_in_frame(trial, pose, observed),
-        "base_angular_velocity": at(f"{turning}_angular_velocity", "", linear, 3),
+        "base_angular_velocity": at(f"{turning}_angular_velocity", "", resample.linear, 3),
     }
 
 

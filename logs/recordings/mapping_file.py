@@ -13,15 +13,7 @@ from msgspec import Struct
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.logs.recordings.mapping import (
-    NONE,
-    UNKNOWN,
-    VECTORS,
-    Angles,
-    Keys,
-    Place,
-    Trial,
-)
+from selfmodel.logs.recordings.mapping import NONE, UNKNOWN, VECTORS, Angles, Keys, Place, Trial
 from selfmodel.logs.recordings.messages import ARRAY, TYPES
 from selfmodel.logs.recordings.recording import TABLE, Recording
 from selfmodel.robot.anatomy import Anatomy

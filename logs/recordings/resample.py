@@ -35,10 +35,6 @@ class Clocked:
     latency: FloatArray
 
 
-class ClocksApartError(ValueError):
-    """The stamps of a topic and its log times are of different clocks."""
-
-
 @dataclass(frozen=True, eq=False)
 class Track:
     """Time series of one quantity; one without samples was not recorded.
@@ -71,27 +67,26 @@ def clocked(series: Series, clock: str) -> Clocked:
     Args:
         series: Messages of the topic.
         clock: ``header`` for stamps, with log times for messages without a stamp; else log times.
+
+    Raises:
+        ValueError: The stamps of the topic and its log times are of different clocks.
     """
     stamped = series.stamps > 0
     latency = (series.logged - series.stamps)[stamped] / 1e9
-    everything = np.ones(len(stamped), dtype=bool)
+    near = np.abs(latency) <= MAX_LATENCY
     apart = float(np.median(latency)) if len(latency) else 0.0
+    usable = np.ones(len(stamped), dtype=bool)
     if clock != "header":
-        usable_latency = latency if abs(apart) <= MAX_LATENCY else latency[:0]
-        return Clocked(series.logged, everything, 0, usable_latency)
+        known = latency if abs(apart) <= MAX_LATENCY else latency[:0]
+        return Clocked(series.logged, usable, 0, known)
     if abs(apart) > MAX_LATENCY:
-        raise ClocksApartError(
+        raise ValueError(
             f"the stamps and the times at which they were recorded are {abs(apart):.0f} s apart "
             f"(median), so they are of different clocks"
         )
-    usable = everything.copy()
-    usable[stamped] = np.abs(latency) <= MAX_LATENCY
-    return Clocked(
-        times=np.where(stamped, series.stamps, series.logged),
-        usable=usable,
-        fallbacks=int(np.sum(~stamped)),
-        latency=latency[np.abs(latency) <= MAX_LATENCY],
-    )
+    usable[stamped] = near
+    times = np.where(stamped, series.stamps, series.logged)
+    return Clocked(times, usable, int(np.sum(~stamped)), latency[near])
 
 
 def track(clock: Clocked, columns: Sequence[Column], numbers: slice) -> Track:
@@ -120,14 +115,10 @@ limit (``reach``): ``(steps, width)``."""
 
 
 def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: int) -> FloatArray:
-    """Returns a track at the control steps, ``(steps, width)``; NaN where it was not observed.
+    """Returns a track at times after the first step, the origin, ns; NaN where not observed.
 
-    Args:
-        track: The track.
-        origin: Time of the first step, ns.
-        steps: Times after the first step, ``(steps,)`` ns.
-        method: Interpolation, such as ``linear``.
-        width: Numbers of the quantity.
+    Returns:
+        Numbers of the quantity, ``(steps, width)``.
     """
     if not len(track):
         return np.full((len(steps), width), np.nan)
@@ -209,9 +200,8 @@ def hold_outside_gaps(
     times: FloatArray, values: FloatArray, at: FloatArray, limit: float
 ) -> FloatArray:
     """Returns the last sample before each step where ``linear`` has one."""
-    return np.where(
-        np.isnan(linear(times, values, at, limit)), np.nan, hold(times, values, at, np.inf)
-    )
+    unknown = np.isnan(linear(times, values, at, limit))
+    return np.where(unknown, np.nan, hold(times, values, at, np.inf))
 
 
 def _bracket(

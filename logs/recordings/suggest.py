@@ -55,9 +55,6 @@ def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
         robot: Robot of the recording.
         name: Name of the robot in the mapping, or its MJCF or URDF file.
         with_timestep: Whether the mapping must contain the control time step.
-
-    Raises:
-        InputError: The recording is damaged, or cannot be read.
     """
     offer = _in_table(path, robot) if is_table(path) else _in_bag(read_bag(path), robot)
     step = repr(robot.control_timestep)
@@ -94,11 +91,9 @@ def _lines(offer: _Offer, robot: Robot) -> Iterator[str]:
     yield from _table(offer, "imu", "  # CHECK: its axes must be those of the root body")
     sensors = names.get("sensor", {})
     certain = {k: v for k, v in _matched(anatomy.names.sensors, sensors).items() if v[1]}
-    yield from (
-        ["[sensors]", *(_entry(part, *found) for part, found in certain.items())]
-        if (certain)
-        else []
-    )
+    if certain:
+        yield "[sensors]"
+        yield from (_entry(part, *found) for part, found in certain.items())
     if not sensors:
         yield from _touches(offer, [s.name for s in anatomy.sensors if s.kind == "touch"])
 

@@ -25,6 +25,7 @@ from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
 from selfmodel.logs.controllers import NPZ_FAILURES
 from selfmodel.logs.files import create_file
 from selfmodel.logs.recordings.recording import (
+    MAX_TIME,
     TABLE,
     Column,
     Recording,
@@ -33,9 +34,6 @@ from selfmodel.logs.recordings.recording import (
     unpacked,
 )
 from selfmodel.trials.trajectory import Trajectory, columns_of
-
-MAX_TIME = 2**62
-"""Largest magnitude of a time, ns; sums still fit 64 bits."""
 
 _NO_TIME = np.iinfo(np.int64).min
 """Missing time among integers; numpy's missing date."""
@@ -57,8 +55,8 @@ def read_table(path: Path, wanted: Collection[str], *, time: str = "", unit: int
     Args:
         path: A file with a suffix of ``FORMATS``.
         wanted: Names of the columns to read; a name that the table does not have is left out.
-        time: Name of the time column; rows without a time are left out.
-        unit: Unit of its values, ns.
+        time: Name of the time column, whose unit is in ns; rows without a time are left out.
+        unit: That unit.
 
     Raises:
         InputError: The file cannot be read, a wanted column has no numbers or another length than
@@ -66,7 +64,7 @@ def read_table(path: Path, wanted: Collection[str], *, time: str = "", unit: int
     """
     _check_parquet(path)
     request = Message({"path": str(path), "wanted": sorted(wanted), "time": time, "unit": unit})
-    task = "selfmodel.logs.recordings.tables:read_in_child"
+    task = f"{__name__}:read_in_child"
     return unpacked(run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS))
 
 
@@ -380,10 +378,6 @@ def export(path: Path, trajectory: Trajectory) -> tuple[str, ...]:
 
     Returns:
         Names of the columns.
-
-    Raises:
-        InputError: The file exists, has another suffix, or needs a package that is missing.
-        LogWriteError: The disk is full, or failed.
     """
     write = writer_of(path)
     columns = columns_of(trajectory)

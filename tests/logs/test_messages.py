@@ -13,13 +13,7 @@ from rosbags.typesys.store import Typestore
 
 from selfmodel.arrays import FloatArray
 from selfmodel.logs.log_file import read_contents
-from selfmodel.logs.messages import (
-    description,
-    names_in,
-    schema_text,
-    topics,
-    transforms,
-)
+from selfmodel.logs.messages import description, names_in, schema_text, topics, transforms
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot

@@ -41,11 +41,7 @@ def line_of(text: str, mapping: str = MAPPING) -> int:
         ('robot = "biped.xml"', "robot = 3", "robot must be a text in quotes, got 3"),
         ("control_timestep = 0.01", "control_timestep = 0", "must be a number > 0.0, got 0"),
         ("control_timestep = 0.01", "control_timestp = 0.01", "did you mean control_timestep"),
-        (
-            "control_timestep = 0.01",
-            'stage = "befor"',
-            "unknown stage 'befor': did .* before",
-        ),
+        ("control_timestep = 0.01", 'stage = "befor"', "unknown stage 'befor': did .* before"),
         ("control_timestep = 0.01", "duration = true", "duration must be a number, got True"),
         ("control_timestep = 0.01", "duration = 1979-05-27", "a number, got datetime"),
         ("control_timestep = 0.01", f"start = {'9' * 5000}", "an integer has more than 64 bits"),

@@ -102,9 +102,7 @@ def test_the_right_fault_is_found_in_an_imported_trial(
     assert facts["topics"]["/odom"]["latency"] == pytest.approx(0.015)
     trial = read_log(log).trial
     diagnose = DiagnosticSearch(
-        Simulator(quadruped, threads=2),
-        DEFAULT,
-        Settings(generations=12).scaled(50),
+        Simulator(quadruped, threads=2), DEFAULT, Settings(generations=12).scaled(50)
     )
     diagnosis = diagnose([trial], [], np.random.default_rng(0), lambda _: None)
     assert diagnosis.best == truth
