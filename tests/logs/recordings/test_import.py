@@ -15,14 +15,10 @@ from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
 from tests.logs.conftest import MJCF
 from tests.logs.recordings.bags import (
-    ROS,
     T0,
     Item,
-    array,
     imu,
     joint_state,
-    odometry,
-    storage,
     trajectory,
     write_bag,
 )
@@ -184,72 +180,30 @@ def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, 
     assert json.loads(told["topics"])["/odom"]["latency"] == pytest.approx(0.015)
 
 
-SIX = ["LF_HAA", "LF_HFE", "LF_KFE", "RF_HAA", "RF_HFE", "RF_KFE"]
+def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
+    biped: Robot, tmp_path: Path
+):
+    rng, items = np.random.default_rng(3), without("/joint_states", recorded())
+    stamps = np.array([T0 + 5_000_000 * k for k in range(200) if not 100 <= k < 110])
+    stamps += np.rint(rng.normal(0, 300_000, len(stamps))).astype(int)
+    told = np.array([[angle(j, (stamp - T0) / 1e9) for j in range(4)] for stamp in stamps])
+    for stamp, row in zip(stamps.tolist(), told, strict=True):
+        state = joint_state(stamp, JOINTS[::-1], row[::-1], np.full(4, np.nan))
+        items.append(("/joint_states", stamp + 2_000_000, state))
+    recording = imported(write_bag(tmp_path / "bag", items), biped)
+    positions = recording.trajectory["joint_positions"]
 
-
-def jittery() -> list[Item]:
-    """Joints at 200 Hz with jitter, of which ten samples in a row are lost; no velocities."""
-    rng = np.random.default_rng(3)
-    items: list[Item] = []
-    for k in range(600):
-        stamp = T0 + k * 5_000_000 + round(rng.normal(0, 300_000))
-        angles = np.sin(k / 40 + np.arange(6))
-        if not 300 <= k < 310:
-            state = joint_state(stamp, SIX[::-1], angles[::-1], np.full(6, np.nan))
-            items.append(("/joint_states", stamp + 2_000_000, state))
-        if k % 4 == 0:
-            stamp = T0 + k * 5_000_000
-            items.append(("/odom", stamp + 15_000_000, odometry(stamp, (k / 600, 0, 0.5))))
-            items.append(("/joint_group_position_controller/commands", stamp, array(angles)))
-        items.append(("/imu/data", stamp, imu(stamp, (1, 0, 0, 0), (0, 0, 0), known=False)))
-    return items
-
-
-def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(tmp_path: Path):
-    bag = storage(write_bag(tmp_path / "bag", jittery()))
-    links = "".join(f'{name} = "{name}"\n' for name in SIX)
-    text = (
-        'robot = "six"\n[joints]\ntopic = "/joint_states"\nunit = "rad"\n'
-        f"[joints.names]\n{links}[commands]\nunit = 'rad'\n"
-        'topic = "/joint_group_position_controller/commands"\n'
-        'order = ["RF_HAA", "RF_HFE", "LF_HAA", "LF_HFE", "LF_KFE", "RF_KFE"]\n'
-        f'[commands.names]\n{links}[base]\ntopic = "/odom"\n[imu]\ntopic = "/imu/data"\n'
-    )
-    legs = "".join(
-        f'<body name="{name}"><joint name="{name}" range="-1 1"/><geom size="0.1"/></body>'
-        for name in SIX
-    )
-    motors = "".join(f'<position name="{name}" joint="{name}"/>' for name in SIX)
-    robot = Robot(
-        "six",
-        '<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody><body name="base">'
-        f'<freejoint/><geom size="0.1"/>{legs}</body></worldbody><actuator>{motors}</actuator>'
-        "</mujoco>",
-        0.01,
-    )
-    recording = import_recording(bag, parse_mapping(text, "MAP.toml"), robot)
-    trajectory = recording.trajectory
-
-    stamps, positions = [], []
-    with bag.open("rb") as file:
-        for schema, _, message in make_reader(file).iter_messages("/joint_states"):
-            told = ROS.deserialize_cdr(message.data, schema.name)
-            stamps.append(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec)
-            positions.append(told.position[[told.name.index(name) for name in SIX]])
-    at = recording.origin + np.arange(trajectory.steps) * 10_000_000
-    before = np.searchsorted(stamps, at, side="right") - 1
-    periods = np.diff(stamps)
-    unknown = (periods[before] > 1.5 * np.median(periods)) & (np.array(stamps)[before] != at)
+    at = recording.origin + np.arange(recording.trajectory.steps) * 10_000_000
+    before, periods = np.searchsorted(stamps, at, side="right") - 1, np.diff(stamps)
+    unknown = (periods[before] > 1.5 * np.median(periods)) & (stamps[before] != at)
     assert unknown.sum() == 5
-    assert np.array_equal(np.isnan(trajectory["joint_positions"]).all(axis=1), unknown)
-    assert np.array_equal(np.isnan(trajectory["joint_positions"]).any(axis=1), unknown)
-    seconds = (np.array(stamps) - recording.origin) / 1e9
-    for column in range(6):
-        expected = np.interp(trajectory.time, seconds, np.array(positions)[:, column])
-        found = trajectory["joint_positions"][:, column]
-        assert np.allclose(found[~unknown], expected[~unknown], rtol=0, atol=1e-12)
-    assert np.isnan(trajectory["joint_velocities"]).any()
-    assert np.isfinite(trajectory["base_position"]).all()
+    for marked in (np.isnan(positions).all(axis=1), np.isnan(positions).any(axis=1)):
+        assert np.array_equal(marked, unknown)
+    for column in (0, 2, 3):
+        expected = np.interp(at - T0, stamps - T0, told[:, column])
+        assert np.allclose(positions[~unknown, column], expected[~unknown], rtol=0, atol=1e-12)
+    assert np.isnan(recording.trajectory["joint_velocities"]).all()
+    assert np.isfinite(recording.trajectory["base_position"]).all()
     silent = f"/joint_states: silent for {periods.max() / 1e6:.0f} ms"
     assert any(note.startswith(silent) for note in recording.notes)
 
