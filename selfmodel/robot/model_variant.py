@@ -15,14 +15,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from selfmodel.arrays import FloatArray
-from selfmodel.robot.actuators import (
-    has_feedback,
-    length_per_angle,
-    motor_bodies,
-    motor_joints,
-    tendon_bodies,
-    tendon_joints,
-)
+from selfmodel.robot import actuators
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.contacts import can_touch, static_geoms
 
@@ -107,10 +100,10 @@ class ModelVariant:
         # A limit has a force if the initial pose, or an encoder error, is beyond the range.
         model.jnt_limited[joints] = 0
         for motor in range(model.nu):
-            if body in motor_bodies(model, motor):
+            if body in actuators.motor_bodies(model, motor):
                 self.release_motor(motor)
         for tendon in range(model.ntendon):
-            if body in tendon_bodies(model, tendon):
+            if body in actuators.tendon_bodies(model, tendon):
                 _slacken(model, tendon)
         for constraint in range(model.neq):
             if body in _constrained(model, constraint)[1]:
@@ -141,14 +134,14 @@ class ModelVariant:
         addresses = [address for address, _, _ in self.welded]
         welded = frozenset(np.flatnonzero(np.isin(model.jnt_qposadr, addresses)).tolist())
         for tendon in range(model.ntendon):
-            if tendon_joints(model, tendon) <= welded:
+            if actuators.tendon_joints(model, tendon) <= welded:
                 _slacken(model, tendon)
         for constraint in range(model.neq):
             joints, _ = _constrained(model, constraint)
             if joints and joints <= welded:
                 model.eq_active0[constraint] = 0
         for motor in range(model.nu):
-            moved = motor_joints(model, motor)
+            moved = actuators.motor_joints(model, motor)
             if moved and moved <= welded:
                 self.release_motor(motor)
 
@@ -163,7 +156,7 @@ class ModelVariant:
         for forces in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
             forces[motors] *= factor
         # A joint that several of the motors drive is scaled once.
-        joints = {joint for motor in motors for joint in motor_joints(self.model, motor)}
+        joints = {joint for motor in motors for joint in actuators.motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
 
     def shift_feedback(self, hinge: str, offset: float) -> None:
@@ -175,9 +168,9 @@ class ModelVariant:
         """
         model, joint = self.model, int(self.model.joint(hinge).id)
         for motor in range(model.nu):
-            if has_feedback(model, motor):
+            if actuators.has_feedback(model, motor):
                 bias = model.actuator_biasprm[motor]
-                bias[0] += bias[1] * length_per_angle(model, motor, joint) * offset
+                bias[0] += bias[1] * actuators.length_per_angle(model, motor, joint) * offset
 
     def scale_damping(self, hinge: str, factor: float) -> None:
         """Scales the viscous damping of a hinge.
@@ -281,7 +274,7 @@ def largest_torque(model: mujoco.MjModel, hinge: int) -> float:
     """
     torque = 0.0
     for motor in range(model.nu):
-        if hinge not in motor_joints(model, motor):
+        if hinge not in actuators.motor_joints(model, motor):
             continue
         if model.actuator_forcelimited[motor]:
             force = float(abs(model.actuator_forcerange[motor]).max())
@@ -412,8 +405,8 @@ def _constrained(model: mujoco.MjModel, constraint: int) -> tuple[frozenset[int]
     objects = [int(number) for number in ends if number >= 0]
     kind, nothing = int(model.eq_type[constraint]), frozenset[int]()
     if kind == _EQ_TENDON:
-        bodies = nothing.union(*(tendon_bodies(model, one) for one in objects))
-        return nothing.union(*(tendon_joints(model, one) for one in objects)), bodies
+        bodies = nothing.union(*(actuators.tendon_bodies(model, one) for one in objects))
+        return nothing.union(*(actuators.tendon_joints(model, one) for one in objects)), bodies
     if kind == _EQ_JOINT:
         return frozenset(objects), frozenset(model.jnt_bodyid[objects].tolist())
     if int(model.eq_objtype[constraint]) == _SITE:

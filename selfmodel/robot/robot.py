@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError, listed
+from selfmodel.robot import anatomy_reader
 from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS, motor_joints
 from selfmodel.robot.anatomy import (
     CONTROL_DELAY,
@@ -14,13 +15,6 @@ from selfmodel.robot.anatomy import (
     Anatomy,
     control_delay,
     custom_numeric,
-)
-from selfmodel.robot.anatomy_reader import (
-    driven_joints,
-    find_root_body,
-    joints_of_body,
-    read_anatomy,
-    reference_pose,
 )
 from selfmodel.robot.mujoco_errors import configure, loading_a_model
 
@@ -69,10 +63,10 @@ class Robot:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
         if not model.opt.timestep > 0:
             raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
-        root = find_root_body(model, driven_joints(model))
+        root = anatomy_reader.find_root_body(model, anatomy_reader.driven_joints(model))
         check_model(model, root)
         object.__setattr__(self, "model", model)
-        object.__setattr__(self, "anatomy", read_anatomy(model, root))
+        object.__setattr__(self, "anatomy", anatomy_reader.read_anatomy(model, root))
         object.__setattr__(self, "root", str(model.body(root).name))
         if not np.isclose(self.substeps * model.opt.timestep, self.control_timestep, rtol=1e-9):
             raise ValueError(
@@ -111,7 +105,7 @@ class Robot:
     @property
     def standing_height(self) -> float:
         """Height of the root body above the ground in the initial pose, m."""
-        position, _ = reference_pose(self.model, int(self.model.body(self.root).id))
+        position, _ = anatomy_reader.reference_pose(self.model, int(self.model.body(self.root).id))
         return float(position[2])
 
     @property
@@ -170,7 +164,7 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
                 f"expected finite numbers of at most {MAX_NUMBER:g} in the model's {name}, got "
                 f"{wrong[0]:g}"
             )
-    base_joints = joints_of_body(model, root)
+    base_joints = anatomy_reader.joints_of_body(model, root)
     for j in range(model.njnt):
         kind = int(model.jnt_type[j])
         if j not in base_joints and kind in _UNSUPPORTED_JOINTS:
@@ -252,11 +246,6 @@ def check_usable(model: mujoco.MjModel) -> None:
         raise InputError(
             f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
         )
-    if not model.nu:
-        raise InputError(
-            "the model has no actuators: give each joint that a motor is to drive an element in "
-            "<actuator>"
-        )
     tops = sorted({int(model.body_rootid[body]) for body in model.jnt_bodyid})
     if len(tops) > 1:  # a log contains the state of one robot
         raise InputError(
@@ -264,19 +253,20 @@ def check_usable(model: mujoco.MjModel) -> None:
             f"{listed([model.body(body).name for body in tops], 12)}: keep the robot, and remove "
             f"the other bodies or fix them to the world"
         )
-    driven = driven_joints(model)
+    driven = anatomy_reader.driven_joints(model)
     if not driven:
         raise InputError(
-            "the model's motors drive no joint, so no fault could be diagnosed: give the joints of "
-            "its limbs motors in <actuator>"
+            "the model has no actuators, or its motors drive no joint, so no fault could be "
+            "diagnosed: give the joints of its limbs motors in <actuator>"
         )
     try:
-        root = find_root_body(model, driven)
+        root = anatomy_reader.find_root_body(model, driven)
         check_model(model, root)
     except ValueError as error:
         raise InputError(str(error)) from error
+    base_joints = anatomy_reader.joints_of_body(model, root)
     for motor in range(model.nu):
-        for joint in motor_joints(model, motor).intersection(joints_of_body(model, root)):
+        for joint in motor_joints(model, motor).intersection(base_joints):
             raise InputError(
                 f"the motor {model.actuator(motor).name} drives {model.joint(joint).name} of the "
                 f"root body {model.body(root).name}, which only the limbs may move: remove the "

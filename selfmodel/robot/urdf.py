@@ -53,29 +53,19 @@ _REMEDIES = {
 
 _MAX_LISTED = 6
 
-_KEPT: Mapping[str, tuple[str, ...]] = {
-    "link": ("name",),
-    "inertial": (),
-    "origin": ("xyz", "rpy"),
-    "mass": ("value",),
-    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-    "visual": (),
-    "collision": (),
-    "geometry": (),
-    "box": ("size",),
-    "sphere": ("radius",),
-    "cylinder": ("radius", "length"),
-    "capsule": ("radius", "length"),
-    "mesh": ("filename", "scale"),
-    "material": ("name",),
-    "color": ("rgba",),
-    "joint": ("name", "type"),
-    "parent": ("link",),
-    "child": ("link",),
-    "axis": ("xyz",),
-    "limit": ("lower", "upper", "effort", "velocity"),
-    "dynamics": ("damping", "friction"),
-    "mimic": ("joint", "multiplier", "offset"),
+_KEPT: Mapping[str, list[str]] = {
+    tag: attributes
+    for tag, *attributes in map(
+        str.split,
+        (
+            *("link name", "inertial", "origin xyz rpy", "mass value"),
+            *("inertia ixx ixy ixz iyy iyz izz", "visual", "collision", "geometry", "box size"),
+            *("sphere radius", "cylinder radius length", "capsule radius length"),
+            *("mesh filename scale", "material name", "color rgba", "joint name type"),
+            *("parent link", "child link", "axis xyz", "limit lower upper effort velocity"),
+            *("dynamics damping friction", "mimic joint multiplier offset"),
+        ),
+    )
 }
 """Elements that are kept, with the attributes that are kept."""
 

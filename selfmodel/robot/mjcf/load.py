@@ -18,19 +18,12 @@ import mujoco
 from selfmodel.errors import InputError
 from selfmodel.files import encodable, read_file
 from selfmodel.isolation import Message, run_isolated
-from selfmodel.robot.mjcf import equipment, meshes, pose, structure
+from selfmodel.robot.mjcf import equipment, meshes, pose, structure, untrusted
 from selfmodel.robot.mjcf.settings import (
     MAX_CONTROL_TIMESTEP,
     MjcfSettings,
     checked_settings,
     read_settings,
-)
-from selfmodel.robot.mjcf.untrusted import (
-    MAX_TEXT,
-    InMemory,
-    named_files,
-    parse_xml,
-    robot_folder,
 )
 from selfmodel.robot.mjcf.work import Work, read_mjcf
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
@@ -63,7 +56,7 @@ def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     file = Path(path)
     # Settings made in Python have not been validated.
     checked = read_settings(file) if settings is None else checked_settings(asdict(settings))
-    data = read_file(file, "an MJCF or URDF file", MAX_TEXT)
+    data = read_file(file, "an MJCF or URDF file", untrusted.MAX_TEXT)
     request = Message({"path": str(file), "settings": asdict(checked)}, {"file": data})
     try:
         return _robot(run_isolated(f"{_MODULE}:adapt_message", request, what="the model"))
@@ -75,8 +68,8 @@ def adapt_message(request: Message) -> Message:
     """Task of a child process: adapts the file in a message."""
     path = Path(request.header["path"])
     settings = msgspec.convert(request.header["settings"], MjcfSettings)
-    root = parse_xml(request.buffers["file"])
-    files = robot_folder(path.parent, settings.assets)
+    root = untrusted.parse_xml(request.buffers["file"])
+    files = untrusted.robot_folder(path.parent, settings.assets)
     if root.tag == "robot":
         work = read_urdf(root, files, settings)
         work.settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
@@ -105,7 +98,8 @@ def adapt_text(
         InputError: The text cannot be a robot; the message has the reason and the remedy.
     """
     try:
-        return _robot(_adapted(name, read_mjcf(parse_xml(mjcf), InMemory(files), settings)))
+        root = untrusted.parse_xml(mjcf)
+        return _robot(_adapted(name, read_mjcf(root, untrusted.InMemory(files), settings)))
     except ValueError as error:
         raise _named(name, error) from error
 
@@ -122,7 +116,7 @@ def _named(source: str, error: ValueError) -> InputError:
 def _adapted(name: str, work: Work) -> Message:
     """Returns the robot's attributes; the steps are in an order in which each finds its needs."""
     try:
-        named_files(work.root, work.assets)  # before MuJoCo compiles the model
+        untrusted.named_files(work.root, work.assets)  # before MuJoCo compiles the model
     except InputError as error:
         raise InputError(
             f"the log of a trial contains the robot's model, and cannot contain this model: {error}"
@@ -155,7 +149,8 @@ def _adapted(name: str, work: Work) -> Message:
         equipment.limit_reach(work)
     equipment.add_command_ranges(work)
     attributes = {"name": name, "mjcf": work.text, "control_timestep": timestep}
-    return Message({**attributes, "notes": work.notes}, named_files(work.root, work.assets))
+    files = untrusted.named_files(work.root, work.assets)
+    return Message({**attributes, "notes": work.notes}, files)
 
 
 def _control_timestep(work: Work) -> float:

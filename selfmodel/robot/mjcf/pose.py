@@ -8,18 +8,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.anatomy_reader import (
-    common_carrier,
-    driven_joints,
-    floating_bodies,
-    joints_of_body,
-)
-from selfmodel.robot.contacts import (
-    contacts_enabled,
-    ground_contact_geoms,
-    static_geoms,
-    touching_geoms,
-)
+from selfmodel.robot import anatomy_reader as anatomy, contacts
 from selfmodel.robot.mjcf.settings import FORWARD_DIRECTIONS, NO_KEYFRAME
 from selfmodel.robot.mjcf.work import UniqueNames, Work, format_numbers
 from selfmodel.robot.model_variant import turned_by_hinge
@@ -30,9 +19,6 @@ STANDING_KEYFRAMES = ("home", "stand", "standing")
 
 STAND_CLEARANCE = 0.02
 """Distance between the ground and the lowest point that a robot on a stand can reach, m."""
-
-_POSE_TOLERANCE = 1e-9
-"""Largest difference of the new reference pose from the keyframe, m and unit quaternions."""
 
 _EQUALITY_TOLERANCE = 1e-6
 """Largest violation of an equality constraint in the keyframe, m or rad."""
@@ -46,21 +32,16 @@ _MAX_DISTANCE = 1e6
 _COUPLINGS = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
 """Equality constraints with a polynomial of the distances from the reference pose."""
 
-_OTHER_KEYFRAME = (
-    f"start the robot in another keyframe with keyframe=NAME, or in the reference pose with "
-    f"keyframe={NO_KEYFRAME}"
-)
-
 
 def free_base(work: Work) -> None:
     """Gives the root body of a fixed robot a free joint; a floating base stays as it is."""
     model = work.model
-    driven = driven_joints(model)
-    if not driven or floating_bodies(model, driven):
+    driven = anatomy.driven_joints(model)
+    if not driven or anatomy.floating_bodies(model, driven):
         return
     tops = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in driven}
     body = min(tops)
-    if len(tops) > 1 or joints_of_body(model, body):
+    if len(tops) > 1 or anatomy.joints_of_body(model, body):
         raise InputError(
             "base = 'free' needs one body of the world that carries all driven joints and has no "
             "joint, and the model has none: put the joints into one <body>"
@@ -77,8 +58,10 @@ def free_base(work: Work) -> None:
 def carry_hinges(work: Work) -> None:
     """Adds the root body of a fixed base if hinges are directly on bodies of the world."""
     model = work.model
-    driven = driven_joints(model)
-    if not driven or floating_bodies(model, driven) or common_carrier(model, driven):
+    driven = anatomy.driven_joints(model)
+    if not driven:
+        return
+    if anatomy.floating_bodies(model, driven) or anatomy.common_carrier(model, driven):
         return
     tops = {model.body(model.body_rootid[model.jnt_bodyid[joint]]).name for joint in driven}
     name = UniqueNames(element.get("name") for element in work.bodies()).new("base")
@@ -98,13 +81,8 @@ def bake_keyframe(work: Work) -> None:
     model = work.model
     number = _keyframe(model, work.settings.keyframe)
     qpos = np.array(model.qpos0 if number is None else model.key_qpos[number])
-    before = None
     if not np.array_equal(qpos, model.qpos0):
-        with loading_a_model():
-            before = mujoco.MjData(model)
-            before.qpos = qpos
-            mujoco.mj_fwdPosition(model, before)
-        _check_equalities(model, before)
+        _check_equalities(model, qpos)
         _place_at(work, model, qpos)
         for tendon, element in enumerate(work.children("tendon")):
             if model.tendon_stiffness[tendon]:  # the default depends on the reference pose
@@ -116,8 +94,6 @@ def bake_keyframe(work: Work) -> None:
                 element.set("polycoef", format_numbers(linear))
     for part in work.root.findall("keyframe"):
         work.root.remove(part)
-    if before is not None:
-        _check_pose(before, work.model)
     if number is not None:
         name = model.key(number).name or f"number {number}"
         work.notes.append(f"the initial pose is the keyframe {name}")
@@ -158,28 +134,21 @@ def _place_at(work: Work, model: mujoco.MjModel, qpos: np.ndarray) -> None:
     work.place_bodies(positions, orientations, references)
 
 
-def _check_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Checks that the new reference pose does not change the equality constraints."""
+def _check_equalities(model: mujoco.MjModel, qpos: np.ndarray) -> None:
+    """Checks that a new reference pose does not change the equality constraints."""
+    with loading_a_model():
+        data = mujoco.MjData(model)
+        data.qpos = qpos
+        mujoco.mj_fwdPosition(model, data)
     rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     violated = np.abs(data.efc_pos[: data.nefc][rows]) > _EQUALITY_TOLERANCE
     nonlinear = np.isin(model.eq_type, _COUPLINGS) & model.eq_data[:, 2:5].any(axis=1)
     if nonlinear.any() or violated.any():
         raise InputError(
-            f"equality constraints are violated in the keyframe, or are nonlinear: "
-            f"{_OTHER_KEYFRAME}"
+            f"equality constraints are violated in the keyframe, or are nonlinear: start the robot "
+            f"in another keyframe with keyframe=NAME, or in the reference pose with "
+            f"keyframe={NO_KEYFRAME}"
         )
-
-
-def _check_pose(before: mujoco.MjData, model: mujoco.MjModel) -> None:
-    """Checks that the bodies in the reference pose of a model have the poses of ``before``."""
-    after = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, after)
-    alignment = np.abs(np.sum(before.xquat * after.xquat, axis=1))
-    if not (
-        np.allclose(before.xpos, after.xpos, atol=_POSE_TOLERANCE)
-        and np.allclose(alignment, 1, atol=_POSE_TOLERANCE)
-    ):
-        raise InputError(f"the keyframe cannot be made the reference pose: {_OTHER_KEYFRAME}")
 
 
 def turn_forward(work: Work) -> None:
@@ -213,7 +182,7 @@ def _is_flat(model: mujoco.MjModel) -> bool:
     """Returns whether all static geoms that can be touched are level planes."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    ground = static_geoms(model) & touching_geoms(model)
+    ground = contacts.static_geoms(model) & contacts.touching_geoms(model)
     planes = model.geom_type[ground] == mujoco.mjtGeom.mjGEOM_PLANE
     normals = data.geom_xmat[ground][:, 2::3]
     return bool(planes.all() and np.allclose(normals, (0, 0, 1), rtol=0, atol=_LEVEL_TOLERANCE))
@@ -226,9 +195,9 @@ def fix_base(work: Work) -> None:
     which the robot cannot touch the ground if that is larger.
     """
     model, height = work.model, work.settings.base_height
-    driven = driven_joints(model)
-    floating = floating_bodies(model, driven)
-    root = floating[0] if floating else common_carrier(model, driven)
+    driven = anatomy.driven_joints(model)
+    floating = anatomy.floating_bodies(model, driven)
+    root = floating[0] if floating else anatomy.common_carrier(model, driven)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     wanted = float(data.xpos[root, 2]) if height is None else height
@@ -275,7 +244,7 @@ def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
     tops = heights + (vertical * centre).sum(axis=1) + (np.abs(vertical) * half).sum(axis=1)
     planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    ground = static_geoms(model) & touching_geoms(model)
+    ground = contacts.static_geoms(model) & contacts.touching_geoms(model)
     return float(np.where(planes, heights, tops)[ground].max(initial=-np.inf))
 
 
@@ -290,7 +259,7 @@ def _reach(model: mujoco.MjModel, root: int) -> float:
         if model.body_rootid[body] != model.body_rootid[root]:
             continue
         if body != root:
-            anchors = model.jnt_pos[joints_of_body(model, body)]
+            anchors = model.jnt_pos[anatomy.joints_of_body(model, body)]
             distance[body] = (
                 distance[model.body_parentid[body]]
                 + np.linalg.norm(model.body_pos[body])
@@ -309,11 +278,11 @@ def add_ground(work: Work) -> None:
     """
     model = work.model
     swims = model.opt.density or model.opt.viscosity
-    if swims or not contacts_enabled(model) or ground_contact_geoms(model):
+    if swims or not contacts.contacts_enabled(model) or contacts.ground_contact_geoms(model):
         return
-    if not floating_bodies(model, driven_joints(model)):
+    if not anatomy.floating_bodies(model, anatomy.driven_joints(model)):
         return
-    moving = ~static_geoms(model)
+    moving = ~contacts.static_geoms(model)
     contype, conaffinity = (
         int(np.bitwise_or.reduce(mask[moving], initial=0))
         for mask in (model.geom_contype, model.geom_conaffinity)
@@ -347,5 +316,5 @@ def lowest_point(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     """Returns the height of the lowest moving geom above geom 0, a plane at height 0, in m."""
     return min(
         float(mujoco.mj_geomDistance(model, data, 0, geom, _MAX_DISTANCE, None))
-        for geom in ground_contact_geoms(model)
+        for geom in contacts.ground_contact_geoms(model)
     )

@@ -24,7 +24,6 @@ from selfmodel.robot.mjcf.work import Work
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.exactness import exactness
@@ -44,14 +43,11 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
     before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
     robot = load_mjcf(path)
-    runs = [(INTACT, controller) for controller in random_controllers(robot, 2)]
-    outcome = Simulator(robot, 1).run(runs, STEPS, SIGNALS)
-    found = exactness(robot, INTACT, runs[0][1], STEPS)
+    (controller,) = random_controllers(robot, 1)
+    found = exactness(robot, INTACT, controller, STEPS)
 
-    assert found.prediction <= ROUNDING
+    assert found.prediction <= ROUNDING  # which no diverged state is
     assert found.displacement == 0.0
-    assert not outcome.diverged.any()
-    assert np.isfinite(outcome.trajectory["base_position"]).all()
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
@@ -79,7 +75,7 @@ def test_a_child_process_reads_a_file_and_gives_the_robot_or_the_refusal(
     path = AWKWARD["UTF-16"].write(tmp_path)
     here = adapt_message(Message({"path": str(path), "settings": {}}, {"file": path.read_bytes()}))
 
-    monkeypatch.delattr(load, "parse_xml")  # of this process
+    monkeypatch.delattr(load.untrusted, "parse_xml")  # of this process
     robot = load_mjcf(path)
 
     assert robot.mjcf == here.header["mjcf"]
