@@ -6,7 +6,7 @@ functions that they share take.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, dataclass_transform
 
 from selfmodel.faults.registry import ALL_KINDS, DEFAULT_KINDS, KIND_SETS, PAPER_KINDS
 from selfmodel.settings import Settings
@@ -18,14 +18,18 @@ LISTED = {"kinds": [kind.name for kind in ALL_KINDS], "sets": KIND_SETS, "stages
 """Names that texts of ``options.toml`` list."""
 
 
+@dataclass_transform(frozen_default=True, kw_only_default=True)
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """Options of every command."""
+    """Options of every command; each subclass is a dataclass."""
 
     as_json: bool = False
 
+    def __init_subclass__(cls) -> None:
+        """Makes a dataclass of the subclass."""
+        dataclass(frozen=True, kw_only=True)(cls)
 
-@dataclass(frozen=True, kw_only=True)
+
 class Robot(Command):
     """A robot, and the settings of its file."""
 
@@ -33,14 +37,12 @@ class Robot(Command):
     model_settings: list[str] | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Notation(Command):
     """Fault kinds that notation may name."""
 
     kinds: str = "all"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Simulated(Notation):
     """A logged trial, and what it is simulated with."""
 
@@ -50,7 +52,6 @@ class Simulated(Notation):
     threads: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class FromLogs(Command):
     """A diagnosis of logs."""
 
@@ -64,7 +65,6 @@ class FromLogs(Command):
     threads: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class Study(Command):
     """A study: its folder, its size, and where it is computed."""
 
@@ -92,7 +92,6 @@ class Study(Command):
         return range(self.seed, self.seed + self.seeds)
 
 
-@dataclass(frozen=True, kw_only=True)
 class Repair(Command):
     """The repair of a study's recoveries."""
 
@@ -102,7 +101,6 @@ class Repair(Command):
     only: str = "1/1"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Robots(Command):
     """List the robots; with ROBOT, its joints, sensors, motors, faults and cases of Table I."""
 
@@ -110,7 +108,6 @@ class Robots(Command):
     model_settings: list[str] | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Recover(Robot):
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
 
@@ -145,7 +142,6 @@ class Recover(Robot):
     report: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class RunTrial(Robot, Notation):
     """Run one trial of the simulated physical robot and write its log."""
 
@@ -160,7 +156,6 @@ class RunTrial(Robot, Notation):
     seed: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class Calibrate(Command):
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
 
@@ -176,7 +171,6 @@ class Calibrate(Command):
     threads: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class Diagnose(FromLogs):
     """Rank hypotheses by how well they predict logged trials, without a robot.
 
@@ -187,14 +181,12 @@ class Diagnose(FromLogs):
     files: list[Path]
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReplayTrial(Simulated):
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
 
     out: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Render(Simulated):
     """Draw a logged trial beside a simulation of the same controller.
 
@@ -209,7 +201,6 @@ class Render(Simulated):
     pictures: int = 6
 
 
-@dataclass(frozen=True, kw_only=True)
 class View(Simulated):
     """Open a logged trial in Rerun: the body as logged, and as simulated under a hypothesis.
 
@@ -221,7 +212,6 @@ class View(Simulated):
     port: int = 9876
 
 
-@dataclass(frozen=True, kw_only=True)
 class MakeReport(FromLogs):
     """Write a report of a run, of logs or of a campaign: one HTML file, which needs no network.
 
@@ -236,7 +226,6 @@ class MakeReport(FromLogs):
     diagnosis: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class MakeRepertoire(Robot):
     """Search for gaits with diverse duty factors of the feet, and keep the best of each cell.
 
@@ -253,14 +242,12 @@ class MakeRepertoire(Robot):
     threads: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class RepertoireInfo(Command):
     """Verify a repertoire file, and show its robot, its gaits and how it was made."""
 
     file: Path
 
 
-@dataclass(frozen=True, kw_only=True)
 class LogInfo(Command):
     """Show what logs contain, and how to open them in a viewer.
 
@@ -270,7 +257,6 @@ class LogInfo(Command):
     files: list[Path]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Verify(Command):
     """Verify checksums, counts, digests, layout, times, names and the model of logs.
 
@@ -281,7 +267,6 @@ class Verify(Command):
     expect: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
 class SalvageLog(Command):
     """Save the steps before the first damage of a log in a new, valid one."""
 
@@ -289,7 +274,6 @@ class SalvageLog(Command):
     out: Path
 
 
-@dataclass(frozen=True, kw_only=True)
 class ImportRecording(Command):
     """Import a recording of a robot as a trial log: a bag of ROS, without ROS, or a table."""
 
@@ -300,7 +284,6 @@ class ImportRecording(Command):
     robot: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ExportTable(Command):
     """Write the signals of a trial log as a table: one row per control step."""
 
@@ -308,7 +291,6 @@ class ExportTable(Command):
     out: Path
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ablate(Study, Repair):
     """Compare comparators on the same trials: robots x cases x gaps x seeds.
 
@@ -325,12 +307,10 @@ class Ablate(Study, Repair):
     bank: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ListSuite(Command):
     """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class RunSuite(Study, Repair):
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
 
@@ -348,7 +328,6 @@ class RunSuite(Study, Repair):
     steps: int | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class RepeatPaper(Study):
     """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown.
 
@@ -360,7 +339,6 @@ class RepeatPaper(Study):
     comparators: str = "forward-displacement,auto"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Compare(Command):
     """Compare the methods of a study by pairs: tests, intervals, marginal means, figures.
 

@@ -9,17 +9,10 @@ from selfmodel.cli.commands import Compare
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
-from selfmodel.studies import figures
+from selfmodel.studies import figures, tables as formats
 from selfmodel.studies.comparisons import LEVEL
 from selfmodel.studies.rows import LoadedStudy, load, whole
 from selfmodel.studies.study import Row
-from selfmodel.studies.tables import (
-    as_json as json_of,
-    check_format,
-    table_files,
-    table_of,
-    write_files,
-)
 
 COMPARISON = "comparison"
 """Folder of the files, in the folder of a study."""
@@ -27,44 +20,49 @@ COMPARISON = "comparison"
 
 def compare(options: Compare) -> None:
     """Compare the methods of a study by pairs: tests, intervals, marginal means, figures."""
-    check_format(options.table)
+    formats.check_format(options.table)
     if options.out is None and not options.study.is_dir():
         raise InputError(
             f"{options.study} is no folder of a study: give the folder of the tables, -o DIR"
         )
     found = load(options.study)
     pairs, means = found.comparisons(), found.marginal_means()
+    pair_rows, mean_rows = _records(pairs), _records(means)
     tables = [
-        table_of("rows", found.rows),
-        table_of("marginal-means", means, list(map(_mean_texts, _records(means))), texts=2),
-        table_of("comparisons", pairs, list(map(_pair_texts, _records(pairs))), texts=3),
+        formats.table_of("rows", found.rows),
+        formats.table_of("marginal-means", means, list(map(_mean_texts, mean_rows)), texts=2),
+        formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), texts=3),
     ]
-    content = table_files(tables, options.table) | figures.of_comparisons(pairs)
-    files = list(map(str, write_files(options.out or options.study / COMPARISON, content)))
+    content = formats.table_files(tables, options.table) | figures.of_comparisons(pairs)
+    folder = options.out or options.study / COMPARISON
+    files = list(map(str, formats.write_files(folder, content)))
     if options.as_json:
-        shown = {"comparisons": pairs, "marginal_means": means}
-        facts = {"study": found.kind, "rows": len(found.rows), "warnings": list(found.warnings())}
-        print_json(
-            json_of(facts | {n: _records(one) for n, one in shown.items()} | {"files": files}),
-            indent=1,
-        )
+        facts = {
+            "study": found.kind,
+            "rows": len(found.rows),
+            "warnings": list(found.warnings()),
+            "comparisons": pair_rows,
+            "marginal_means": mean_rows,
+            "files": files,
+        }
+        print_json(formats.as_json(facts), indent=1)
         return
-    _print_comparison(found, pairs, means)
+    _print_comparison(found, pair_rows, means)
     print_lines(*files)
 
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """Returns the rows of a frame of statistics; the names of a table as one text."""
-    return [{**row, "table": ", ".join(row["table"])} for row in json_of(frame.to_dict("records"))]
+    rows = formats.as_json(frame.to_dict("records"))
+    return [{**row, "table": ", ".join(row["table"])} for row in rows]
 
 
-def _print_comparison(study: LoadedStudy, pairs: pd.DataFrame, means: pd.DataFrame) -> None:
+def _print_comparison(study: LoadedStudy, found: list[Row], means: pd.DataFrame) -> None:
     """Prints the tables that are over all conditions; the files have the others too."""
     if not len(means):
         print_lines(f"{study.path}: {len(study.rows)} rows of one method: nothing to compare")
         return
     print_notes(*(f"warning: {warning}" for warning in study.warnings()))
-    found = _records(pairs)
     for name, own in groupby(_records(whole(means)), key=lambda row: row["table"]):
         print_lines(f"{name}:")
         texts = pd.DataFrame(map(_mean_texts, own)).drop(columns="table")

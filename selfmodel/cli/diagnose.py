@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 from selfmodel import arguments, plugins
 from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
@@ -14,20 +13,14 @@ from selfmodel.cli.output import counted, print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import print_tables, ranking_table
 from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis import text
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
-from selfmodel.diagnosis.direct_evidence import DirectEvidence, direct_evidence
-from selfmodel.diagnosis.text import (
-    detectable_sentences,
-    evidence_sentences,
-    fit_sentence,
-    verdict_sentences,
-)
+from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.trials.trial import trial_names
 
 
@@ -61,37 +54,24 @@ def diagnose(options: Diagnose) -> None:
     )
     if options.as_json:
         print_json(values_of(result))
-    else:
-        _print(values_of(result), diagnosis, evidence)
-
-
-def _print(
-    result: dict[str, Any], diagnosis: Diagnosis, evidence: Sequence[DirectEvidence]
-) -> None:
-    print_tables(ranking_table(result["diagnosis"]))
+        return
+    print_tables(ranking_table(values_of(result)["diagnosis"]))
     print_lines(
-        f"{result['robot']}, {counted(len(result['logs']), 'log')}, "
-        f"{result['comparator']}: {result['evaluations']} evaluations by the EA, "
-        f"{result['distinct_hypotheses']} distinct hypotheses, {result['seconds']:.1f} s.",
-        f"Comparator {result['comparator']}: {result['comparator_reason']}.",
-        verdict_sentences(diagnosis),
-        fit_sentence(diagnosis),
-        *detectable_sentences(diagnosis),
-        *evidence_sentences(evidence),
-        *(f"from before the failure, not explained: {Path(path)}" for path in result["intact"]),
+        f"{result.robot}, {counted(len(paths), 'log')}, {result.comparator}: "
+        f"{result.evaluations} evaluations by the EA, {result.distinct_hypotheses} distinct "
+        f"hypotheses, {result.seconds:.1f} s.",
+        f"Comparator {result.comparator}: {result.comparator_reason}.",
+        text.verdict_sentences(diagnosis),
+        text.fit_sentence(diagnosis),
+        *text.detectable_sentences(diagnosis),
+        *text.evidence_sentences(evidence),
+        *(f"from before the failure, not explained: {Path(one.path)}" for one in inputs.healthy),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class DiagnosedLogs:
-    """A diagnosis of logs, and what it was made of.
-
-    Attributes:
-        explained: Logs of the trials to explain, in order.
-        robot: The nominal robot.
-        inputs: Trials, comparator, calibration and search.
-        diagnosis: The diagnosis.
-    """
+    """A diagnosis of the logs to explain, in order, with the nominal robot."""
 
     explained: tuple[TrialLog, ...]
     robot: Robot
@@ -100,28 +80,25 @@ class DiagnosedLogs:
 
 
 def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
-    """Returns the diagnosis of logs; prints notes and progress on standard error.
-
-    Args:
-        files: The logs, in the order in which the trials were run.
-        options: How to diagnose them.
-
-    Raises:
-        InputError: A log cannot be used, or no comparator can judge all trials.
-    """
+    """Returns the diagnosis of logs; prints notes and progress on standard error."""
     kinds = plugins.kinds(options.kinds)
     comparator = arguments.comparator_choice(options.comparator)
     logs = arguments.read_logs(files)
     robot = arguments.robot_of_logs(logs, options.self_model)
     failed, healthy = by_stage([log.trial for log in logs])
     explained = [log for log in logs if log.trial in failed]
+    settings = explained[0].settings
+    if options.generations is not None:
+        settings = dataclasses.replace(settings, generations=options.generations)
+    if options.population is not None:
+        settings = settings.scaled(options.population)
     inputs = set_up_diagnosis(
         failed,
         healthy,
         robot=robot,
         choose_comparator=comparator,
         kinds=kinds,
-        settings=_settings(explained[0].settings, options),
+        settings=settings,
         seed=options.seed,
         calibrate=options.calibrate,
         threads=options.threads,
@@ -130,13 +107,6 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
     with display() as on_event:
         diagnosis = inputs.run(on_event)
     return DiagnosedLogs(tuple(explained), robot, inputs, diagnosis)
-
-
-def _settings(logged: Settings, options: FromLogs) -> Settings:
-    """Returns the settings of a log with the options that were given."""
-    if options.generations is not None:
-        logged = dataclasses.replace(logged, generations=options.generations)
-    return logged if options.population is None else logged.scaled(options.population)
 
 
 def _is_played_back(log: TrialLog) -> bool:

@@ -13,30 +13,29 @@ from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.output import counted, print_json, print_lines
 from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
-from selfmodel.logs import LogError, TrialLog
-from selfmodel.logs.inspection import Info, read_info, verify as check
-from selfmodel.logs.salvage import salvage as save, salvageable_steps
+from selfmodel.logs import LogError, inspection, salvage as salvaging
+
+_TRUTH = {
+    "hidden": "recorded in the log of a simulated robot; no diagnosis reads it",
+    "unknown": "not recorded",
+}
 
 
 def info(options: LogInfo) -> None:
     """Show what logs contain, and how to open them in a viewer."""
-    found = [_info_facts(path) for path in options.files]
+    found = [_info(path) for path in options.files]
     if options.as_json:
         print_json({"files": found})
     else:
         for one in found:
             _print_info(one)
         if any("error" not in one for one in found):
-            print_lines(*_viewers())
+            print_lines(
+                "To view a log:",
+                f"  Foxglove  Open local file; import the layout {layout_path()}",
+                "  Rerun     selfmodel view FILE.mcap   (pip install 'selfmodel[rerun]')",
+            )
     raise typer.Exit(1 if any("error" in one for one in found) else 0)
-
-
-def _viewers() -> tuple[str, ...]:
-    return (
-        "To view a log:",
-        f"  Foxglove  Open local file; import the layout {layout_path()}",
-        "  Rerun     selfmodel view FILE.mcap   (pip install 'selfmodel[rerun]')",
-    )
 
 
 def layout_path() -> Path:
@@ -45,42 +44,33 @@ def layout_path() -> Path:
         return path
 
 
-def _info_facts(path: Path) -> dict[str, Any]:
+def _info(path: Path) -> dict[str, Any]:
+    """Returns the summary of a log as JSON values, or its damage."""
     try:
-        return _as_object(path, read_info(path))
-    except LogError as error:
-        return _damage(path, error, salvageable_steps(path))
-    except InputError as error:
-        return _damage(path, error, 0)
-
-
-def _damage(path: Path, error: Exception, steps: int) -> dict[str, Any]:
-    return {
-        "file": str(path),
-        "error": str(error),
-        "kind": type(error).__name__,
-        "salvageable_steps": steps,
-    }
-
-
-def _as_object(path: Path, found: Info) -> dict[str, Any]:
-    trial = found.log.trial
-    displacement = trial.displacement
+        found = inspection.read_info(path)
+    except (LogError, InputError) as error:
+        is_log = isinstance(error, LogError)
+        return _error(path, error) | {
+            "salvageable_steps": salvaging.salvageable_steps(path) if is_log else 0
+        }
+    log, trial, timing = found.log, found.log.trial, found.log.timing
+    counts = ("late", "missing")
+    clock = timing and {name: int(getattr(timing, name).sum()) for name in counts}
     return {
         "file": str(path),
         "bytes": found.bytes,
         "robot": trial.robot,
         "trial": trial.plan.name,
         "stage": trial.plan.stage,
-        "status": found.log.status,
-        "reason": found.log.reason,
+        "status": log.status,
+        "reason": log.reason,
         "steps": trial.trajectory.steps,
         "planned_steps": trial.plan.steps,
-        "control_timestep": found.log.control_timestep,
+        "control_timestep": log.control_timestep,
         "seed": trial.plan.seed,
-        "displacement": displacement if math.isfinite(displacement) else None,
+        "displacement": trial.displacement if math.isfinite(trial.displacement) else None,
         "driver": found.driver,
-        "software": dict(found.log.software),
+        "software": dict(log.software),
         "topics": {
             name: {"type": topic.type, "messages": topic.messages, "rate": round(topic.rate, 3)}
             for name, topic in found.topics.items()
@@ -88,29 +78,23 @@ def _as_object(path: Path, found: Info) -> dict[str, Any]:
         "attachments": dict(found.attachments),
         "records": list(found.records),
         "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
-        "clock": _clock(found.log),
+        "clock": clock,
         "truth": "hidden" if found.has_truth else "unknown",
         "source": dict(found.source),
         "digest": found.digest,
     }
 
 
-def _clock(log: TrialLog) -> dict[str, int] | None:
-    if log.timing is None:
-        return None
-    return {"late": int(log.timing.late.sum()), "missing": int(log.timing.missing.sum())}
+def _error(path: Path, error: Exception) -> dict[str, Any]:
+    return {"file": str(path), "error": str(error), "kind": type(error).__name__}
 
 
 def _print_info(one: dict[str, Any]) -> None:
     if "error" in one:
-        print_lines(
-            f"error: {one['error']}",
-            f"complete steps that can be salvaged: {one['salvageable_steps']}",
-            "",
-        )
+        salvageable = f"complete steps that can be salvaged: {one['salvageable_steps']}"
+        print_lines(f"error: {one['error']}", salvageable, "")
         return
-    seconds = one["steps"] * one["control_timestep"]
-    dx = one["displacement"]
+    seconds, dx = one["steps"] * one["control_timestep"], one["displacement"]
     print_lines(
         f"{one['file']} ({one['bytes'] / 1000:.0f} kB)",
         f"trial {one['trial']} ({one['stage']}) of {one['robot']}, {one['status']}"
@@ -124,10 +108,7 @@ def _print_info(one: dict[str, Any]) -> None:
         f"SHA-256 {one['digest']}",
     )
     if clock := one["clock"]:
-        late, missing = (
-            counted(clock["late"], "step"),
-            counted(clock["missing"], "observation"),
-        )
+        late, missing = counted(clock["late"], "step"), counted(clock["missing"], "observation")
         print_lines(f"clock: {late} late, {missing} missing")
     for name, text in one["source"].items():
         print_lines(f"{name}: {text if len(text) <= 100 else text[:97] + '...'}")
@@ -136,21 +117,13 @@ def _print_info(one: dict[str, Any]) -> None:
         for name, topic in one["topics"].items()
     ]
     show(("topic", "type", "messages", "Hz"), rows, texts=2)
-    partly = {signal: share for signal, share in one["observed"].items() if share < 1}
-    print_lines(
-        "observed: everything"
-        if not partly
-        else "partly observed: "
-        + ", ".join(f"{signal} {share:.1%}" for signal, share in partly.items())
-    )
+    partly = [f"{name} {share:.1%}" for name, share in one["observed"].items() if share < 1]
     sizes = ", ".join(f"{name} {size / 1000:.1f} kB" for name, size in one["attachments"].items())
-    print_lines(f"attachments: {sizes}", "")
-
-
-_TRUTH = {
-    "hidden": "recorded in the log of a simulated robot; no diagnosis reads it",
-    "unknown": "not recorded",
-}
+    print_lines(
+        f"partly observed: {', '.join(partly)}" if partly else "observed: everything",
+        f"attachments: {sizes}",
+        "",
+    )
 
 
 def verify(options: Verify) -> None:
@@ -160,18 +133,19 @@ def verify(options: Verify) -> None:
             f"--expect is the SHA-256 of one log: give one log, got {len(options.files)}"
         )
     checked = [_checked(path, options.expect.lower()) for path in options.files]
+    good = all(one["ok"] for one in checked)
     if options.as_json:
-        print_json({"ok": all(one["ok"] for one in checked), "files": checked}, indent=None)
+        print_json({"ok": good, "files": checked}, indent=None)
     else:
         print_lines(*map(_line, checked))
-    raise typer.Exit(0 if all(one["ok"] for one in checked) else 1)
+    raise typer.Exit(0 if good else 1)
 
 
 def _checked(path: Path, expected: str) -> dict[str, Any]:
     try:
-        found = check(path, expected)
+        found = inspection.verify(path, expected)
     except (LogError, InputError) as error:
-        return {"file": str(path), "ok": False, "error": str(error), "kind": type(error).__name__}
+        return {"ok": False} | _error(path, error)
     return {
         "file": str(path),
         "ok": True,
@@ -184,19 +158,18 @@ def _checked(path: Path, expected: str) -> dict[str, Any]:
 
 
 def _line(one: dict[str, Any]) -> str:
-    if one["ok"]:
-        unloaded = "" if one["model_loaded"] else " (without MuJoCo, its model was not loaded)"
-        why = f" ({one['reason']})" if one["reason"] else ""
-        steps = counted(one["steps"], "step")
-        digest = f"SHA-256 {one['digest']}"
-        return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}; {digest}"
-    return f"error: {one['error']}"
+    if not one["ok"]:
+        return f"error: {one['error']}"
+    unloaded = "" if one["model_loaded"] else " (without MuJoCo, its model was not loaded)"
+    why = f" ({one['reason']})" if one["reason"] else ""
+    steps, digest = counted(one["steps"], "step"), f"SHA-256 {one['digest']}"
+    return f"ok: {one['file']}: {steps}, {one['status']}{why}{unloaded}; {digest}"
 
 
 def salvage(options: SalvageLog) -> None:
     """Save the steps before the first damage of a log in a new, valid one."""
     check_log_name(options.out)
-    saved = save(options.file, options.out)
+    saved = salvaging.salvage(options.file, options.out)
     if options.as_json:
         print_json({"source": str(options.file), **dataclasses.asdict(saved)}, indent=None)
         return

@@ -3,12 +3,11 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from selfmodel import arguments, plugins
-from selfmodel.cli.commands import MakeRepertoire, RepertoireInfo
+from selfmodel.cli.commands import Command, MakeRepertoire, RepertoireInfo
 from selfmodel.cli.inputs import check_new_file
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.faults.hypothesis import INTACT
@@ -37,10 +36,7 @@ def make(options: MakeRepertoire) -> None:
         on_filling=_notes(),
     )
     save_repertoire(options.out, repertoire)
-    _print(
-        {**_facts(options.out, repertoire), "simulated_steps": simulator.stats.steps},
-        as_json=options.as_json,
-    )
+    _print(options.out, repertoire, options, {"simulated_steps": simulator.stats.steps})
 
 
 def _notes() -> Callable[[Filling], None]:
@@ -62,32 +58,29 @@ def _notes() -> Callable[[Filling], None]:
 
 def info(options: RepertoireInfo) -> None:
     """Verify a repertoire file, and show its robot, its gaits and how it was made."""
-    _print(_facts(options.file, load_repertoire(options.file)), as_json=options.as_json)
+    _print(options.file, load_repertoire(options.file), options, {})
 
 
-def _facts(path: Path, repertoire: Repertoire) -> dict[str, Any]:
-    feet = repertoire.descriptors.shape[1]
-    return {
-        "repertoire": str(path),
-        **dataclasses.asdict(repertoire.origin),
-        "controller": repertoire.design.name,
-        "gaits": len(repertoire),
-        "feet": feet,
-        "cells": repertoire.origin.levels**feet,
-        "best": float(repertoire.scores[0]),
-        "median": float(np.median(repertoire.scores)),
-    }
-
-
-def _print(facts: dict[str, Any], *, as_json: bool) -> None:
-    if as_json:
-        print_json(facts)
+def _print(path: Path, repertoire: Repertoire, options: Command, more: dict[str, int]) -> None:
+    origin, feet, scores = repertoire.origin, repertoire.descriptors.shape[1], repertoire.scores
+    best, median = float(scores[0]), float(np.median(scores))
+    if options.as_json:
+        facts = {
+            "repertoire": str(path),
+            **dataclasses.asdict(origin),
+            "controller": repertoire.design.name,
+            "gaits": len(repertoire),
+            "feet": feet,
+            "cells": origin.levels**feet,
+            "best": best,
+            "median": median,
+        }
+        print_json(facts | more)
         return
     print_lines(
-        f"{facts['repertoire']}: {facts['gaits']} gaits of {facts['robot']}, one per cell of duty "
-        f"factors ({facts['feet']} feet, {facts['levels']} levels each)",
-        f"score of a gait in {facts['steps']} steps, m: best {facts['best']:.2f}, median "
-        f"{facts['median']:.2f}",
-        f"made from {facts['evaluations']} evaluations of a {facts['controller']} with seed "
-        f"{facts['seed']} by selfmodel {facts['version']}; model {facts['model'][:12]}",
+        f"{path}: {len(repertoire)} gaits of {origin.robot}, one per cell of duty factors "
+        f"({feet} feet, {origin.levels} levels each)",
+        f"score of a gait in {origin.steps} steps, m: best {best:.2f}, median {median:.2f}",
+        f"made from {origin.evaluations} evaluations of a {repertoire.design.name} with seed "
+        f"{origin.seed} by selfmodel {origin.version}; model {origin.model[:12]}",
     )

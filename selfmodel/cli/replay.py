@@ -32,33 +32,27 @@ units: some thousand roundings, before contacts amplify them."""
 WINDOWS = 10
 """Rows of the table of errors over time."""
 
-COLUMNS: tuple[tuple[Signal, str], ...] = (
-    ("base_position", "base, m"),
-    ("joint_positions", "joints, rad"),
-    ("joint_velocities", "joints, rad/s"),
-    ("commands", "commands"),
-    ("sensors", "sensors"),
-)
+COLUMNS: dict[Signal, str] = {
+    "base_position": "base, m",
+    "joint_positions": "joints, rad",
+    "joint_velocities": "joints, rad/s",
+    "commands": "commands",
+    "sensors": "sensors",
+}
+"""Signals in the table, and their titles."""
 
-LINES: tuple[tuple[Signal, str], ...] = (
-    ("base_position", "base position, m"),
-    ("joint_positions", "joint angles, rad"),
-    ("commands", "commands"),
-    ("sensors", "sensor readings"),
-)
+LINES: dict[Signal, str] = {
+    "base_position": "base position, m",
+    "joint_positions": "joint angles, rad",
+    "commands": "commands",
+    "sensors": "sensor readings",
+}
 """Signals in the figure, and their titles."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayedLog:
-    """A log, and what its trial is simulated with.
-
-    Attributes:
-        log: The log.
-        robot: The self-model.
-        hypothesis: The hypothesis to simulate.
-        threads: Threads of the physics; 0 for one per processor.
-    """
+    """A log, and what its trial is simulated with: self-model, hypothesis, and threads."""
 
     log: TrialLog
     robot: Robot
@@ -71,21 +65,13 @@ class ReplayedLog:
         return simulate(self.log.trial, self.hypothesis, simulator, tolerance)
 
     def drawable(self) -> Replay:
-        """Returns the simulation; see ``simulated``.
-
-        Raises:
-            InputError: A pose in the log is too large to draw.
-        """
+        """Returns the simulation; raises ``InputError`` if a pose is too large to draw."""
         check_magnitudes(self.log.trial, POSE)
         return self.simulated()
 
 
 def replayed_log(options: Simulated, hypothesis: str) -> ReplayedLog:
-    """Returns a log, and what its trial is simulated with.
-
-    Raises:
-        InputError: The log, the hypothesis or the model cannot be used.
-    """
+    """Returns a log, and what its trial is simulated with."""
     (log,) = arguments.read_logs([options.file])
     robot = arguments.robot_of_logs([log], options.self_model)
     assumed = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds)).parse(hypothesis)
@@ -132,28 +118,26 @@ def replay(options: ReplayTrial) -> None:
 
 
 def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
-    print_lines(
-        f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}, replayed as "
-        f"{result['hypothesis']}"
-    )
     logged, running = result["mujoco"].values()
     equal = f"differences below {TOLERANCE:g} count as equal."
-    if logged != running:
-        print_lines(f"The log was made with MuJoCo {logged}, this is {running}: {equal}")
-    if log.imported:
-        print_lines(f"The log was imported, and resampled: {equal}")
-    if found.diverged:
-        print_lines("The simulation diverged: with this hypothesis the model is unstable.")
-    if found.identical:
-        print_lines("identical: every observed number equals the simulated one, to the bit.")
-        return
     step = found.first_divergence_step
-    if step is None:
-        print_lines(f"equal at every step, within {result['tolerance']:g}.")
-    else:
+    end = f"equal at every step, within {result['tolerance']:g}."
+    if found.identical:
+        end = "identical: every observed number equals the simulated one, to the bit."
+    elif step is not None:
         time = step * log.control_timestep
-        print_lines(f"They differ from step {step} ({time:g} s). Root mean square difference:")
-    show(("time, s", *(title for _, title in COLUMNS)), _rows(log, found), texts=0)
+        end = f"They differ from step {step} ({time:g} s). Root mean square difference:"
+    sentences = {
+        f"{result['log']}: {counted(result['steps'], 'step')} of {result['robot']}, replayed as "
+        f"{result['hypothesis']}": True,
+        f"The log was made with MuJoCo {logged}, this is {running}: {equal}": logged != running,
+        f"The log was imported, and resampled: {equal}": log.imported,
+        "The simulation diverged: with this hypothesis the model is unstable.": found.diverged,
+        end: True,
+    }
+    print_lines(*(sentence for sentence, holds in sentences.items() if holds))
+    if not found.identical:
+        show(("time, s", *COLUMNS.values()), _rows(log, found), texts=0)
 
 
 def _rows(log: TrialLog, found: Replay) -> list[tuple[str, ...]]:
@@ -163,21 +147,14 @@ def _rows(log: TrialLog, found: Replay) -> list[tuple[str, ...]]:
     rows = []
     for k in range(windows):
         first, last = steps * k // windows, steps * (k + 1) // windows
-        errors = [found.rms(signal, slice(first, last)) for signal, _ in COLUMNS]
+        errors = [found.rms(signal, slice(first, last)) for signal in COLUMNS]
         texts = ("-" if math.isnan(error) else f"{error:.3g}" for error in errors)
         rows.append((f"{first * timestep:.2f}-{(last - 1) * timestep:.2f}", *texts))
     return rows
 
 
 def figure(log: TrialLog, found: Replay, hypothesis: str, kind: str) -> bytes:
-    """Returns a figure of the path of the base, logged and simulated, and of the errors.
-
-    Args:
-        log: The logged trial.
-        found: Its replay.
-        hypothesis: Notation of the simulated hypothesis.
-        kind: File format, such as ``png``.
-    """
+    """Returns a figure file of the path of the base, logged and simulated, and of the errors."""
     from matplotlib.figure import Figure  # noqa: PLC0415  # most replays draw nothing
 
     logged, simulated = log.trial.trajectory, found.simulated
@@ -187,7 +164,7 @@ def figure(log: TrialLog, found: Replay, hypothesis: str, kind: str) -> bytes:
     label = figure_text(f"simulated: {hypothesis}")
     path.plot(logged.time, simulated["base_position"][:, 0], "--", label=label)
     path.set_ylabel("base, forward, m")
-    for signal, title in LINES:
+    for signal, title in LINES.items():
         # Identical steps have an error of 0, which a logarithmic axis cannot show.
         shown = np.where(found.errors[signal] > 0, found.errors[signal], np.nan)
         error.plot(logged.time, shown, label=title)

@@ -11,10 +11,9 @@ from selfmodel.cli.output import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.files import write_new
-from selfmodel.report.campaign import is_campaign, report_of_campaign
+from selfmodel.report import campaign, subject as subjects
 from selfmodel.report.charts import REPORT, Report, html_of
 from selfmodel.report.content import report_of
-from selfmodel.report.subject import Subject, is_run, subject_of_logs, subject_of_run
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.trials.trial import trial_names
 
@@ -48,10 +47,11 @@ def report(options: MakeReport) -> None:
 
 
 def _of_folder(folder: Path, options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
-    if is_run(folder):
-        return report_of(subject_of_run(folder, options.threads, options.comparator, kinds))
-    if is_campaign(folder):
-        return report_of_campaign(folder)
+    if subjects.is_run(folder):
+        comparator = options.comparator
+        return report_of(subjects.subject_of_run(folder, options.threads, comparator, kinds))
+    if campaign.is_campaign(folder):
+        return campaign.report_of_campaign(folder)
     raise InputError(
         f"{folder}: expected the folder of a run with its trials and diagnoses.json, or of a "
         f"campaign with a table such as results.csv, got neither"
@@ -60,7 +60,7 @@ def _of_folder(folder: Path, options: MakeReport, kinds: Sequence[FaultKind]) ->
 
 def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
     if options.diagnosis is not None:
-        subject = subject_of_logs(
+        given = subjects.subject_of_logs(
             options.sources,
             options.diagnosis,
             robot=options.self_model,
@@ -68,9 +68,9 @@ def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
             comparator=options.comparator,
             kinds=kinds,
         )
-        return report_of(subject)
+        return report_of(given)
     found = diagnose_logs(options.sources, options)
-    subject = Subject(
+    made = subjects.Subject(
         name=", ".join(trial_names(found.inputs.damaged).values()),
         robot=found.robot,
         healthy=found.inputs.healthy,
@@ -81,4 +81,4 @@ def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
         made_with=found.explained[0].software,
         threads=thread_count(options.threads),
     )
-    return report_of(subject)
+    return report_of(made)
