@@ -34,7 +34,6 @@ class Generation:
 
 
 GenerationCallback = Callable[[Generation], None]
-"""Callback, called after each generation."""
 
 
 class GenomeSearch(Protocol):
@@ -182,14 +181,13 @@ def evolve(
     *,
     noisy: bool = False,
 ) -> None:
-    """Runs a search to its end: at least one generation.
+    """Runs a search until no generation is left, at least one.
 
     Args:
         search: The search.
         fitness: Fitness function, from genomes ``(n, length)`` to ``(n,)``.
         on_generation: Called after each generation.
-        generations_left: Returns the number of generations that remain, such as
-            ``Evolution.generations_left``.
+        generations_left: Returns the number of generations that remain.
         noisy: Whether fitness is comparable within a generation only.
     """
     start, number, best, left = perf_counter(), 0, -np.inf, 1

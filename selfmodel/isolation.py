@@ -37,12 +37,7 @@ _MEMORY_SHARE = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Message:
-    """Request to a child, or its answer.
-
-    Attributes:
-        header: JSON object.
-        buffers: Bytes by name.
-    """
+    """Request to a child, or its answer: a JSON object, and bytes by name."""
 
     header: Mapping[str, Any]
     buffers: Mapping[str, bytes] = field(default_factory=dict)

@@ -5,7 +5,7 @@ A plug-in is an entry point of an installed package, or ``package.module:object`
 
 import importlib
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -56,9 +56,6 @@ SEARCHES: Mapping[str, MakeSearch] = MappingProxyType(
 REPERTOIRE = "repertoire"
 """Name of the search that begins from a repertoire."""
 
-OWN_SEARCH: Mapping[str, str] = MappingProxyType({ROBUST: "cma-es", PAPER: "ea"})
-"""Name of the search of each repair, unless another is given."""
-
 RETURN = "return"
 """Name of the score that is the sum of a task's rewards."""
 
@@ -83,15 +80,10 @@ def comparator(name: str) -> Comparator:
     return as_comparator(_plug_in("comparator", name, COMPARATOR_GROUP, COMPARATORS), name)
 
 
-def next_trial(name: str) -> str:
-    """Returns a name of ``NEXT_TRIAL``, checked.
-
-    Raises:
-        InputError: The name is unknown; the message has the nearest names.
-    """
-    if name not in NEXT_TRIAL:
-        raise unknown_name("choice of the next trial", name, NEXT_TRIAL)
-    return name
+def check_known(what: str, name: str, known: Collection[str]) -> None:
+    """Raises ``InputError`` with the nearest names for a name that is unknown."""
+    if name not in known:
+        raise unknown_name(what, name, known)
 
 
 def repair(
@@ -101,45 +93,37 @@ def repair(
 
     Args:
         name: ``robust`` or ``paper``.
-        search: Name of one of ``SEARCHES``, or ``repertoire``; None for that of the repair: the
-            repertoire if there is one, otherwise CMA-ES or the paper's EA.
+        search: Name of one of ``SEARCHES``, or ``repertoire``; None as for ``search_name``.
         repertoire: Gaits from which the search ``repertoire`` begins.
 
     Raises:
         InputError: A name is unknown, the paper's repair is to have another search, or a repertoire
             is given without the search that needs it, or the search without a repertoire.
     """
-    if name not in (ROBUST, PAPER):
-        raise unknown_name("repair", name, (ROBUST, PAPER))
-    if search is not None and search not in (*SEARCHES, REPERTOIRE):
-        raise unknown_name("search", search, (*SEARCHES, REPERTOIRE))
+    check_known("repair", name, (ROBUST, PAPER))
     chosen = search_name(name, search, repertoire)
+    check_known("search", chosen, (*SEARCHES, REPERTOIRE))
     if (chosen == REPERTOIRE) != (repertoire is not None):
         raise InputError(
             f"expected a repertoire with the search {REPERTOIRE}, and with no other; got the "
             f"search {chosen} {'with' if repertoire is not None else 'without'} a repertoire: "
             f"give --search {REPERTOIRE} --repertoire FILE, or neither"
         )
-    if name == PAPER and chosen != OWN_SEARCH[PAPER]:
-        raise InputError(
-            f"the paper's repair has its own EA, got the search {chosen}: leave --search and "
-            f"--repertoire out, or give --repair {ROBUST}"
-        )
     if name == PAPER:
+        if chosen != "ea":
+            raise InputError(
+                f"the paper's repair has its own EA, got the search {chosen}: leave --search and "
+                f"--repertoire out, or give --repair {ROBUST}"
+            )
         return RepairSearch
     make_search = SEARCHES[chosen] if repertoire is None else from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
 
 
 def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
-    """Returns the name of the search of a repair.
-
-    Args:
-        repair: ``robust`` or ``paper``.
-        search: The name, if one is given.
-        repertoire: Gaits from which the search begins.
-    """
-    return search or (REPERTOIRE if repertoire is not None else OWN_SEARCH[repair])
+    """Returns the name of a repair's search: as given, of the repertoire, CMA-ES or the EA."""
+    own = "cma-es" if repair == ROBUST else "ea"
+    return search or (own if repertoire is None else REPERTOIRE)
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:
@@ -212,19 +196,13 @@ def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> objec
 
 
 def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
-    """Returns a controller design by name, for a robot.
-
-    Args:
-        name: One of ``DESIGNS``.
-        robot: The robot that the design is for.
-        neurons: Number of hidden neurons; the design's default if not given.
+    """Returns a controller design of ``DESIGNS`` for a robot, with a number of hidden neurons.
 
     Raises:
         InputError: The design is unknown, it cannot have that many hidden neurons, or a motor
             has no command range.
     """
-    if name not in DESIGNS:
-        raise unknown_name("kind of controller", name, DESIGNS)
+    check_known("kind of controller", name, DESIGNS)
     return DESIGNS[name](robot, neurons)
 
 

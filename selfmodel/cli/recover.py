@@ -89,6 +89,7 @@ def experiment_of(options: Recover) -> Experiment:
     check_silent_neurons(design, silent_neurons(truth))
     gaits = arguments.repertoire_of(options.repertoire, robot, design)
     plugins.repair(options.repair, options.search, gaits)
+    plugins.check_known("choice of the next trial", options.next_trial, plugins.NEXT_TRIAL)
     score = choose_score(
         options.score or plugins.DEFAULT_SCORES[options.repair],
         entry,
@@ -118,7 +119,7 @@ def experiment_of(options: Recover) -> Experiment:
         threads=thread_count(options.threads),
         folder=options.out or _new_folder(robot.name),
         gap=options.gap,
-        next_trial=plugins.next_trial(options.next_trial),
+        next_trial=options.next_trial,
         design=design,
         gait=score.gait,
         score=score.score,

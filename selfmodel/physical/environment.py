@@ -125,8 +125,11 @@ class EnvironmentRobot:
     def __post_init__(self) -> None:
         anatomy = self.robot.anatomy
         motors = (len(anatomy.motors),)
-        given = _nearest_to_zero(self.robot) if self.safe is None else self.safe
-        targets = np.array(given, dtype=np.float64)
+        if self.safe is None:
+            centre, half = np.array(command_ranges(self.robot.model)).T
+            targets = np.clip(0.0, centre - half, centre + half)
+        else:
+            targets = np.array(self.safe, dtype=np.float64)
         for what, shape in (
             ("the environment's actions", tuple(self.env.action_spec().shape)),
             ("the safe targets", targets.shape),
@@ -203,13 +206,13 @@ class EnvironmentRobot:
         names, timestep = robot.anatomy.names, robot.control_timestep
         controllers = make_batch([controller], [frozenset(self.silent_neurons)], len(names.sensors))
         commands = np.zeros((1, len(names.motors)))
+        # The readings are required of a controller; of a playback, only that some signal arrives.
         needed = {signal for limit in self.limits for signal in limit.signals}
-        if not isinstance(controller, Playback):
-            needed.add("sensors")
+        needed |= set() if isinstance(controller, Playback) else {"sensors"}
         missing_steps: dict[Signal, IndexArray] = {
             signal: np.zeros(names.width(signal), dtype=np.intp)
             for signal in SIGNALS
-            if signal in needed or signal == "sensors"
+            if signal in {*needed, "sensors"}
         }
         timer = StepTimer(timestep, self.tolerance)
         ended = False
@@ -227,7 +230,8 @@ class EnvironmentRobot:
             for signal, counts in missing_steps.items():
                 missing = np.isnan(values[signal]) & (signal in needed or timing.missing)
                 missing_steps[signal] = np.where(missing, counts + 1, 0)
-            self._check(k, values, missing_steps, missing=timing.missing)
+                self._check_patience(k, signal, missing_steps[signal])
+            self._check(k, values, missing=timing.missing)
             readings = values["sensors"]
             np.copyto(controllers.readings[0], readings, where=~np.isnan(readings))
             controllers.step(commands)
@@ -248,30 +252,17 @@ class EnvironmentRobot:
         except Exception as error:  # an environment may raise any: raised as a TrialError
             raise TrialError(f"the environment failed: {_type_and_message(error)}") from error
 
-    def _check(
-        self,
-        k: int,
-        values: Mapping[Signal, FloatArray],
-        missing_steps: Mapping[Signal, IndexArray],
-        *,
-        missing: bool,
-    ) -> None:
-        """Checks the observation of a step, and the steps without a value of each required signal.
-
-        Raises:
-            TrialError: A required signal is missing for too long, a number is invalid, or a limit
-                is exceeded.
-        """
+    def _check_patience(self, k: int, signal: Signal, missing_steps: IndexArray) -> None:
+        """Raises ``TrialError`` if a column of a required signal is missing for too long."""
         patience = self.patience if k else 0  # at step 0 there are no previous readings
-        for signal, counts in missing_steps.items():
-            columns = self.robot.anatomy.names.columns(signal)
-            pairs = zip(columns, counts > patience, strict=True)
-            if lacking := ", ".join(name for name, is_missing in pairs if is_missing):
-                if signal != "sensors":
-                    lacking = f"{signal} ({lacking}), which a limit requires,"
-                raise TrialError(
-                    f"no reading of {lacking} for more than {patience} steps, at step {k}"
-                )
+        columns = np.array(self.robot.anatomy.names.columns(signal))
+        if lacking := ", ".join(columns[missing_steps > patience]):
+            if signal != "sensors":
+                lacking = f"{signal} ({lacking}), which a limit requires,"
+            raise TrialError(f"no reading of {lacking} for more than {patience} steps, at step {k}")
+
+    def _check(self, k: int, values: Mapping[Signal, FloatArray], *, missing: bool) -> None:
+        """Raises ``TrialError`` if a number is invalid, or a limit is exceeded."""
         for signal, row in values.items():
             if np.any(np.isinf(row)):
                 raise TrialError(f"{signal} is infinite at step {k}")
@@ -285,11 +276,6 @@ class EnvironmentRobot:
 def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:
     with suppress(TimeoutError):  # the targets were sent; the observation is not used
         env.step(targets.copy())
-
-
-def _nearest_to_zero(robot: Robot) -> FloatArray:
-    centre, half = np.array(command_ranges(robot.model)).T
-    return np.asarray(np.clip(0.0, centre - half, centre + half))
 
 
 def _rows(names: Names, observation: Mapping[str, Any]) -> dict[Signal, FloatArray]:
@@ -322,11 +308,9 @@ def _type_and_message(error: Exception) -> str:
 
 
 class StepTimer:
-    """Computes the timing of each control step.
+    """Computes the timing of each control step, with the tolerance of ``EnvironmentRobot``.
 
-    If the first observation has a timestamp, all times are timestamps of observations; otherwise
-    all times are readings of the clock. The tolerance is the largest deviation of a punctual step,
-    as a fraction of the control time step.
+    All times are timestamps of observations if the first has one, or else readings of the clock.
     """
 
     def __init__(self, timestep: float, tolerance: float) -> None:

@@ -76,20 +76,18 @@ def joint_limits(robot: Robot, margin: float) -> Limit:
     """
     names = robot.anatomy.hinges
     hinges = [robot.model.joint(name) for name in names]
-    ranges = np.array(
-        [hinge.range if hinge.limited[0] else (-np.inf, np.inf) for hinge in hinges]
-    ).reshape(-1, 2)
-    lowest, highest = ranges[:, 0] - margin, ranges[:, 1] + margin
+    ranges = [hinge.range if hinge.limited[0] else (-np.inf, np.inf) for hinge in hinges]
+    low, high = np.array(ranges).reshape(-1, 2).T
 
     def reason(observed: Mapping[Signal, FloatArray]) -> str:
         angles = observed["joint_positions"]
-        beyond = np.flatnonzero((angles < lowest) | (angles > highest))
+        beyond = np.flatnonzero((angles < low - margin) | (angles > high + margin))
         if not len(beyond):
             return ""
         k = int(beyond[0])
         return (
-            f"{names[k]} is at {angles[k]:.3f}, beyond its range of {ranges[k, 0]:.3f} to "
-            f"{ranges[k, 1]:.3f} and the margin of {margin:g}"
+            f"{names[k]} is at {angles[k]:.3f}, beyond its range of {low[k]:.3f} to "
+            f"{high[k]:.3f} and the margin of {margin:g}"
         )
 
     return Limit(("joint_positions",), reason)

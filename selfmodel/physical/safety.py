@@ -35,19 +35,16 @@ class Terminated(KeyboardInterrupt, SystemExit):
 
     def __init__(self, number: signal.Signals) -> None:
         super().__init__(number.name)
-        self.code = self.status = _exit_status(number)
+        self.code = self.status = _ENDED + number
+
+
+_ENDED = 128
+"""What a shell adds to the number of the signal that ended a program, for its exit status."""
 
 
 def status_of(interruption: KeyboardInterrupt) -> int:
     """Returns the exit status of a program that an interruption ends."""
-    if isinstance(interruption, Terminated):
-        return interruption.status
-    return _exit_status(signal.SIGINT)
-
-
-def _exit_status(number: int) -> int:
-    """Returns the exit status that a shell reports for a program that a signal ended."""
-    return 128 + number
+    return interruption.status if isinstance(interruption, Terminated) else _ENDED + signal.SIGINT
 
 
 class _Handler:
@@ -69,7 +66,7 @@ class _Handler:
         now = time.monotonic()
         if self._received is not None:
             if now - self._received > REPETITION:
-                os._exit(_exit_status(number))
+                os._exit(_ENDED + number)
             return
         self._received, self.waiting = now, signal.Signals(number)
         if not self.held:
@@ -78,9 +75,8 @@ class _Handler:
     def raise_waiting(self, *, forget: bool) -> None:
         """Raises the waiting signal.
 
-        Args:
-            forget: Whether code that catches the exception has handled the signal. Otherwise it is
-                raised again at the end of the critical section, because a driver may catch any.
+        Unless it is to be forgotten, it is raised again at the end of the critical section, because
+        a driver may catch any exception.
         """
         number = self.waiting
         if forget:
@@ -268,12 +264,8 @@ class Watchdog:
     def call(self, what: str, function: Callable[[], Any]) -> Any:  # noqa: ANN401  # any function
         """Calls a function in the driver's thread; returns its result, or raises its exception.
 
-        Args:
-            what: Name of the function in the error message.
-            function: The function.
-
         Raises:
-            HangError: The function did not return in time.
+            HangError: The function, of the name ``what``, did not return in time.
         """
         self._waiting = True
         self._calls.put(function)

@@ -196,12 +196,8 @@ def physical_variant(
 
 def detached_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
     """Returns the root body of each limb that a hypothesis detaches, in the order of its faults."""
-    limbs = []
-    for fault in hidden.faults:
-        if fault.kind is BROKEN:
-            bodies = robot.anatomy.joint(fault.part).bodies
-            limbs.append(min(bodies, key=lambda name: int(robot.model.body(name).id)))
-    return tuple(limbs)
+    joints = [robot.anatomy.joint(each.part) for each in hidden.faults if each.kind is BROKEN]
+    return tuple(min(one.bodies, key=lambda name: robot.model.body(name).id) for one in joints)
 
 
 def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
@@ -213,11 +209,9 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
     the start: the contact force would throw the copy away.
     """
     bare = spec.copy()
-    for parts in (bare.actuators, bare.sensors, bare.equalities, bare.tendons):
-        for part in list(parts):
-            bare.delete(part)
+    own = (bare.actuators, bare.sensors, bare.equalities, bare.tendons)
     # _overlapping_pairs computes the excluded pairs anew.
-    for parts in (bare.excludes, bare.pairs):
+    for parts in (*own, bare.excludes, bare.pairs):
         for part in list(parts):
             bare.delete(part)
     for k, limb in enumerate(limbs):
@@ -238,9 +232,7 @@ def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) 
     for joint in list(root.joints):
         spec.delete(joint)
     root.add_freejoint(name=DEBRIS_PREFIX + limb)
-    affinities = 0
-    for geom in bare.geoms:
-        affinities |= int(geom.conaffinity)
+    affinities = int(np.bitwise_or.reduce([int(geom.conaffinity) for geom in bare.geoms]))
     for geom in root.find_all("geom"):
         if geom.contype or geom.conaffinity:
             geom.contype |= affinities
