@@ -7,13 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.comparators import encoders
-from selfmodel.comparators.readings import (
-    arithmetic_loss,
-    finite_mean,
-    logged_readings,
-    readings_loss,
-)
+from selfmodel.comparators import encoders, readings
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
 from selfmodel.simulation.requests import command_steps, cut_segments
 from selfmodel.trials.estimation import ONBOARD, STATE, estimated_states, known_rows
@@ -84,10 +78,10 @@ class SegmentPrediction:
         starts, steady = self._starts(trial, states)
         compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
         logged = {s: values[starts[:, np.newaxis] + compared] for s, values in states.items()}
-        readings = logged_readings(trajectory["sensors"], starts, horizon)
+        reading_log = readings.logged_readings(trajectory["sensors"], starts, horizon)
         motion = encoders.logged_motion(trajectory["joint_positions"], starts, horizon)
         loose = encoders.loose_encoders(trajectory, starts, horizon)
-        arithmetic = arithmetic_loss(trial, starts, horizon)
+        arithmetic = readings.arithmetic_loss(trial, starts, horizon)
 
         def losses(simulated: Trajectory) -> Losses:
             """Returns the losses of each segment without a late step."""
@@ -99,8 +93,8 @@ class SegmentPrediction:
             for signal, values in logged.items():
                 error = difference(signal, predicted[signal][:, :, compared], values)
                 scaled = error / PREDICTION_ERROR_SCALES[signal]
-                terms[signal] = finite_mean(np.log1p(np.square(scaled)))
-            terms["sensors"] = readings_loss(predicted["sensors"], readings, steady)
+                terms[signal] = readings.finite_mean(np.log1p(np.square(scaled)))
+            terms["sensors"] = readings.readings_loss(predicted["sensors"], reading_log, steady)
             terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion)
             total = np.zeros(shape)
             for term in terms.values():

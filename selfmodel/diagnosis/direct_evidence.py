@@ -99,12 +99,16 @@ def _evidence_of(trial: Trial, anatomy: Anatomy, trial_name: str) -> DirectEvide
     without_effect: list[str] = []
     for joint in anatomy.joints:
         commanded = max((ranges[motor] for motor in joint.motors), default=0.0)
-        rows = [
-            _hinge(joint.name, hinge, angles[hinge], tolerances[hinge], commanded)
-            for hinge in joint.hinges
-        ]
-        joints += rows
-        if {row.motion for row in rows} == {"stands"}:
+        motions: set[Motion] = set()
+        for hinge in joint.hinges:
+            mean, deviation = None, None
+            motion: Motion = "unknown"
+            if len(known := angles[hinge]) >= MIN_KNOWN:
+                mean, deviation = float(known.mean()), float(known.std())
+                motion = "stands" if deviation <= tolerances[hinge] else "moves"
+            joints.append(JointEvidence(joint.name, hinge, mean, deviation, commanded, motion))
+            motions.add(motion)
+        if motions == {"stands"}:
             without_effect += [motor for motor in joint.motors if ranges[motor] >= MIN_COMMANDED]
     constant = [
         ConstantSensor(sensor, float(known[0]))
@@ -117,13 +121,3 @@ def _evidence_of(trial: Trial, anatomy: Anatomy, trial_name: str) -> DirectEvide
 def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:
     """Returns the finite values of each column."""
     return {name: one[np.isfinite(one)] for name, one in zip(names, values.T, strict=True)}
-
-
-def _hinge(
-    joint: str, hinge: str, known: FloatArray, tolerance: float, commanded: float
-) -> JointEvidence:
-    if len(known) < MIN_KNOWN:
-        return JointEvidence(joint, hinge, None, None, commanded, "unknown")
-    deviation = float(known.std())
-    motion: Motion = "stands" if deviation <= tolerance else "moves"
-    return JointEvidence(joint, hinge, float(known.mean()), deviation, commanded, motion)

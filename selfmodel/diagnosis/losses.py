@@ -76,22 +76,17 @@ class LossTable:
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
+        if problems := self._refusals(trials):
+            raise InputError("; ".join(problems))
+
+    def _refusals(self, trials: Sequence[Trial]) -> list[str]:
         problems = []
         for trial in trials:
             try:
                 self._of(trial)
             except InputError as error:
                 problems.append(str(error))
-        if problems:
-            raise InputError("; ".join(problems))
-
-    def accepts(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the comparator accepts all trials."""
-        try:
-            self.check(trials)
-        except InputError:
-            return False
-        return True
+        return problems
 
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the distances are means of losses, so that paired tests are possible."""
@@ -177,7 +172,7 @@ class LossTable:
             return self, [self._opening(trial) for trial in trials]
         cheapest = self._cheaper._cheaper if len(trials) >= MANY_TRIALS else None  # noqa: SLF001
         for table in (cheapest, self._cheaper):
-            if table is not None and table.accepts(trials):
+            if table is not None and not table._refusals(trials):  # noqa: SLF001
                 return table, trials
         return self, trials
 
@@ -188,11 +183,10 @@ class LossTable:
 
     def _opening(self, trial: Trial) -> Trial:
         """The first part of a trial, or the whole trial if the comparator refuses the part."""
-        steps = max(
-            round(OPENING * trial.trajectory.steps), min(MIN_OPENING, trial.trajectory.steps)
-        )
+        whole_steps = trial.trajectory.steps
+        steps = max(round(OPENING * whole_steps), min(MIN_OPENING, whole_steps))
         opening = replace(trial, trajectory=trial.trajectory.first(steps))
-        return opening if self.accepts([opening]) else trial
+        return trial if self._refusals([opening]) else opening
 
     def _of(self, trial: Trial) -> PreparedTrial | PiecewiseTrial:
         """Returns the prepared trial."""
@@ -237,7 +231,11 @@ class LossTable:
         result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
         with np.errstate(all="ignore") if diverged.any() else nullcontext():
-            losses = _compared(prepared, result.trajectory)
+            if isinstance(prepared, PiecewiseTrial):
+                given = prepared.losses(result.trajectory)
+            else:
+                given = np.asarray(prepared.distances(result.trajectory))[..., np.newaxis]
+        losses = given if isinstance(given, Losses) else Losses(np.asarray(given))
         total, by_hinge, problem = losses.total, losses.by_hinge, ""
         hinges = (*total.shape, len(trial.trajectory.names.hinges))
         if total.ndim != 2 or len(total) != len(hypotheses) or not total.shape[1]:
@@ -268,13 +266,6 @@ def simulate(
             return simulator.predict(hypotheses, request, trial.trajectory)
         case Ensemble():
             return simulator.run_ensemble(hypotheses, driver, steps, request)
-
-
-def _compared(prepared: PreparedTrial | PiecewiseTrial, simulated: Trajectory) -> Losses:
-    if not isinstance(prepared, PiecewiseTrial):
-        return Losses(np.asarray(prepared.distances(simulated))[..., np.newaxis])
-    losses = prepared.losses(simulated)
-    return losses if isinstance(losses, Losses) else Losses(np.asarray(losses))
 
 
 def contradiction_losses(

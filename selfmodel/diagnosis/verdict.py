@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmodel.diagnosis import significance
+from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     DetectableSeverity,
@@ -23,12 +23,6 @@ from selfmodel.diagnosis.diagnosis import (
 )
 from selfmodel.diagnosis.joints import excesses, predicts_joints_worse
 from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
-from selfmodel.diagnosis.search import (
-    SHORTLIST_SIZE,
-    any_fault_is_model_error,
-    by_distance,
-    with_fitted_severity,
-)
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
@@ -96,7 +90,7 @@ def diagnosis_of(
     listed = list({*compared, INTACT})
     distances = problem.table.distances(listed, problem.trials)
     totals = dict(zip(listed, map(float, distances), strict=True))
-    ranked, kept = by_distance(totals), problem.settings.kept
+    ranked, kept = search.by_distance(totals), problem.settings.kept
     if best is None or not math.isfinite(totals[best]):
         best = ranked[0]
     if not math.isfinite(totals[best]):
@@ -236,7 +230,7 @@ def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
         [*space.with_one_less(best), *space.with_one_replaced(best), *space.with_one_more(INTACT)]
     )
     smaller = [one for one in neighbours if len(one) <= len(best) and not _has_more(one, best)]
-    few = best_severities(by_total_loss(smaller, problem.coarse))[:SHORTLIST_SIZE]
+    few = best_severities(by_total_loss(smaller, problem.coarse))[: search.SHORTLIST_SIZE]
     fitted = [_with_fitted_others(one, best, problem) for one in few]
     candidates = by_total_loss(list(dict.fromkeys([*few, *fitted])), problem.losses)
     best_losses, *rows = problem.losses([best, *candidates])
@@ -245,7 +239,7 @@ def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
         for one, row in zip(candidates, rows, strict=True)
         if without_severities(one) != without_severities(best)
         and not significance.is_better(best_losses, row)
-        and not any_fault_is_model_error(one, problem)
+        and not search.any_fault_is_model_error(one, problem)
         and not (problem.has_joints and predicts_joints_worse(one, best, problem))
     )
 
@@ -261,7 +255,7 @@ def _with_fitted_others(one: Hypothesis, best: Hypothesis, problem: Problem) -> 
     for fault in one.faults:
         if fault not in best.faults and fault in one.faults:
             index = one.faults.index(fault)
-            one = with_fitted_severity(one, index, problem.coarse, problem.space)
+            one = search.with_fitted_severity(one, index, problem.coarse, problem.space)
     return one
 
 
@@ -352,7 +346,7 @@ def _largest_gains(
         else -np.inf
         for row in rows
     ]
-    few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][:SHORTLIST_SIZE]]
+    few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][: search.SHORTLIST_SIZE]]
     return by_total_loss(few, problem.losses)
 
 

@@ -21,13 +21,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.recovery.repair import (
-    CandidateController,
-    MakeRepair,
-    Repair,
-    RobustRepair,
-    untried_mutants,
-)
+from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import UPRIGHT, Score, fall_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
@@ -47,7 +41,7 @@ def by_repair(loop: "RecoveryLoop") -> Controller:
     candidates = [candidate.controller for candidate in loop.repaired()]
     tried = loop.known.controllers
     untried = [controller for controller in candidates if controller not in tried]
-    return (untried or untried_mutants(candidates[:1], tried, loop.settings, loop.rng))[0]
+    return (untried or repairs.untried_mutants(candidates[:1], tried, loop.settings, loop.rng))[0]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -91,7 +85,7 @@ class RecoveryLoop:
     calibrate: Callable[[Sequence[Trial]], Calibration] | None = None
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
-    make_repair: MakeRepair = RobustRepair
+    make_repair: repairs.MakeRepair = repairs.RobustRepair
     known: Database = field(default_factory=Database, init=False)
     trials_left: int = field(default=0, init=False)
     rng: np.random.Generator = field(init=False)
@@ -118,7 +112,7 @@ class RecoveryLoop:
         self._diagnose()
         return self._result()
 
-    def repaired(self) -> tuple[CandidateController, ...]:
+    def repaired(self) -> tuple[repairs.CandidateController, ...]:
         """Evolves controllers that compensate for the last diagnosis; returns them best first."""
         diagnosis = self.known.diagnoses[-1]
         uncertainty = partial(self._posterior.after, self.known.trials, diagnosis.best)
@@ -128,7 +122,7 @@ class RecoveryLoop:
         HypothesisSpace.of(self.kinds, self.simulator.robot.anatomy)  # refused before any trial
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(self.simulator.robot)
-        self._repairs: list[Repair] = []
+        self._repairs: list[repairs.Repair] = []
         self._begin_repair()
         self._predictions: dict[Controller, float] = {}
         self._predicted: list[float] = []
@@ -144,7 +138,7 @@ class RecoveryLoop:
 
     def _evolved(
         self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
-    ) -> tuple[CandidateController, ...]:
+    ) -> tuple[repairs.CandidateController, ...]:
         """Evolves controllers for hypotheses, best first; returns them best first."""
         self.on_event(SearchBegins("repair", hypotheses[0]))
         rng = random_stream(self.seed, "repair", len(self.known.diagnoses))

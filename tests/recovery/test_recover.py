@@ -12,7 +12,7 @@ import pytest
 from numpy.random import Generator
 
 from selfmodel.arguments import comparator_choice
-from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.choice import ChosenComparator
@@ -414,13 +414,6 @@ def test_trials_that_cannot_be_judged_are_named_before_any_search(quadruped: Rob
         diagnose_trials([first, *others], search, 0, lambda _: pytest.fail("a search began"))
     with pytest.raises(InputError, match="at least one trial to explain, got none"):
         diagnose_trials([], search, 0, lambda _: None)
-
-
-@pytest.mark.parametrize("name", COMPARATORS)
-def test_a_comparator_names_what_a_trial_lacks(name: str, quadruped: Robot):
-    (trial,) = trials_of(quadruped, 1)
-    with pytest.raises(InputError, match=r"0: .* needs \w+"):
-        COMPARATORS[name].prepare(lacking(trial, SIGNALS))
 
 
 def test_a_trial_that_other_software_drove_is_explained_by_its_commands(quadruped: Robot):
