@@ -1,5 +1,6 @@
 """Short predictions from logged states under logged commands."""
 
+import copy
 from collections.abc import Iterator, Sequence
 from functools import cache, partial
 
@@ -216,8 +217,8 @@ def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArra
     Activations, ``(steps, na)``, are not logged. That of a motor with the ``dyntype`` filter
     follows its command with a time constant, and that of an integrator is the sum of its commands.
     Both are zero at the start of a trial, so they follow from the commands since. MuJoCo computes
-    them, on a model that has only motors, so that they are those of the robot's own model to the
-    bit: where a solver switches its active constraints, a rounding error has visible effects.
+    them, on a copy of the model whose motors move nothing, so that they are those of the robot to
+    the bit: where a solver switches its active constraints, a rounding error has visible effects.
 
     Args:
         robot: The healthy robot: no fault changes the activation dynamics.
@@ -227,7 +228,12 @@ def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArra
     """
     states = np.zeros((len(commands), robot.model.na))
     if robot.model.na:
-        model = _motors_only(robot.model)
+        model, nothing = copy.copy(robot.model), mujoco.mjtDisableBit
+        model.opt.disableflags |= (
+            nothing.mjDSBL_CONSTRAINT | nothing.mjDSBL_GRAVITY | nothing.mjDSBL_SPRING
+        )
+        model.actuator_gaintype[:], model.actuator_biastype[:] = 0, 0  # fixed, and none
+        model.actuator_gainprm[:] = 0.0
         data = mujoco.MjData(model)
         arriving = held(np.concatenate([np.zeros((delay + 1, model.nu)), commands]))[1:]
         for after, command in zip(states[1:], arriving[: len(commands) - 1], strict=True):
@@ -235,23 +241,3 @@ def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArra
             mujoco.mj_step(model, data, robot.substeps)
             after[:] = data.act
     return states
-
-
-def _motors_only(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Returns a model with as many motors, of the same dynamics, that move nothing."""
-    spec = mujoco.MjSpec()
-    body = spec.worldbody.add_body(mass=1.0, inertia=[1.0, 1.0, 1.0])
-    body.add_joint(name="joint")
-    for kind in model.actuator_dyntype:
-        spec.add_actuator(
-            dyntype=mujoco.mjtDyn(int(kind)),
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            target="joint",
-            gainprm=np.zeros(10),
-        )
-    motors = spec.compile()
-    for name in ("timestep", "integrator", "disableflags", "disableactuator"):
-        setattr(motors.opt, name, getattr(model.opt, name))
-    for name in ("dynprm", "ctrllimited", "ctrlrange", "actlimited", "actrange", "group"):
-        getattr(motors, f"actuator_{name}")[:] = getattr(model, f"actuator_{name}")
-    return motors

@@ -26,8 +26,8 @@ STATE: tuple[Signal, ...] = ONBOARD + BASE
 def known_steps(states: Mapping[Signal, FloatArray]) -> BoolArray:
     """Returns a mask of the steps at which a prediction can begin, ``(steps,)``.
 
-    Some hinge of each joint signal is known there, and all other signals are known completely. A
-    hinge without an encoder is unknown, and does not make the steps of a trial unknown.
+    Some hinge of each joint signal is known there, and all other signals completely: a hinge
+    without an encoder does not make the steps of a trial unknown.
     """
     known = [known_rows(signal, rows) for signal, rows in states.items()]
     return np.asarray(np.logical_and.reduce(known))
@@ -97,9 +97,7 @@ def _integrated(velocities: FloatArray, timestep: float, substeps: int) -> Float
 
 
 def _is_noise(residuals: FloatArray, smallest_noise: float) -> bool:
-    """Returns whether the residual displacements are mostly measurement noise, in every column.
-
-    A column without residuals, such as that of a lost encoder, does not count.
+    """Returns whether residual displacements are mostly noise, in every column that has any.
 
     A position error makes the residual before it too large and the residual after it too small, so
     successive residuals have opposite signs: in two of three pairs for pure noise. Residuals from
@@ -165,9 +163,8 @@ def _summed(values: FloatArray) -> FloatArray:
 HALF_WIDTH = 0.05
 """Half width of the smoother, s: long against encoder noise, short against a limb's motion."""
 
-_DEGREE = 3
-_MIN_HALF_WIDTH = 2
-"""Smallest half width of the smoother, in steps: a cubic has four coefficients."""
+_DEGREE, _MIN_HALF_WIDTH = 3, 2
+"""Degree of the smoother, and its smallest half width, steps: a cubic has four coefficients."""
 
 
 def with_joint_velocities(trajectory: Trajectory) -> Trajectory:
@@ -213,11 +210,9 @@ def _slopes(trajectory: Trajectory) -> FloatArray:
     return slopes
 
 
-PLAY = 0.01
-"""Motion of a jammed joint by elasticity and backlash, rad."""
-
-NOISE_FACTOR = 2.0
-"""Factor on an encoder's noise in the tolerance: noise alone must be a small part of it."""
+PLAY, NOISE_FACTOR = 0.01, 2.0
+"""Motion of a jammed joint by elasticity and backlash, rad; and factor on an encoder's noise in the
+tolerance: noise alone must be a small part of it."""
 
 _ORDER = 4
 """Order of the differences between neighbouring steps: it suppresses motion, and not noise."""

@@ -13,11 +13,9 @@ from selfmodel.arrays import BoolArray, FloatArray, frozen
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 
-MAX_TIME_ERROR = 0.5
-"""Largest difference of the time of a row from its control step, control time steps."""
-
-MAX_LENGTH_ERROR = 1e-3
-"""Largest difference of the length of a quaternion from 1: float32 and printed digits round it."""
+MAX_TIME_ERROR, MAX_LENGTH_ERROR = 0.5, 1e-3
+"""Largest differences of the time of a row from its control step, control time steps; and of the
+length of a quaternion from 1: float32 and printed digits round it."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +23,7 @@ class StepTiming:
     """Measured time of one control step, for a robot with its own clock.
 
     Attributes:
-        elapsed: Seconds from the first observation to this one by the robot's clock; NaN if
-            unknown.
+        elapsed: Seconds since the first observation by the robot's clock; NaN if unknown.
         late: Whether the time since the previous step differs from the control time step by more
             than a tolerance, in either direction.
         missing: Whether the step has no observation.
@@ -42,8 +39,7 @@ class Sample:
     """State, readings and commands of one control step.
 
     Attributes:
-        time: Scheduled time of the step, s since the start of the run: a multiple of the control
-            time step.
+        time: Scheduled time, s since the start of the run: a multiple of the control time step.
         values: Row of each signal, ``(width,)``, in the signal's unit.
         moment: Measured time of the step, for a robot with its own clock.
     """
@@ -107,11 +103,7 @@ class Trajectory:
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
 
     def __getitem__(self, signal: Signal) -> FloatArray:
-        """Returns one signal, ``(..., steps, width)``.
-
-        Raises:
-            KeyError: The signal was not recorded.
-        """
+        """Returns one signal, ``(..., steps, width)``; a ``KeyError`` names those recorded."""
         try:
             return self.signals[signal]
         except KeyError:
@@ -126,10 +118,7 @@ class Trajectory:
 
     @property
     def steady_commands(self) -> FloatArray:
-        """Commands, with NaN for each command that was held for other than one control time step.
-
-        The value of such a command is known, but the next row is not one control time step later.
-        """
+        """Commands, with NaN for each that was held for other than one control time step."""
         commands = self["commands"]
         if self.late is None:
             return commands

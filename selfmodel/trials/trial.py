@@ -248,9 +248,9 @@ def whole(trial: Trial | TrialPart) -> TrialPart:
 def trial_names(trials: Iterable[Trial]) -> dict[str, str]:
     """Returns a name for each trial, by the trial's path.
 
-    The name is that of the log's file, without ``.mcap``, and not that of the plan: every imported
-    trial has the plan ``imported``. A trial without a log has the name of its plan. Where several
-    trials would have one name, each of them has its whole path.
+    It is that of the log's file, without ``.mcap``: every imported trial has the plan ``imported``.
+    Without a log it is that of the plan. Where several trials would have one name, each has its
+    whole path.
     """
     files = {trial.path: (PurePath(trial.path), trial.plan.name) for trial in trials}
     names = {
@@ -265,8 +265,7 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """Returns a trial without the columns that were never observed in one of the others.
 
     An unknown joint makes the prediction of the others worse. So the loss of a healthy trial is a
-    reference for a trial with a lost encoder only without the same encoder. The trial itself is
-    returned if the others, of the same robot, lack nothing.
+    reference for a trial with a lost encoder only without the same encoder.
     """
     reduced: dict[Signal, FloatArray] = {}
     losable: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
