@@ -64,14 +64,7 @@ def draw_gap(robot: Robot, size: float, rng: np.random.Generator) -> Gap:
 def compiled(
     robot: Robot, gap: Gap, faults: Faults, angles: dict[str, float] | None = None
 ) -> mujoco.MjModel:
-    """Returns the model of a robot.
-
-    Args:
-        robot: The robot.
-        gap: Difference between the robot and its model.
-        faults: The faults.
-        angles: Angle of each hinge that jams where it is, rad.
-    """
+    """Returns the model of a robot; ``angles`` are those of hinges that jam where they are, rad."""
     spec = robot.spec()
     weight = robot.spec().compile().body_mass.sum()
     for fault in faults:

@@ -24,11 +24,8 @@ ground."""
 def draw_gait(robot: Robot, kind: str, rng: np.random.Generator) -> Gait:
     """Returns a random gait, which grows in the first half second.
 
-    Args:
-        robot: The robot; its joints' ranges are those of the commands.
-        kind: ``playback``, a sinusoid per motor, or ``network``, a hidden layer of tanh neurons
-            with a clock of two phases as inputs.
-        rng: Random numbers.
+    Its kind is ``playback``, a sinusoid per motor, or ``network``, a hidden layer of tanh neurons
+    with a clock of two phases as inputs. The joints' ranges are those of the commands.
     """
     model = robot.spec().compile()
     limits = np.array([model.joint(hinge).range for hinge in robot.motors.values()])
@@ -161,14 +158,9 @@ def simulate(
     duration: float,
     latency: Callable[[], float] = lambda: 0.0,
 ) -> Motion:
-    """Simulates a trial.
+    """Simulates a trial of a duration, and of ``TAIL`` after it, s, in phases from time 0 on.
 
-    Args:
-        robot: The robot.
-        phases: Phases in the order of their starts; the first starts at 0.
-        gait: The gait.
-        duration: Duration, s; the gait goes on for ``TAIL`` after it.
-        latency: Draws the delay of a command, s.
+    ``latency`` draws the delay of a command, s.
     """
     left, waiting = deque(phases), deque[tuple[float, np.ndarray]]()
     phase = left.popleft()

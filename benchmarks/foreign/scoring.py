@@ -68,12 +68,7 @@ def score(
     """Diagnoses every recording of a folder that has no row yet, and appends the rows.
 
     The order is that of the names' digests, so that the rows of an interrupted run are a sample.
-
-    Args:
-        out: Folder of the recordings.
-        rows: File with a JSON object per line; created if it does not exist.
-        question_of: Returns how the recordings of a group are diagnosed.
-        jobs: Number of commands at a time.
+    ``question_of`` returns how the recordings of a group are diagnosed.
     """
 
     def key(name: str, asked: Row) -> str:

@@ -34,16 +34,7 @@ class Contact(NamedTuple):
 
 
 class Bullet:
-    """A robot in PyBullet, by the names of its model; ``close`` ends the client.
-
-    Args:
-        robot: The healthy robot.
-        reality: Masses and contacts of this robot.
-        damage: Its damage.
-
-    Attributes:
-        client: PyBullet's number of the client; -1 after ``close``.
-    """
+    """A damaged robot in a client of PyBullet, by the names of its model; ``close`` ends it."""
 
     def __init__(self, robot: Robot, reality: Reality, damage: Damage) -> None:
         self._robot, self._reality, self._damage = robot, reality, damage
@@ -115,13 +106,7 @@ class Bullet:
         self._call("setJointMotorControlArray", self._body, self._hinges, mode, forces=forces)
 
     def place(self, position: np.ndarray, orientation: np.ndarray, angles: np.ndarray) -> None:
-        """Moves the robot to a pose, at rest.
-
-        Args:
-            position: Position of the root body, m.
-            orientation: Its orientation, w x y z.
-            angles: Angle of each hinge of the model, rad; unused for absent and fixed ones.
-        """
+        """Moves the robot to a pose of its root, w x y z, and all hinges, rad, at rest."""
         pose = pybullet.multiplyTransforms(position, np.roll(orientation, -1), *self._base_inertial)
         self._call("resetBasePositionAndOrientation", self._body, *pose)
         self._call("resetBaseVelocity", self._body, [0, 0, 0], [0, 0, 0])

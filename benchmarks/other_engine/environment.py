@@ -38,12 +38,7 @@ class BulletEnvironment(dm_env.Environment):
     number of the episode: the n-th episodes of two equal environments are equal to the bit. An
     episode has no end.
 
-    Args:
-        robot: The healthy robot.
-        reality: What distinguishes this robot from its model.
-        damage: Its damage.
-        stream: Number of the environment among those of the reality; those with the same number
-            have the same noise.
+    Environments of a reality with the same ``stream`` have the same noise.
     """
 
     def __init__(
@@ -81,11 +76,7 @@ class BulletEnvironment(dm_env.Environment):
         return dm_env.restart(self._observation())
 
     def step(self, action: np.ndarray) -> dm_env.TimeStep:
-        """Sends motor targets, and advances by a control time step; the reward is the speed, m/s.
-
-        Raises:
-            FloatingPointError: The simulation diverged.
-        """
+        """Sends motor targets, and advances by a control step; the reward is the speed, m/s."""
         if not self._begun:
             return self.reset()
         before = self._bullet.base()[0][0]
@@ -140,13 +131,7 @@ def physical_robot(environment: BulletEnvironment, robot: Robot) -> EnvironmentR
 
 
 class Servos:
-    """The servos of a robot in motion.
-
-    Args:
-        robot: The healthy robot.
-        reality: Factors of the torques, and stiffness of the gears.
-        angles: Angle of each hinge at rest, rad.
-    """
+    """The servos of a robot in motion, which begins at rest at some angles, rad."""
 
     def __init__(self, robot: Robot, reality: Reality, angles: np.ndarray) -> None:
         model = robot.model
@@ -160,13 +145,7 @@ class Servos:
         self._angles, self._speeds = angles[self._driven], np.zeros(model.nu)
 
     def step(self, targets: np.ndarray, angles: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-        """Returns the torques of the gears on the hinges over a substep, N m.
-
-        Args:
-            targets: Target angle of each motor, rad.
-            angles: Angle of each hinge, rad.
-            speeds: Angular velocity of each hinge, rad/s.
-        """
+        """Returns the torques of the gears on the hinges over a substep, N m, from SI units."""
         torque = self._stiffness * (targets - self._angles) - self._damping * self._speeds
         torque = np.clip(self._factor * torque, -self._limit, self._limit)
         slip = self._speeds - speeds[self._driven]
@@ -186,12 +165,7 @@ class Measurements:
     the start; a driver repeats it when the encoder no longer answers. A fixed hinge is measured at
     its angle, with noise.
 
-    Args:
-        robot: The healthy robot.
-        reality: Levels of the noise.
-        damage: Absent hinges and dead sensors.
-        rng: Random numbers of the noise.
-        start: Angle of each hinge, absent ones included, at the start, rad.
+    ``start`` has the angle of each hinge, absent ones included, at the start, rad.
     """
 
     def __init__(

@@ -118,13 +118,7 @@ def _in_mujoco(
 
 
 def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) -> Iterator[str]:
-    """Yields a Markdown table, line by line: a row per gait, m in a trial of the paper's length.
-
-    Args:
-        robot: The healthy robot.
-        gaits: Files of its controllers.
-        seeds: Seeds of robots in PyBullet.
-    """
+    """Yields a Markdown table, line by line: a row per gait, m in a trial of the paper's length."""
     realities = [ideal_reality(robot), *(draw_reality(robot, seed) for seed in seeds)]
     names = ["gait", "MuJoCo", "PyBullet, ideal", *(f"PyBullet, robot {seed}" for seed in seeds)]
     yield f"| {' | '.join(names)} |"

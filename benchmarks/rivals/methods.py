@@ -47,14 +47,7 @@ it may leave out the worse ones."""
 
 @dataclass(frozen=True)
 class Trial:
-    """Measurements of a physical trial.
-
-    Attributes:
-        displacement: Forward displacement, m.
-        upright: Forward displacement up to the last step before the first fall, m.
-        fallen: Whether the robot fell.
-        steps: Control steps that the run lasted; fewer than planned if it ended early.
-    """
+    """Forward displacement of a physical trial, m, that up to the first fall, and control steps."""
 
     displacement: float
     upright: float
@@ -70,16 +63,11 @@ class Problem:
         physical: The damaged physical robot.
         robot: The healthy robot as its model describes it.
         normal: Unit normal of the ground, ``(3,)``.
-        steps: Control steps of a run.
-        trials: Physical trials that the method may spend.
-        design: Design of the controllers.
-        settings: Sizes of the EAs.
+        trials: Physical trials that the method may spend, of ``steps`` each.
         period: Generations of T-Resilience between two physical trials.
-        rng: Source of all random numbers of the method.
         evaluate: Evaluation in simulation of the healthy robot, without noise.
         healthy: Fitness in simulation of the healthy robot, with noise of sensors and start.
         hidden: Fitness of the physical robot's own model with its own noise: for the oracle alone.
-        search: Search for controllers.
         repertoire: Repertoire of the healthy robot; None if no method needs it.
         done: Trials so far.
     """
@@ -113,10 +101,6 @@ class Problem:
         """Runs a trial, and returns its displacement up to the first fall, m.
 
         A run that ends early counts as far as it went.
-
-        Raises:
-            TrialError: The run ended before its first sample.
-            ValueError: No trials are left.
         """
         if not self.left:
             raise ValueError(f"all {self.trials} physical trials are spent")
@@ -262,15 +246,10 @@ def _simulated(problem: Problem, genomes: FloatArray) -> tuple[FloatArray, Float
 def posterior(
     points: FloatArray, values: FloatArray, queries: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns mean and standard deviation of a Gaussian process of variance 1, given observations.
+    """Returns mean and standard deviation of a Gaussian process of variance 1, ``(m,)`` each.
 
-    Args:
-        points: Points of the observations, ``(n, d)``; n may be 0.
-        values: Observations, ``(n,)``.
-        queries: ``(m, d)``.
-
-    Returns:
-        ``(m,)`` each; without observations 0 and 1.
+    The observations are at points ``(n, d)``, the queries ``(m, d)``; without observations, mean
+    and deviation are 0 and 1.
     """
     if not len(points):
         return np.zeros(len(queries)), np.ones(len(queries))
@@ -285,9 +264,6 @@ def best_first(objectives: FloatArray) -> IndexArray:
 
     Source: K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, *A fast and elitist multiobjective
     genetic algorithm: NSGA-II* (IEEE Transactions on Evolutionary Computation 6:182, 2002).
-
-    Args:
-        objectives: Finite values to be maximised, ``(n, objectives)``.
     """
     no_worse = (objectives[:, np.newaxis] >= objectives).all(axis=-1)
     better = (objectives[:, np.newaxis] > objectives).any(axis=-1)

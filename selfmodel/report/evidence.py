@@ -66,11 +66,9 @@ def residual_section(subject: Subject) -> Section | None:
 
 
 def _axis(subject: Subject) -> tuple[dict[str, float], tuple[charts.Mark, ...]]:
-    """Returns a time axis of all trials, one after the other.
+    """Returns a time axis of all trials, one after the other: their beginnings, s, and marks.
 
-    Returns:
-        Beginning of each trial on the axis, s, by the path of its log; marks of the beginnings, and
-        of a change of the robot.
+    The beginnings are by the path of a trial; marks are of them and of a change of the robot.
     """
     offsets: dict[str, float] = {}
     marks: list[charts.Mark] = []

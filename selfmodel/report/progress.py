@@ -28,13 +28,8 @@ class Progress:
     The report is made of what the recovery has in memory, by simulations of its own: the recovery
     computes the same numbers with and without it.
 
-    Attributes:
-        folder: Folder of the run.
-        robot: The nominal robot.
-        on_event: Callback that every event is handed to.
-        threads: Threads of the physics of the report.
-        reports: Whether the report in the folder is rewritten after each trial, as soon as it is
-            diagnosed, and before the first diagnosis.
+    If it ``reports``, the report in the folder of the run is rewritten after each trial, as soon as
+    it is diagnosed, and before the first diagnosis.
     """
 
     folder: Path

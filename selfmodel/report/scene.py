@@ -192,14 +192,10 @@ def _motion(robot: Robot, bodies: IndexArray, motion: Motion, steps: IndexArray)
 
 
 def quantised(values: FloatArray) -> dict[str, Any]:
-    """Returns finite numbers as 16-bit numbers between the bounds of each column.
+    """Returns numbers, ``(rows, columns)``, as 16-bit numbers between the bounds of each column.
 
-    Args:
-        values: Numbers, ``(rows, columns)``; the error is at most 1/131070 of a column's span.
-
-    Returns:
-        ``low`` and ``span`` of each column and, in ``data``, little-endian 16-bit numbers q in
-        base64, in row-major order: a value is ``low + span * q / 65535``.
+    They are ``low`` and ``span`` of each column and, in ``data``, little-endian numbers q in
+    base64, in row-major order: a value is ``low + span * q / 65535``.
     """
     low, high = values.min(axis=0), values.max(axis=0)
     span = high - low

@@ -164,9 +164,6 @@ def subject_of_run(
         comparator: Name of the comparator of the run, which may be ``package.module:object``;
             ``auto`` for that of its result.
         kinds: Fault kinds of the run that are no entry points.
-
-    Raises:
-        InputError: The folder has no logs or diagnoses, or a file of it is damaged.
     """
     paths = sorted((folder / TRIALS).glob("*.mcap"), key=trial_order)
     if not paths:
@@ -235,13 +232,8 @@ def subject_of_logs(
         diagnosis: Output of ``selfmodel diagnose --json``, or the ``result.json`` of a recovery.
         robot: Self-model instead of that in the logs, as in ``--robot`` of the diagnosis.
         threads: Threads of the physics; 0 for all processors.
-        comparator: ``auto`` for the comparator that the file names; its name, such as
-            ``package.module:object``, if it is no entry point.
-        kinds: Fault kinds of the diagnosis that are no entry points.
-
-    Raises:
-        InputError: The diagnosis is of other logs, of another self-model or with another
-            comparator, or a file is damaged.
+        comparator: As of ``subject_of_run``.
+        kinds: As of ``subject_of_run``.
     """
     file = DiagnosisFile(diagnosis, DiagnosisResult)
     explained, intact = file.matched(paths)
@@ -286,12 +278,7 @@ WORDS = {
 class DiagnosisFile(Generic[Result]):
     """A diagnosis in a JSON file: the logs that it is of, its plug-ins, its calibration.
 
-    Args:
-        path: Output of ``diagnose --json``, or a run's ``result.json``.
-        kind: Class of the content.
-
-    Raises:
-        InputError: The file cannot be read, or is no such file, or was altered.
+    The class of the content is that of the output of ``diagnose --json``, or of ``result.json``.
     """
 
     def __init__(self, path: Path, kind: type[Result]) -> None:
@@ -350,12 +337,7 @@ class DiagnosisFile(Generic[Result]):
             )
 
     def comparator_name(self, given: str) -> str:
-        """Returns the name by which the recorded comparator is found.
-
-        Args:
-            given: Name of ``--comparator``: where the recorded comparator is, such as
-                ``package.module:object``; ``auto`` for one that its own name finds.
-        """
+        """Returns the name by which the recorded comparator is found: that of ``--comparator``."""
         recorded = self.result.comparator
         if given == AUTO:
             return self._installed(recorded)

@@ -194,12 +194,9 @@ def _compared(runs: pd.DataFrame, measure: str, seed: int) -> dict[str, Any]:
 
 
 def _marginal(values: FloatArray, measure: str) -> Interval:
-    """Returns the mean of cell means with its interval.
+    """Returns the mean of cell means with its interval, from values ``(seeds, cells)``.
 
-    Args:
-        values: ``(seeds, cells)``; NaN for a run that is missing. If there is one, or a single
-            seed, the interval over seeds is NaN.
-        measure: ``share`` or ``number``.
+    With a missing run, NaN, or a single seed, the interval over seeds is NaN.
     """
     mean = float(np.nanmean(values, axis=0).mean())
     low = high = math.nan

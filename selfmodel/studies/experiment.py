@@ -161,11 +161,7 @@ class Reality:
 
 
 def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
-    """Returns the reality gap of a physical robot; a search with the same seed draws other numbers.
-
-    Raises:
-        InputError: The level is out of range.
-    """
+    """Returns the gap of a physical robot; a search with the same seed draws other numbers."""
     return Reality(draw_gap(robot, level, random_stream(seed, "gap")))
 
 
@@ -292,8 +288,6 @@ def read_reference(path: Path, robot: Robot) -> Reference:
             hinges, rad. Other columns are ignored.
         robot: The robot that is to follow the trajectory.
 
-    Raises:
-        InputError: The file cannot be read, or has no column of the robot.
     """
     if path.suffix.lower() == ".mcap":
         (log,) = read_logs([path])

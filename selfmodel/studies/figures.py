@@ -209,10 +209,8 @@ def by_trial(
     The line of a case and a comparator has the failing trial, then the best recovery trial so far
     after one, two and more trials: medians over the seeds.
 
-    Args:
-        trials: Physical trials of all recoveries.
-        grey: Cases by robot that the paper did not restore.
-        restored: Function of the trials of a recovery to the values of its line.
+    ``grey`` are the cases by robot that the paper did not restore, and ``restored`` returns the
+    values of the line of a recovery from its trials.
     """
     robots, comparators = (_distinct(trials, name) for name in ("robot", "comparator"))
     cases = sorted({trial["case"] for trial in trials})
@@ -254,10 +252,8 @@ def by_trial(
 def by_cost(costs: Sequence[Row], band: str, reported: tuple[float, float, str]) -> Figure:
     """Returns Figure 6: the function restored by the number of physical trials, per robot.
 
-    Args:
-        costs: Quartiles of all ways.
-        band: The way that is drawn as a line with a band.
-        reported: Trials, restored function, and label of the paper's own number.
+    ``costs`` are quartiles of all ways, ``band`` the way that is drawn as a line with a band, and
+    ``reported`` trials, restored function, and label of the paper's own number.
     """
     robots, ways = (_distinct(costs, name) for name in ("robot", "way"))
     others = [way for way in ways if way != band]
@@ -390,14 +386,9 @@ def _panels(
     margin: tuple[float, float],
     share: Any,  # noqa: ANN401  # of matplotlib
 ) -> tuple[Figure, list[Axes]]:
-    """Returns a figure with panels; sizes and the margin around all of them in inches.
+    """Returns a figure with panels, of a size each, and a margin around all of them, in inches.
 
-    Args:
-        count: Number of panels.
-        columns: Number of columns, if there are as many panels.
-        size: Width and height of a panel.
-        margin: Width and height in addition to those of the panels.
-        share: Axes that panels share: ``x``, ``y``, True for both, or False.
+    The panels share the axes ``x``, ``y``, both (True) or none (False).
     """
     rows, columns = math.ceil(count / columns), min(count, columns)
     whole_size = (margin[0] + columns * size[0], margin[1] + rows * size[1])

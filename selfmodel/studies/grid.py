@@ -136,12 +136,8 @@ def _computed(
 ) -> Iterator[tuple[Cell, Answer]]:
     """Yields each cell with its answer, in order of completion.
 
-    Args:
-        folder: Folder of the study.
-        cells: The cells by their place; a need that is not among them is finished.
-        given: Executor of the caller, which gets every cell as soon as it can be computed; None for
-            processes, which get the first cells first: an interrupted study has whole runs.
-        workers: Number of the processes.
+    A given executor gets every cell as soon as it can be computed, processes get the first cells
+    first: an interrupted study has whole runs. A need that is not among the cells is finished.
     """
     graph = TopologicalSorter(
         {
@@ -297,9 +293,6 @@ def dask_executor(address: str) -> Iterator[Executor]:
     Args:
         address: ``HOST:PORT`` of the scheduler, or ``tls://HOST:PORT`` for a connection that Dask's
             configuration encrypts.
-
-    Raises:
-        InputError: Dask is not installed, or no scheduler answers.
     """
     try:
         import dask  # noqa: PLC0415  # an extra

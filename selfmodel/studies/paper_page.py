@@ -63,13 +63,10 @@ restoration after 3 trials. The data are in [costs.csv](costs.csv).
 
 @dataclass(frozen=True)
 class PaperResults:
-    """Results of the experiment.
+    """Results of the experiment: settings of its runs, None without one, and rows.
 
-    Attributes:
-        settings: Parameters of all runs; None without a finished run.
-        recoveries: Rows of all recoveries in the folder.
-        trials: Rows of their physical trials.
-        evolution: Rows of the generations of the evolutions on the robot.
+    They are those of recoveries, of their physical trials, and of the generations of the evolutions
+    on the robot.
     """
 
     settings: Settings | None

@@ -106,13 +106,10 @@ def ablation(
         kinds: Fault kinds to search, as in ``--kinds``.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
-        score: Name of the fitness of the repair; None for that of the repair.
+        score: Name of the fitness; None for that of the repair.
         repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
         search: Name of its search; None for that of the repair.
         only: Share of the runs.
-
-    Raises:
-        InputError: The definition is invalid.
     """
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
     trials = settings.trials
@@ -179,27 +176,11 @@ def suite(
     search: str | None = None,
     only: Share = ALL,
 ) -> Study:
-    """Returns a study of recoveries of many bodies, with one comparator; see ``ablation``.
+    """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.
 
-    Args:
-        folder: Folder of the study.
-        bodies: Names of robots, and paths of MJCF or URDF files.
-        cases: Numbers of failures like those of Table I; a case that does not apply to a body or
-            to its controllers is omitted.
-        seeds: Seeds, one run each.
-        settings: Parameters of the recoveries.
-        comparator: Name of the comparator, ``package.module:object``, or ``auto``.
-        controller: Name of the controller design.
-        neurons: Number of hidden neurons; None for the design's default.
-        kinds: Fault kinds to search, as in ``--kinds``.
-        gap: Level of the reality gap.
-        score: Fitness of the repair, also reported per trial; None for that of the repair.
-        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
-        search: Name of its search; None for that of the repair.
-        only: Share of the bodies with their seeds.
-
-    Raises:
-        InputError: The definition is invalid.
+    Bodies are names of robots, or paths of MJCF or URDF files. A case that does not apply to a body
+    or to its controllers is omitted; the share is of bodies with their seeds. The comparator may be
+    ``auto``, and ``score`` is reported per trial too.
     """
     comparator_choice(comparator)
     plugins.kinds(kinds)
@@ -239,9 +220,6 @@ def paper(
 
     A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
     is exact, and is not calibrated.
-
-    Raises:
-        InputError: The definition is invalid.
     """
     for robot in robots:
         if robot not in ROBOTS:
@@ -288,11 +266,7 @@ def _study(
     *,
     function: str = "recover",
 ) -> Study:
-    """Returns a study at points, which get their names.
-
-    Raises:
-        InputError: A gap is out of range, or two robots would have the same file names.
-    """
+    """Returns a study at points, which get their names."""
     named: dict[str, Point] = {}
     for point in points:
         if not 0 <= point["gap"] <= MAX_GAP_LEVEL:
@@ -392,9 +366,6 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
             suite may be omitted unless another robot has the same name.
         tasks: Names of tasks; a domain contributes the tasks that it has. None for the default
             task of each domain.
-
-    Raises:
-        InputError: A domain is unknown or has none of the tasks, or no domain has a task.
     """
     bodies: list[str] = []
     for given in domains:

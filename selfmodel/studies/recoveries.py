@@ -93,12 +93,7 @@ def robot_key(robot: str) -> str:
 
 
 def repair_parameters(repair: str, search: str | None, score: str | None) -> dict[str, str]:
-    """Returns the names that determine a repair, with the defaults of the repair for None.
-
-    Raises:
-        InputError: A name is unknown, the paper's repair is to have another search, or the search
-            needs a repertoire, which a study does not have.
-    """
+    """Returns the names that determine a repair, with the defaults of the repair for None."""
     if search == plugins.REPERTOIRE:
         raise InputError(
             f"a repertoire is of one robot, and a study of many has none, got --search {search}: "
@@ -125,10 +120,10 @@ def gait_cell(
     """Returns the cell of the first gait of a recovery with the same seed.
 
     Args:
-        robot: The robot, as planned.
+        robot: The robot, as ``planned``.
         settings: Parameters of the repair.
         seed: Seed of all random numbers.
-        repair: The repair that evolves the gait; see ``repair_parameters``.
+        repair: The repair that evolves the gait, as ``repair_parameters``.
         controller: Name of the controller design.
         neurons: Number of hidden neurons; None for the design's default.
     """
@@ -167,13 +162,7 @@ def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
 def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
     """Returns the cell of a gait of a bank; its parameters contain the file.
 
-    Args:
-        bank: Folder with the file ``ROBOT-K.npz``, or the gaits of another study.
-        robot: The robot, as planned.
-        number: Number of the gait, from 0.
-
-    Raises:
-        InputError: The bank has no such gait, or the gait is for another robot.
+    The bank is a folder with the file ``ROBOT-K.npz``, or the gaits of another study.
     """
     name = robot["robot"]
     bank_gait(bank, name, number)
@@ -204,8 +193,7 @@ def _bank_file(bank: Path, robot: str, number: int) -> Path:
 def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str]:
     """Runs the trials of a run before and after the failure, and fits the self-model to the former.
 
-    Returns:
-        The names of the trials.
+    It returns the names of the trials.
     """
     settings = Settings(**parameters["shared"]["settings"])
     robot, seed = planned_entry(parameters).robot(), parameters["seed"]
@@ -235,11 +223,7 @@ def truth_of(parameters: Parameters, robot: Robot) -> Hypothesis:
 
 
 def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
-    """Returns the diagnoses of the trials of a run, after the first and after the last of them.
-
-    Raises:
-        InputError: The comparator cannot compare the trials.
-    """
+    """Returns the diagnoses of the trials of a run, after the first and after the last of them."""
     folder, shared = needs["trials"], parameters["shared"]
     logged = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
     trials = logged[HEALTHY_TRIALS:]
@@ -261,10 +245,6 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     """Runs a recovery, and returns rows of its diagnoses, of its trials, and its own.
 
     In place of a recovery, the paper's control runs the repair EA on the robot.
-
-    Raises:
-        InputError: The comparator cannot compare the trials.
-        WorkError: A trial could not be run or read.
     """
     if parameters["comparator"] == ON_ROBOT:
         return _evolve_on_robot(parameters, needs)

@@ -164,14 +164,9 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 
 @dataclass(frozen=True)
 class LoadedStudy:
-    """Rows of a study with their statistics.
+    """Rows of a study, one per diagnosis or recovery, with what they compare.
 
-    Attributes:
-        kind: Name of the study: ``ablate``, ``paper``, ``suite`` or ``rivals``.
-        path: Folder or file that the rows are from.
-        rows: A row per diagnosis or recovery.
-        outcomes: What the rows compare, for ``comparisons.compare``; empty for a study with one
-            method.
+    The outcomes are those of ``comparisons.compare``; none for a study with one method.
     """
 
     kind: str
@@ -277,12 +272,9 @@ def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
 
 
 def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
-    """Returns the rows of all finished runs in the folder of a study, in order.
+    """Returns the rows of all finished runs in the folder of a study of ``KINDS``, in order.
 
-    Args:
-        name: Name of the study, one of ``KINDS``.
-        folder: The folder.
-        table: Name of the table; None for that with the columns of the kind.
+    Without the name of a table, they have the columns of the kind.
     """
     kind = KINDS[name]
     rows = rows_in(folder, table or kind.table)

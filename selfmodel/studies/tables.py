@@ -124,13 +124,9 @@ def as_json(value: Any) -> Any:  # noqa: ANN401  # JSON
 
 @dataclass(frozen=True)
 class Table:
-    """A table for programs and for readers.
+    """A table, whose file has its name: the rows with all digits, and as texts for readers.
 
-    Attributes:
-        name: Name of its file, without an extension.
-        records: The rows with all digits, for programs.
-        shown: The same rows as texts, for readers.
-        texts: Number of leading columns of ``shown`` that are texts; the others are numbers.
+    The first columns for readers, ``texts`` of them, are texts, the others numbers.
     """
 
     name: str
@@ -176,7 +172,7 @@ def _flat(record: Row, intervals: set[str]) -> Row:
 def results_files(
     name: str, rows: Sequence[Row], key: str, summaries: Sequence[Row]
 ) -> dict[str, bytes]:
-    """Returns the content of ``results.csv`` and ``results.json`` of a study.
+    """Returns the files ``results.csv`` and ``results.json`` of a study.
 
     Args:
         name: Name of the study.
@@ -244,11 +240,7 @@ def check_format(wanted: str | None) -> None:
 
 
 def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
-    """Returns the content of the files of tables by their name; a table without a row has none.
-
-    Raises:
-        InputError: The format is unknown, or needs a package that is missing.
-    """
+    """Returns the content of the files of tables by their name; a table without a row has none."""
     if wanted not in FORMATS:
         raise unknown_name("table format", wanted, FORMATS)
     suffix, write = FORMATS[wanted]
