@@ -69,7 +69,7 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     scored = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
     rows = next(filter(None, scored), [])
     every = {**other_lists(folder), **tables}
-    shown = tuple(_table(name, records) for name, records in every.items())
+    shown = tuple(Table.of(encodable(name), records) for name, records in every.items())
     sections = [
         _shares(rows) if rows else None,
         Section("tables", "Tables", ("A heading sorts its table by that column.",), shown),
@@ -126,12 +126,6 @@ def _numbers_first(name: str) -> tuple[float, str]:
     except ValueError:
         return math.inf, name
     return (math.inf if math.isnan(value) else value), name
-
-
-def _table(name: str, records: Sequence[Record]) -> Table:
-    columns = tuple(dict.fromkeys(key for record in records for key in record))
-    rows = tuple(tuple(record.get(column) for column in columns) for record in records)
-    return Table(encodable(name), columns, rows)
 
 
 def _figures(folder: Path, most: int) -> Section | None:

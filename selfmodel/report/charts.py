@@ -5,9 +5,9 @@ logs and results, and NaN or infinite numbers are null. Labels have the unit.
 """
 
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 
@@ -133,6 +133,12 @@ class Table(Item, frozen=True, tag="table"):
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
+
+    @classmethod
+    def of(cls, title: str, records: Sequence[Mapping[str, Cell]]) -> Self:
+        """Returns the table of records, whose keys are its columns."""
+        columns = tuple(dict.fromkeys(key for record in records for key in record))
+        return cls(title, columns, tuple(tuple(map(one.get, columns)) for one in records))
 
 
 class Picture(Item, frozen=True, tag="picture"):

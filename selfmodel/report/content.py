@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.logs.results import RecoveryResult, Search, TrialResult
+from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.report import charts
 from selfmodel.report.charts import Item, Report, Section
@@ -31,6 +31,13 @@ MAX_LINES = 4
 
 MAX_DIAGRAMS = 12
 """Trials with a gait diagram, at most: the last ones."""
+
+TRIAL_COLUMNS = {
+    "predicted before the trial": "predicted_score",
+    "hypothesis at the time": "hypothesis",
+    "fell at step": "fell_at_step",
+}
+"""Further columns of the table of trials of a recovery, and the fields of their results."""
 
 Z = 1.96
 """Half width of a 95 % interval of a normal distribution, in standard deviations."""
@@ -164,27 +171,26 @@ def _displacements(shot: Shot) -> tuple[float, ...]:
 
 
 def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
-    columns = ["trial", "stage", "steps", "observed displacement, m"]
-    columns += ["predicted displacement, m", "predicted under"]
     result = subject.result
     results = {} if result is None else {one.name: one for one in result.trials or ()}
-    if result is not None:
-        columns += [f"{result.score.name}, {result.score.unit}".removesuffix(", ")]
-        columns += ["predicted before the trial", "hypothesis at the time", "fell at step"]
     rows = []
     for one in shots:
         first = one.rollouts[0]
-        row: list[charts.Cell] = [one.name, one.trial.plan.stage, one.trial.trajectory.steps]
-        row += [one.trial.displacement, first.displacement, str(first.hypothesis)]
-        row += [] if result is None else _scores(results.get(one.name))
-        rows.append(tuple(row))
-    return charts.Table("Trials", tuple(columns), tuple(rows))
-
-
-def _scores(trial: TrialResult | None) -> list[charts.Cell]:
-    if trial is None:
-        return [None] * 4
-    return [trial.score, trial.predicted_score, trial.hypothesis, trial.fell_at_step]
+        row: dict[str, charts.Cell] = {
+            "trial": one.name,
+            "stage": one.trial.plan.stage,
+            "steps": one.trial.trajectory.steps,
+            "observed displacement, m": one.trial.displacement,
+            "predicted displacement, m": first.displacement,
+            "predicted under": str(first.hypothesis),
+        }
+        if result is not None:
+            score = f"{result.score.name}, {result.score.unit}".removesuffix(", ")
+            found = results.get(one.name)
+            for title, name in {score: "score", **TRIAL_COLUMNS}.items():
+                row[title] = getattr(found, name, None)
+        rows.append(row)
+    return charts.Table.of("Trials", rows)
 
 
 def hypotheses_section(subject: Subject) -> Section:
@@ -199,14 +205,12 @@ def hypotheses_section(subject: Subject) -> Section:
         names=("distance",),
         groups=tuple(charts.Group(str(one), (distance,)) for one, distance in ranked),
     )
-    table = charts.Table(
-        "Hypotheses",
-        ("rank", "hypothesis", "distance", "against the best"),
-        tuple(
-            (rank, str(one), distance, _standing(diagnosis, one))
-            for rank, (one, distance) in enumerate(ranked, start=1)
-        ),
+    columns = ("rank", "hypothesis", "distance", "against the best")
+    rows = tuple(
+        (rank, str(one), distance, _standing(diagnosis, one))
+        for rank, (one, distance) in enumerate(ranked, start=1)
     )
+    table = charts.Table("Hypotheses", columns, rows)
     items = (chart, table) if len(subject.diagnoses) < 2 else (chart, table, _over_time(subject))
     text = (
         f"The smaller the distance, the better the prediction. The first hypothesis has the fewest "

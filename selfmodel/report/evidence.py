@@ -195,20 +195,18 @@ def separation_section(subject: Subject) -> Section:
     if not diagnosis.indistinguishable and not diagnosis.undetectable:
         text = "No other hypothesis predicts the trials as well, and no fault is undetectable."
         return Section("separation", title, (text,))
-    alike = [(str(one), "predicts the trials as well") for one in diagnosis.indistinguishable]
-    alike += [
-        (str(one), "its further fault does not show in these trials")
-        for one in diagnosis.undetectable
+    reasons = [(one, "predicts the trials as well") for one in diagnosis.indistinguishable]
+    reasons += [
+        (one, "its further fault does not show in these trials") for one in diagnosis.undetectable
     ]
     text = "These hypotheses predict the trials as well as the best one, or nearly so."
     advice = (
         "A trial separates hypotheses if their predictions of it differ; a disagreement of 1 is "
         "complete."
     )
-    table = charts.Table(
+    table = charts.Table.of(
         "Hypotheses that cannot be distinguished from the best",
-        ("hypothesis", "reason"),
-        tuple(alike),
+        [{"hypothesis": str(one), "reason": reason} for one, reason in reasons],
     )
     return Section("separation", title, (text, advice), (table, *_separating_trials(subject)))
 
