@@ -127,7 +127,7 @@ def _folder_of(file: Path, assets: object) -> str:
             f"absolute path with --set assets=DIR"
         )
     folder = file.parent / assets
-    if is_around_home(folder.resolve()):
+    if is_around_home(folder):
         raise InputError(
             f"assets may not be the home folder, or a folder around it, got {assets!r}: give that "
             f"folder with --set assets=DIR"

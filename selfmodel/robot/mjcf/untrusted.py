@@ -252,8 +252,8 @@ def root_around(folder: Path) -> Path:
 
 def is_around_home(folder: Path) -> bool:
     """Returns whether a folder is the home folder, or contains the home folder."""
-    home = Path(realpath(expanduser("~")))
-    return folder == folder.parent or home.is_relative_to(folder)
+    real, home = Path(realpath(folder)), Path(realpath(expanduser("~")))
+    return real == real.parent or home.is_relative_to(real)
 
 
 @dataclass(frozen=True)

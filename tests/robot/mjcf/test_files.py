@@ -131,6 +131,14 @@ def test_a_settings_file_cannot_open_the_whole_disk(tmp_path: Path, assets: str)
         read_settings(tmp_path / "robot.xml")
 
 
+def test_a_settings_file_that_names_a_loop_of_links_is_refused(tmp_path: Path):
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    put(tmp_path / "robot.toml", 'assets = "loop"')
+
+    with pytest.raises(InputError, match="assets needs a folder"):
+        load_mjcf(put(tmp_path / "robot.xml", mjcf()))
+
+
 def test_a_model_of_a_settings_folder_loads(tmp_path: Path):
     text = mjcf(more='<asset><mesh name="m" file="../shapes/m.obj"/></asset>', torso=MESHED)
     put(tmp_path / "shapes" / "m.obj", CUBE)
