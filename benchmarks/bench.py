@@ -24,7 +24,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mujoco import rollout
 
-from selfmodel import tasks
+from selfmodel import plugins, tasks
 from selfmodel.arguments import comparator_choice
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.controllers.controller import CommandSource, Controller, draw_genomes, make_batch
@@ -39,6 +39,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -284,6 +285,8 @@ def one_recovery() -> dict[str, float]:
             threads=os.cpu_count() or 1,
             folder=Path(folder) / "run",
             calibrated=False,
+            score=DISPLACEMENT,
+            repair=plugins.PAPER,
             physical=lambda model, hidden: TimedRobot(SimulatedRobot(model, hidden)),
         )
         outcome = run(experiment, lambda _event: None)

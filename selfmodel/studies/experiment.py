@@ -28,7 +28,7 @@ from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.recovery.recover import RecoveryLoop, random_stream
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, upright_within
+from selfmodel.recovery.scores import UPRIGHT, Score, upright_within
 from selfmodel.recovery.tracking import TRACKING, Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -82,9 +82,9 @@ class Experiment:
     calibrated: bool = True
     next_trial: str = "repair"
     design: Design | None = None
-    score: Score = DISPLACEMENT
+    score: Score = UPRIGHT
     physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
-    repair: str = plugins.PAPER
+    repair: str = plugins.ROBUST
     search: str | None = None
     repertoire: Repertoire | None = None
 
