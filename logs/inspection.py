@@ -17,13 +17,7 @@ from selfmodel.trials.signals import SIGNALS, Signal
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """Summary of one topic of a log.
-
-    Attributes:
-        type: Type of the messages.
-        messages: Number of messages.
-        rate: Mean message rate, 1/s; 0 for a single message.
-    """
+    """Type of the messages on a topic, their number, and mean rate, 1/s (0 for a single one)."""
 
     type: str
     messages: int
@@ -98,13 +92,7 @@ def _topic(messages: Messages) -> TopicInfo:
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """Result of a verification.
-
-    Attributes:
-        log: Content of the log.
-        model_loaded: Whether MuJoCo is installed and has loaded the model.
-        digest: SHA-256 of the file.
-    """
+    """Content of a verified log, whether MuJoCo has loaded its model, and the file's SHA-256."""
 
     log: TrialLog
     model_loaded: bool

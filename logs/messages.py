@@ -244,14 +244,7 @@ _XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a messag
 
 
 class Topic:
-    """Topic of a trial's log.
-
-    Args:
-        name: Name of the topic, such as ``/odom``.
-        kind: Message type.
-        content: Fixed content of the messages; see ``Template``.
-        parts: Quantities in a message with their widths, in order.
-    """
+    """Topic of a trial's log: message type, fixed content (see ``Template``), widths of parts."""
 
     def __init__(self, name: str, kind: str, content: Mapping[str, Any], **parts: int) -> None:
         self.name, self.type = name, kind

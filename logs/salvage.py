@@ -19,14 +19,7 @@ _SEALED = "selfmodel.manifest"
 
 @dataclass(frozen=True)
 class Salvaged:
-    """Result of a salvage.
-
-    Attributes:
-        log: New file.
-        steps: Number of steps in the new log: those before the first damage.
-        planned: Planned number of steps.
-        damage: The first damage of the old log.
-    """
+    """Result of a salvage: new file, its steps of those planned, first damage of the old file."""
 
     log: str
     steps: int

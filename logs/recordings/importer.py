@@ -44,7 +44,7 @@ class ImportedTrial:
         digests: SHA-256 of the recording's files by name.
         clock: Clock of the times: ``header``, ``log`` or ``column``.
         origin: Start of the trial, ns since 1970 or since the start of a table's time.
-        notes: Warnings for the user, one sentence each.
+        notes: Warnings, one sentence each.
     """
 
     trajectory: Trajectory

@@ -52,11 +52,9 @@ class Place:
 
     Attributes:
         path: Entry of the mapping; errors name its line.
-        topic: Topic.
-        columns: Columns on that topic, side by side.
+        topic: Topic, with the columns side by side.
         numbers: Half-open range of the numbers of these columns.
-        scale: Factor to the unit and the sign of the model.
-        offset: Offset after the factor.
+        scale: Factor to the unit and the sign of the model; then ``offset`` is added.
     """
 
     path: Keys

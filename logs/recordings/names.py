@@ -141,12 +141,8 @@ _COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW])[\])]?$"
 class Classified:
     """Columns of a table by their quantity.
 
-    Attributes:
-        times: Columns that may be the time.
-        parts: Columns by quantity and by the rest of their name, which may be a joint's. The
-            quantities are ``command``, ``velocity``, ``effort``, ``sensor`` and ``position``.
-        vectors: Columns of each vector of ``base`` and of ``imu``.
-        others: All other columns.
+    ``parts`` has ``command``, ``velocity``, ``effort``, ``sensor`` and ``position``, each by the
+    rest of the name, which may be a joint's; ``vectors`` those of ``base`` and of ``imu``.
     """
 
     times: list[str] = field(default_factory=list)

@@ -20,10 +20,7 @@ MAX_GAPS_IN_FACTS, MAX_GAPS_IN_NOTES = 100, 5
 
 
 class Gap(NamedTuple):
-    """Interval between two messages longer than ``MAX_PERIOD_RATIO`` usual periods, s.
-
-    It starts at the message before it, from the start of the trial, perhaps before it.
-    """
+    """Time between two messages longer than ``MAX_PERIOD_RATIO`` usual ones, s, from the start."""
 
     start: float
     length: float

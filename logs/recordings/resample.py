@@ -37,12 +37,7 @@ class Clocked:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Time series of one quantity; one without samples was not recorded.
-
-    Attributes:
-        times: Times, ``(m,)`` ns, strictly increasing.
-        values: Values, ``(m, width)``, finite.
-    """
+    """Finite values of a quantity, ``(m, width)``, at increasing times, ``(m,)`` ns; or none."""
 
     times: IntArray
     values: FloatArray
@@ -90,14 +85,9 @@ def clocked(series: Series, clock: str) -> Clocked:
 
 
 def track(clock: Clocked, columns: Sequence[Column], numbers: slice) -> Track:
-    """Returns the time series of some numbers of columns, sorted, with distinct times.
+    """Returns some numbers of columns of a topic, side by side, sorted, with distinct times.
 
     Rows with a value that is NaN, infinite or above ``MAX_MEASUREMENT`` are left out.
-
-    Args:
-        clock: Times of the topic.
-        columns: Columns of the topic, with the same messages.
-        numbers: Slice of their numbers, side by side.
     """
     index = columns[0].index
     values = np.concatenate([column.values for column in columns], axis=1)[:, numbers]
