@@ -11,7 +11,7 @@ import os
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, TextIO
 
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 STDIN, STDOUT, STDERR = 0, 1, 2
-
-MUJOCO_LOG = "selfmodel.robot.mujoco_errors"
-"""Module that counts MuJoCo's warnings; it is not imported by a command without MuJoCo."""
 
 
 def plain(text: str) -> str:
@@ -152,21 +149,21 @@ def counted_warnings() -> Iterator[None]:
     def count(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
         found[f"Python warned {{}}: {category.__name__}: {message}"] += 1
 
-    before = Counter(_mujoco_warnings())
+    before = _mujoco_warnings()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("always", RuntimeWarning)  # each occurrence, not each place
             warnings.showwarning = count
             yield
     finally:
-        since = Counter(_mujoco_warnings()) - before
-        found.update({f"MuJoCo warned {{}}: {text}": number for text, number in since.items()})
+        found.update(_mujoco_warnings() - before)
         for text, number in found.items():
             sentence = text.replace("{}", counted(number, "time"), 1)
             print_notes(f"note: {' '.join(sentence.split())}")
 
 
-def _mujoco_warnings() -> Mapping[str, int]:
-    module = sys.modules.get(MUJOCO_LOG)
-    found: Mapping[str, int] = {} if module is None else module.mujoco_warnings()
-    return found
+def _mujoco_warnings() -> Counter[str]:
+    """Returns the warnings of MuJoCo and their numbers; none where no command has loaded it."""
+    module = sys.modules.get("selfmodel.robot.mujoco_errors")
+    numbers = {} if module is None else module.mujoco_warnings()
+    return Counter({f"MuJoCo warned {{}}: {text}": number for text, number in numbers.items()})

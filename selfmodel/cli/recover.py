@@ -21,16 +21,8 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
+from selfmodel.logs import results
 from selfmodel.logs.files import replace_file
-from selfmodel.logs.results import (
-    RESULT,
-    RecoveryResult,
-    ScoreResult,
-    TrialResult,
-    as_json as values_of,
-    result_bytes,
-    write_searches,
-)
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.report.charts import REPORT, html_of
@@ -59,23 +51,22 @@ def recover(options: Recover) -> None:
         with progress.kept_on_failure():
             outcome = run(experiment, progress)
     result = recovery_result(experiment, outcome)
+    folder = experiment.folder
     try:
-        write_searches(experiment.folder, progress.searches)
+        results.write_searches(folder, progress.searches)
         logs = [Path(trial.path) for trial in outcome.recovery.trials]
-        digests = {relpath(one, experiment.folder): file_digest(one) for one in logs}
+        digests = {relpath(one, folder): file_digest(one) for one in logs}
         content = result.as_file(experiment.settings, digests)
-        replace_file(experiment.folder / RESULT, result_bytes(content))
+        replace_file(folder / results.RESULT, results.result_bytes(content))
     finally:  # the result is printed even if the disk is full
         if options.as_json:
-            print_json(values_of(result))
+            print_json(results.as_json(result))
         else:
-            _print(values_of(result), outcome.recovery.diagnosis, experiment.folder)
+            _print(result, outcome.recovery.diagnosis, folder)
     if options.report:
-        subject = subject_of_run(
-            experiment.folder, experiment.threads, options.comparator, experiment.kinds
-        )
-        replace_file(experiment.folder / REPORT, html_of(report_of(subject)))
-        print_notes(f"report: {experiment.folder / REPORT}")
+        subject = subject_of_run(folder, experiment.threads, options.comparator, experiment.kinds)
+        replace_file(folder / REPORT, html_of(report_of(subject)))
+        print_notes(f"report: {folder / REPORT}")
 
 
 def experiment_of(options: Recover) -> Experiment:
@@ -107,6 +98,7 @@ def experiment_of(options: Recover) -> Experiment:
             f"controller, a {design.name} with random weights: the {score.score.name} before the "
             f"failure is 0, except for a reality gap"
         )
+    now = datetime.now().astimezone()
     return Experiment(
         robot=robot,
         case=options.case,
@@ -117,7 +109,8 @@ def experiment_of(options: Recover) -> Experiment:
         settings=settings_of(options, options.steps),
         seed=options.seed,
         threads=thread_count(options.threads),
-        folder=options.out or _new_folder(robot.name),
+        # The name of a new folder does not contain the hidden failure.
+        folder=options.out or Path("runs") / f"{robot.name}-{now:%Y%m%d-%H%M%S-%f}",
         gap=options.gap,
         next_trial=options.next_trial,
         design=design,
@@ -138,17 +131,12 @@ def _described(robot: Robot, score: Score, trial: Trial) -> str:
     return f"{score.name} {value:.4f} {score.unit}".rstrip()
 
 
-def _new_folder(robot: str) -> Path:
-    """Returns an unused folder in ``runs/``; its name does not contain the hidden failure."""
-    return Path("runs") / f"{robot}-{datetime.now().astimezone():%Y%m%d-%H%M%S-%f}"
-
-
-def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
+def recovery_result(experiment: Experiment, outcome: Outcome) -> results.RecoveryResult:
     """Returns the outcome of a recovery as ``recover --json`` prints it."""
     recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
     design = experiment.design or network_for(experiment.robot)
     columns = (recovery.trials, recovery.tried, recovery.scores, recovery.predicted, recovery.falls)
-    return RecoveryResult(
+    return results.RecoveryResult(
         robot=experiment.robot.name,
         model=self_model_digest(experiment.robot),
         case=experiment.case,
@@ -165,7 +153,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
         neurons=design.hidden,
         seed=experiment.seed,
         trials=tuple(
-            TrialResult(
+            results.TrialResult(
                 log=trial.path,
                 stage=trial.plan.stage,
                 displacement=trial.displacement,
@@ -182,7 +170,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
         calibration=recovery.calibration.to_dict() if recovery.calibration else None,
         correct=outcome.correct,
         displacement={name: getattr(recovery, name) for name in ("before", "after", "recovered")},
-        score=ScoreResult(
+        score=results.ScoreResult(
             name=recovery.score.name,
             unit=recovery.score.unit,
             before=recovery.scores[0],
@@ -203,39 +191,30 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> RecoveryResult:
     )
 
 
-def _print(found: dict[str, Any], diagnosis: Diagnosis, folder: Path) -> None:
-    """Prints the trials, the diagnosis, and the true hypothesis.
-
-    Args:
-        found: The result as JSON values.
-        diagnosis: The last diagnosis.
-        folder: Folder of the recovery.
-    """
-    score, evaluations = found["score"], found["evaluations"]
-    column, key = f"{score['name']}, {score['unit']}".removesuffix(", "), "score"
-    whens = ("before", "after", "recovered")
-    results = [f"{score[when]:.4f} {score['unit']}".rstrip() for when in whens]
-    subject = f"The score {score['name']} was"
-    if score["name"] == DISPLACEMENT.name:
-        column, key = "forward, m", "displacement"
-        results = [f"{value:.2f} m" for value in found["displacement"].values()]
-        subject = "The robot went"
-    before, after, recovered = results
-    rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in found["trials"]]
-    trials = folding(
-        ("trial", "best hypothesis so far", column), rows, title="physical trials", texts=2
-    )
-    print_tables(trials, ranking_table(found["diagnosis"], found["truth"]))
-    gap = f", at a reality gap of {found['gap']:g}" if found["gap"] else ""
+def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) -> None:
+    """Prints the trials, the last diagnosis, and the true hypothesis."""
+    values, score, evaluations = results.as_json(found), found.score, found.evaluations
+    column, key, subject = f"{score.name}, {score.unit}", "score", f"The score {score.name} was"
+    ways = (score.before, score.after, score.recovered)
+    ends = [f"{value:.4f} {score.unit}".rstrip() for value in ways]
+    if score.name == DISPLACEMENT.name:
+        column, key, subject = "forward, m", "displacement", "The robot went"
+        ends = [f"{value:.2f} m" for value in found.displacement.values()]
+    before, after, recovered = ends
+    rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in values["trials"]]
+    columns = ("trial", "best hypothesis so far", column.removesuffix(", "))
+    trials = folding(columns, rows, title="physical trials", texts=2)
+    print_tables(trials, ranking_table(values["diagnosis"], found.truth))
+    gap = f", at a reality gap of {found.gap:g}" if found.gap else ""
+    verdict = right_or_wrong(str(diagnosis.best), found.truth, correct=found.correct)
     print_lines(
-        f"truth: {found['truth']}{gap}; the diagnosis is "
-        f"{right_or_wrong(str(diagnosis.best), found['truth'], correct=found['correct'])}.",
+        f"truth: {found.truth}{gap}; the diagnosis is {verdict}.",
         verdict_sentences(diagnosis),
         f"{subject} {before} before, {after} after the failure, and {recovered} at best in "
-        f"{counted(found['physical_trials'], 'trial')} since.",
-        *(["The robot fell in that trial, which is no recovery."] if found["fell"] else []),
+        f"{counted(found.physical_trials, 'trial')} since.",
+        *(["The robot fell in that trial, which is no recovery."] if found.fell else []),
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
-        f"hypotheses in {found['seconds']:.0f} s; diverged: {evaluations['diverged']}.",
+        f"hypotheses in {found.seconds:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",
     )
 
