@@ -59,11 +59,6 @@ REPERTOIRE = "repertoire"
 RETURN = "return"
 """Name of the score that is the sum of a task's rewards."""
 
-COMPARATOR_GROUP = "selfmodel.comparators"
-FAULT_KIND_GROUP = "selfmodel.fault_kinds"
-SCORE_GROUP = "selfmodel.scores"
-"""Groups of the entry points of plug-ins."""
-
 
 def comparator(name: str) -> Comparator:
     """Returns a comparator by name.
@@ -77,7 +72,7 @@ def comparator(name: str) -> Comparator:
     """
     if name in COMPARATORS:
         return COMPARATORS[name]
-    return as_comparator(_plug_in("comparator", name, COMPARATOR_GROUP, COMPARATORS), name)
+    return as_comparator(_plug_in("comparator", name, "selfmodel.comparators", COMPARATORS), name)
 
 
 def check_known(what: str, name: str, known: Collection[str]) -> None:
@@ -154,7 +149,7 @@ def _kind(name: str) -> FaultKind:
     own = {kind.name: kind for kind in ALL_KINDS}
     if name in own:
         return own[name]
-    found = _plug_in("kind", name, FAULT_KIND_GROUP, (*own, *KIND_SETS))
+    found = _plug_in("kind", name, "selfmodel.fault_kinds", (*own, *KIND_SETS))
     if not isinstance(found, FaultKind):
         raise InputError(
             f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"
@@ -163,7 +158,7 @@ def _kind(name: str) -> FaultKind:
 
 
 def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> object:
-    """Returns the object of an entry point, or of ``package.module:object``.
+    """Returns the object of an entry point of a group, or of ``package.module:object``.
 
     Raises:
         InputError: The name is unknown (the message has the nearest names), its object cannot be
@@ -224,7 +219,7 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     if name in SCORES:
         return SCORES[name]
     if name != RETURN:
-        found = _plug_in("score", name, SCORE_GROUP, (*SCORES, RETURN, TRACKING))
+        found = _plug_in("score", name, "selfmodel.scores", (*SCORES, RETURN, TRACKING))
         if not isinstance(found, Score):
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"

@@ -83,7 +83,7 @@ def load(
             ``Hypothesis``, which may have faults of third-party kinds; ``time_limit`` in seconds;
             ``random``, a seed, a numpy ``RandomState`` or a ``Generator``; ``gap``, the level of
             the reality gap; ``start_noise``, the standard deviation of the initial joint angles,
-            rad. See ``walking.environment`` and ``suite_tasks.environment``.
+            rad.
         environment_kwargs: Arguments of ``dm_control.rl.control.Environment``.
         visualize_reward: Whether colours show the reward, in tasks of the suite. Must be ``False``
             otherwise: the rewards are speeds, which dm_control cannot map to colours.
@@ -107,11 +107,7 @@ def load(
 
 
 def constructor(domain_name: str | Path, task_name: str) -> Callable[..., "control.Environment"]:
-    """Returns the function that makes the environments of a task; a file is read once.
-
-    Args:
-        domain_name: As for ``load``.
-        task_name: As for ``load``.
+    """Returns the function that makes the environments of a task; see ``load``.
 
     Raises:
         InputError: The robot or the task is unknown, or the file cannot be a robot.

@@ -113,12 +113,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
         seed: int | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode, with other random numbers if a seed is given.
-
-        Args:
-            seed: Seed of all that is random; None to continue the random numbers.
-            options: Ignored; part of Gymnasium's interface.
-        """
+        """Starts an episode; a seed is that of all that is random. Options are ignored."""
         super().reset(seed=seed, options=options)
         if seed is not None:
             self._environment.physics.free()
@@ -127,10 +122,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
         return _observation(self._environment.reset()), {}
 
     def step(self, action: FloatArray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies the commands of one control step.
-
-        Args:
-            action: Commands of the motors, ``(motors,)``.
+        """Applies the commands of the motors, ``(motors,)``, for one control step.
 
         Raises:
             ResetNeeded: The episode is over.

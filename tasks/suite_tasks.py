@@ -73,19 +73,10 @@ def environment(
 
     Without a hypothesis, a gap and start noise, it is the suite's own.
 
-    Args:
-        domain: Domain of the suite.
-        task: Task of the domain.
-        hypothesis: Faults of the body and of its environment, or their notation with built-in
-            kinds.
-        time_limit: Length of an episode, s; None for the suite's.
-        random: Seed or generator of the suite's initial states and of the start noise, which are
-            drawn for each episode, and of the gap and the terrain, which are drawn once.
-        gap: Level of the reality gap: factors of the model and a control delay. There is no
-            measurement noise, because the scales of the suite's observations are unknown.
-        start_noise: Standard deviation of a noise that is added to the joint angles of the suite's
-            initial state, rad; None for that of the gap.
-        environment_kwargs: Arguments of ``control.Environment``.
+    The other arguments are those of ``selfmodel.tasks.load``. The random numbers of an episode are
+    those of the suite's initial state and of the start noise, which is added to it. A gap has
+    factors of the model and a control delay, and no measurement noise, because the scales of the
+    suite's observations are unknown.
 
     Raises:
         InputError: The hypothesis cannot be parsed or does not apply, or another argument is out of
@@ -170,14 +161,8 @@ def _variant(
 class DamagedTask(suite_bodies.SuiteTask):
     """A task of the suite with welded joints at their angles, a control delay and start noise.
 
-    Observations, rewards and the end of an episode are the suite's.
-
-    Args:
-        task: The suite's task.
-        variant: The body with its faults.
-        anatomy: Parts of the body.
-        delay: Control delay, control steps.
-        start: Noise of the initial joint angles, as a gap level.
+    Observations, rewards and the end of an episode are the suite's. The delay is in control steps,
+    the noise of the joint angles at the start a level of the reality gap.
     """
 
     def __init__(

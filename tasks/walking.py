@@ -42,17 +42,9 @@ def environment(
     Without a gap and start noise, the physics, the readings and their timing equal the simulator's
     to the bit.
 
-    Args:
-        robot: The healthy robot.
-        hypothesis: Faults of the robot, or their notation with built-in kinds. Silent neurons have
-            no effect, because they belong to the controller.
-        time_limit: Length of an episode, s.
-        random: Seed or generator of the gap and the terrain, which are drawn once, and of the
-            initial pose and the sensor noise, which are drawn for each episode.
-        gap: Level of the reality gap, 0 to ``MAX_GAP_LEVEL``.
-        start_noise: Standard deviation of the initial joint angles, rad, with half of it for roll
-            and pitch of the base; None for that of the gap.
-        environment_kwargs: Arguments of ``control.Environment``.
+    The other arguments are those of ``selfmodel.tasks.load``. Silent neurons have no effect,
+    because they belong to the controller. The start noise tilts the base by half of that of the
+    joints.
 
     Raises:
         InputError: The base of the robot is fixed, its control delay has a part of a control step,
