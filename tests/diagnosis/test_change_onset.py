@@ -99,10 +99,3 @@ def test_a_jam_of_a_robot_that_has_lost_a_limb_before_is_found_with_both_hypothe
     assert found.change is not None
     assert str(found.change.before) == lost
     assert abs(found.change.time - 1.5) <= 0.2
-
-
-def test_a_robot_that_does_not_change_has_no_change(quadruped: Robot, gait: Controller):
-    found = diagnosed(quadruped, trial(quadruped, gait, JAM))
-
-    assert str(found.best) == JAM
-    assert found.change is None

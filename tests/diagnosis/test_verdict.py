@@ -115,6 +115,7 @@ def test_a_failure_of_table_one_is_found_and_explained(
     assert found.verdict == ("explained" if found.best else "intact")
     assert found.indistinguishable == ()
     assert found.test == TEST
+    assert found.change is None
     assert found.ranked[0].distance < 1e-9
     assert (found.intact_distance > 1e-4) == (case != 9)
 

@@ -27,8 +27,8 @@ LOGS = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
 
 
 @pytest.fixture(autouse=True)
-def _tables_are_lists(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=list))
+def _tables_are_their_content(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=lambda content: content))
 
 
 @pytest.fixture
@@ -107,11 +107,11 @@ def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):
 def test_a_replay_is_serialisable_and_a_table(trial: Trial, different: Replay):
     assert repr(different).startswith("<Replay of 60 steps: first divergence at step 0\n  rms ")
     values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
-    rows = different.to_pandas()
+    table = different.to_pandas()
 
     assert list(values) == ["observed", "identical", "first_divergence_step", "diverged", "rms"]
     assert values["rms"] == {signal: different.rms(signal) for signal in SIGNALS}
-    assert [row["step"] for row in rows] == list(range(60))
-    assert rows[7]["commands"] == different.errors["commands"][7]
+    assert table["step"].tolist() == list(range(60))
+    assert table["commands"][7] == different.errors["commands"][7]
     blind = selfmodel.replay(without_base(trial), "intact", "quadruped")
     assert blind.to_dict()["rms"]["base_position"] is None
