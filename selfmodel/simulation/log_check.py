@@ -5,7 +5,7 @@ than no motion at all, or off to one side. Then the same model predicts the tria
 the order of the columns corrected, and the best correction names the joint.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -91,34 +91,18 @@ def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
     return None
 
 
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """The column that each column is to be read from, and its sign, ``(columns,)`` each."""
+def _corrected(own: ObservedSegments, joints: IndexArray, motors: IndexArray) -> ObservedSegments:
+    """Returns segments with other columns: the number of each from 1, negative for its negative."""
 
-    order: IndexArray
-    signs: FloatArray
+    def read(values: FloatArray, columns: IndexArray) -> FloatArray:
+        return np.asarray(values[..., np.abs(columns) - 1] * np.sign(columns))
 
-    def of(self, values: FloatArray) -> FloatArray:
-        return np.asarray(values[..., self.order] * self.signs)
-
-    def flipped(self, columns: IndexArray | int) -> "_Columns":
-        signs = self.signs.copy()
-        signs[columns] = -1.0
-        return replace(self, signs=signs)
-
-    def swapped(self, columns: Sequence[int]) -> "_Columns":
-        order = self.order.copy()
-        order[list(columns)] = columns[::-1]
-        return replace(self, order=order)
-
-
-def _corrected(own: ObservedSegments, joints: _Columns, motors: _Columns) -> ObservedSegments:
     segments = own.segments
     states, observed = (
-        {**signals, **{name: joints.of(signals[name]) for name in JOINTS}}
+        {**signals, **{name: read(signals[name], joints) for name in JOINTS}}
         for signals in (segments.states, own.observed)
     )
-    changed = replace(segments, states=states, commands=motors.of(segments.commands))
+    changed = replace(segments, states=states, commands=read(segments.commands, motors))
     return replace(own, segments=changed, observed=observed)
 
 
@@ -135,31 +119,39 @@ def _best_correction(segments: SegmentErrors, fit: Fit, worst: IndexArray) -> Su
     return best
 
 
-def _corrections(robot: Robot, worst: IndexArray) -> Iterator[tuple[Suspicion, _Columns, _Columns]]:
+def _corrections(
+    robot: Robot, worst: IndexArray
+) -> Iterator[tuple[Suspicion, IndexArray, IndexArray]]:
     """Yields a change of each sign, and exchanges with a joint of ``worst``.
 
     Each is the joint that it is about, and the columns of joints and of motors.
     """
     names = robot.anatomy.hinges
-    joints, motors = (
-        _Columns(np.arange(count), np.ones(count)) for count in (len(names), robot.model.nu)
-    )
+    joints, motors = np.arange(len(names)) + 1, np.arange(robot.model.nu) + 1
     motors_of = [np.flatnonzero(joint_of_motor(robot) == number) for number in range(len(names))]
+
+    def flipped(columns: IndexArray, places: IndexArray) -> IndexArray:
+        return np.where(np.isin(columns - 1, places), -columns, columns)
+
+    def swapped(columns: IndexArray, pair: IndexArray) -> IndexArray:
+        exchanged = columns.copy()
+        exchanged[pair] = columns[pair[::-1]]
+        return exchanged
 
     def cause(joint: int, change: str) -> Suspicion:
         return Suspicion(names[joint], f"with {change} it is predicted better")
 
     for number, driven in enumerate(motors_of):
-        flipped, sign = joints.flipped(number), "the other sign of its angle"
-        yield cause(number, sign), flipped, motors
-        yield cause(number, f"{sign} and command"), flipped, motors.flipped(driven)
+        angle, sign = flipped(joints, np.array([number])), "the other sign of its angle"
+        yield cause(number, sign), angle, motors
+        yield cause(number, f"{sign} and command"), angle, flipped(motors, driven)
     for pair in combinations(range(len(names)), 2):
         if not set(pair) & set(worst.tolist()):
             continue
         first, second = pair if pair[0] in worst else pair[::-1]
-        swapped, other = joints.swapped(pair), names[second]
-        yield cause(first, f"the angles of {other}"), swapped, motors
+        angles, other = swapped(joints, np.array(pair)), names[second]
+        yield cause(first, f"the angles of {other}"), angles, motors
         both = [motors_of[number] for number in pair]
         if all(len(own) == 1 for own in both):
-            commands = motors.swapped(np.concatenate(both).tolist())
-            yield cause(first, f"the angles and commands of {other}"), swapped, commands
+            commands = swapped(motors, np.concatenate(both))
+            yield cause(first, f"the angles and commands of {other}"), angles, commands

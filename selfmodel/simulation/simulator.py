@@ -18,12 +18,7 @@ from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, state_writer, with_known_base
-from selfmodel.simulation.domain import (
-    DomainDistribution,
-    DomainSample,
-    initial_positions,
-    reading_noise,
-)
+from selfmodel.simulation import domain
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
@@ -136,8 +131,8 @@ class Simulator:
 
     def run_under(
         self,
-        conditions: Sequence[DomainSample],
-        uncertainty: DomainDistribution,
+        conditions: Sequence[domain.DomainSample],
+        uncertainty: domain.DomainDistribution,
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
@@ -150,14 +145,14 @@ class Simulator:
         """
         robot, count = self.robot, len(drivers)
         variants = [condition.variant(robot) for condition in conditions]
-        start = initial_positions(robot, variants, conditions, uncertainty.start)
+        start = domain.initial_positions(robot, variants, conditions, uncertainty.start)
         flat = self._run(
             [*variants] * count,
             [driver for driver in drivers for _ in conditions],
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            disturb=reading_noise(robot.anatomy, variants, conditions, uncertainty),
+            disturb=domain.reading_noise(robot.anatomy, variants, conditions, uncertainty),
         )
         return flat.grouped(count, len(conditions))
 
