@@ -259,18 +259,9 @@ def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
         "squared = Squared()\n",
         encoding="utf-8",
     )
+    intact = ("recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1")
     done = selfmodel(
-        *(
-            "recover",
-            "quadruped",
-            "--damage",
-            "intact",
-            *SMALL,
-            "--trials",
-            "1",
-            "--kinds",
-            "break",
-        ),
+        *(*intact, "--kinds", "break"),
         *("--comparator", "mine:squared", "--steps", "20", "--no-calibrate"),
         cwd=tmp_path,
         PYTHONPATH=".",
@@ -284,7 +275,7 @@ def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
         for line in done.stdout.splitlines()
     )
     (run,) = (tmp_path / "runs").iterdir()
-    found = read_result(run / "result.json", "a result", "").content
+    found = read_result(run / "result.json", "a result", "")
     assert all(np.isfinite(candidate["distance"]) for candidate in found["diagnosis"])
 
 
