@@ -21,11 +21,8 @@ def parse(
 ) -> Hypothesis:
     """Returns the hypothesis of a notation, in canonical form.
 
-    Args:
-        text: Terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, or
-            ``intact``.
-        anatomy: The robot's parts.
-        kinds: Kinds that the terms may name.
+    It is terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, with
+    names among ``kinds``; or ``intact``.
 
     Raises:
         InputError: A term is malformed, names an unknown kind or part, or has a severity outside

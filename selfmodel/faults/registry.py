@@ -72,8 +72,8 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
 
     Args:
         anatomy: The robot's parts.
-        is_leg: Function from the joints of a limb, the one nearest to the root body first, to
-            whether the limb is a leg, such as ``reaches_ground``.
+        is_leg: Whether a limb is a leg, such as ``reaches_ground``, given its joints, the one
+            nearest to the root body first.
     """
     limbs = _limbs(anatomy)
     limbs = [limb for limb in limbs if is_leg(limb)] or limbs

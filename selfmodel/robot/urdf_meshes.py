@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.untrusted import Files
-from selfmodel.robot.mjcf.work import Work, add_asset
+from selfmodel.robot.mjcf.work import Work
 
 READABLE = (".stl", ".obj")
 """Endings of the meshes of a URDF that MuJoCo reads."""
@@ -32,7 +32,7 @@ def read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
         link.remove(part)
     if empty:
         work.notes.append(f"{len(empty)} shapes of size 0 are left out")
-    names, left_out = dict[str, str](), Counter[str]()
+    left_out = Counter[str]()
     for link, part in parts:
         mesh = part.find("geometry/mesh")
         if mesh is None:
@@ -40,9 +40,7 @@ def read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
         uri = mesh.get("filename", "")
         path = next(filter(files.has, _mesh_paths(uri)), None)
         if path is not None:
-            if path not in names:
-                names[path] = add_asset(work, files, path, f"<mesh> ({quoted(uri)})")
-            mesh.set("filename", names[path])
+            mesh.set("filename", work.add_asset(files, path, f"<mesh> ({quoted(uri)})"))
         elif part.tag == "visual":
             link.remove(part)
             left_out[_why_unread(uri)] += 1

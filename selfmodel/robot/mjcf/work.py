@@ -40,6 +40,7 @@ class Work:
     assets: dict[str, bytes] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
+    _asset_names: dict[str, str] = field(default_factory=dict, init=False)
     _compiled: tuple[str, mujoco.MjModel] | None = field(default=None, init=False)
 
     @property
@@ -58,6 +59,25 @@ class Work:
     def text(self) -> str:
         """The MJCF as text."""
         return ET.tostring(self.root, encoding="unicode")
+
+    def add_asset(self, files: Files, path: str, element: str) -> str:
+        """Reads a file into the assets, once, and returns its name there.
+
+        Raises:
+            InputError: The file is missing, outside the folder, or too large with the others.
+        """
+        if path in self._asset_names:
+            return self._asset_names[path]
+        data = files.read(path, f"the file of a {element}", MAX_FILE)
+        if sum(map(len, self.assets.values())) + len(data) > MAX_FILE:
+            raise InputError(f"the files of the model have over {MAX_FILE} bytes: simplify them")
+        # An attachment of a log: no folders, no special characters.
+        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", basename(path)).lstrip(".-") or "file"
+        (stem, ending), name, number = splitext(plain), plain, 2
+        while name in self.assets:
+            name, number = f"{stem}_{number}{ending}", number + 1
+        self.assets[name], self._asset_names[path] = data, name
+        return name
 
     def section(self, name: str) -> ET.Element:
         """Returns the first section of that name, and adds the section if there is none."""
@@ -189,7 +209,6 @@ def _read_assets(work: Work, files: Files) -> None:
     A mesh without a file becomes a tetrahedron, and the error of its file is kept.
     """
     folders = _pop_asset_folders(work.root)
-    names: dict[str, str] = {}
     for element in work.root.iter():
         for attribute, name in list(element.attrib.items()):
             if not attribute.startswith("file") or not name:
@@ -198,8 +217,7 @@ def _read_assets(work: Work, files: Files) -> None:
             if element.tag in _NAMED_BY_FILE and attribute == "file" and not element.get("name"):
                 element.set("name", PurePosixPath(name).stem)
             try:
-                if path not in names:
-                    names[path] = add_asset(work, files, path, f"<{element.tag}> ({name!r})")
+                asset = work.add_asset(files, path, f"<{element.tag}> ({name!r})")
             except InputError as error:
                 if element.tag != "mesh" or files.has(path):
                     raise
@@ -207,21 +225,7 @@ def _read_assets(work: Work, files: Files) -> None:
                 element.attrib.pop("file")
                 element.set("vertex", _TETRAHEDRON)
             else:
-                element.set(attribute, names[path])
-
-
-def add_asset(work: Work, files: Files, path: str, element: str) -> str:
-    """Reads a file into the assets, and returns its name there."""
-    data = files.read(path, f"the file of a {element}", MAX_FILE)
-    if sum(map(len, work.assets.values())) + len(data) > MAX_FILE:
-        raise InputError(f"the files of the model have over {MAX_FILE} bytes: simplify them")
-    # An attachment of a log: no folders, no special characters.
-    stem, ending = splitext(re.sub(r"[^A-Za-z0-9_.-]", "_", basename(path)).lstrip(".-") or "file")
-    name, number = stem + ending, 2
-    while name in work.assets:
-        name, number = f"{stem}_{number}{ending}", number + 1
-    work.assets[name] = data
-    return name
+                element.set(attribute, asset)
 
 
 def _pop_asset_folders(root: ET.Element) -> dict[str, str]:
