@@ -213,6 +213,13 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         return as_json(msgspec.structs.replace(self, settings=asdict(settings), files=files))
 
 
+class SuspicionResult(Struct, frozen=True):
+    """A probable error in the recording of healthy trials, ``Suspicion.to_dict``."""
+
+    joint: str | None
+    cause: str
+
+
 class CalibrationResult(Struct, frozen=True):
     """The part of a calibration's JSON of which a self-model is made, ``Calibration.to_dict``.
 
@@ -235,6 +242,7 @@ class CalibrationResult(Struct, frozen=True):
     contact_stiffness: ContactFactor
     contact_damping: ContactFactor
     joints: dict[str, Any] | None = None
+    suspicion: SuspicionResult | None = None
 
 
 def as_json(result: Struct) -> dict[str, Any]:

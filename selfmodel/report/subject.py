@@ -47,6 +47,7 @@ from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.fit import NOMINAL
+from selfmodel.simulation.log_check import Suspicion
 from selfmodel.simulation.model_factors import Parameters, factor_names, with_parameters
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.trials.trial import Trial, trial_names
@@ -388,6 +389,7 @@ class DiagnosisFile(Generic[Result]):
             raise self._error(
                 f"its calibration has {sorted(sizes)} factors, and {count} are expected"
             )
+        doubt = fit.suspicion
         return Calibration(
             robot=robot if fit.set == NOMINAL else with_parameters(robot, parameters),
             parameters=parameters,
@@ -397,4 +399,5 @@ class DiagnosisFile(Generic[Result]):
             chosen=fit.set,
             determined=fit.determined,
             held_out_gain=fit.held_out_gain,
+            suspicion=None if doubt is None else Suspicion(doubt.joint, doubt.cause),
         )

@@ -11,7 +11,8 @@ from tests.helpers.command import selfmodel
 
 RECOVER = (
     *("recover", "quadruped", "--case", "2", "--gap", "0.1", "--population", "6"),
-    *("--generations", "1", "--steps", "60", "--trials", "1", "--out", "run"),
+    *("--generations", "1", "--steps", "60", "--trials", "1", "--repair", "paper"),
+    *("--out", "run"),
 )
 
 
