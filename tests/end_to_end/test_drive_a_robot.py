@@ -159,15 +159,12 @@ def test_a_robot_that_is_not_there_is_said_so_and_can_be_tried_again(tmp_path: P
     assert "Traceback" not in errors
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("number", "status", "ends", "reason"),
     [
         (signal.SIGTERM, 143, "", "Terminated: SIGTERM"),
-        pytest.param(signal.SIGHUP, 129, "", "Terminated: SIGHUP", marks=pytest.mark.process),
-        pytest.param(
-            *(signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt", "KeyboardInterrupt"),
-            marks=pytest.mark.process,
-        ),
+        (signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt", "KeyboardInterrupt"),
     ],
 )
 def test_a_stop_signal_stops_the_robot_and_leaves_a_whole_log(
