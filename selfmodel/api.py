@@ -245,7 +245,8 @@ def diagnose(
         >>> import selfmodel
         >>> settings = selfmodel.Settings(generations=2).scaled(6)
         >>> diagnosis = selfmodel.diagnose(
-        ...     "after.mcap", healthy="before.mcap", settings=settings, calibrate=False
+        ...     "after.mcap", healthy="before.mcap", kinds="paper",
+        ...     settings=settings, calibrate=False,
         ... )
         >>> print(diagnosis.best, diagnosis.verdict)
         break:front_left_knee explained
