@@ -40,13 +40,13 @@ demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it doe
 picture: $(READY) ## draw the picture of the README from the newest run of `make demo`; needs EGL or OSMesa
 	$(BIN)/python examples/plot_lanes.py "$$(ls -dt runs/quadruped-* | head -n 1)" docs/figures/lanes.png
 
-test: $(TOOLS) ## run the fast tests: every promise, in three to five minutes on two cores
+test: $(TOOLS) ## run the fast tests: every promise, in two minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
-test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about fifteen minutes on two cores
+test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about seven minutes on two cores
 	$(BIN)/pytest -m "$(SLOW)" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
-test-all: $(TOOLS) ## run every test, with every case; in about twenty minutes on two cores
+test-all: $(TOOLS) ## run every test, with every case; in about ten minutes on two cores
 	$(BIN)/pytest -m "" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
 docs: $(TOOLS) ## build the documentation site in docs/_build; warnings are errors

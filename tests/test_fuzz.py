@@ -36,7 +36,7 @@ from tests.logs.recordings.conftest import MAPPING, recorded
 BAGS = tuple(form for form in FORMS if form.startswith("mcap"))
 """SQLite has no checksums; ``tests/logs/recordings/test_bags.py`` damages such bags."""
 
-EXAMPLES = int(os.environ.get("FUZZ", "1000"))
+EXAMPLES = int(os.environ.get("FUZZ", "300"))
 
 NAMES = (
     *("log", "info", "salvage", "controller", "result", "model", "settings", "mapping"),

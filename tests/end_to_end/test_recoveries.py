@@ -63,7 +63,7 @@ def test_recoveries_of_a_study_are_those_of_recover_and_share_a_gait(tmp_path: P
         seeds=[3],
         settings=SMALL,
         comparator="auto",
-        kinds=kind_names("default"),
+        kinds=kind_names("paper"),
         gap=0.05,
         repair="robust",
     )
@@ -81,6 +81,7 @@ def test_recoveries_of_a_study_are_those_of_recover_and_share_a_gait(tmp_path: P
         *(simulated_robot("quadruped", fault, gap=0.05, seed=3) for fault in FAULTS),
         "quadruped",
         tmp_path / "run",
+        kinds="paper",
         settings=SMALL,
         seed=3,
         threads=1,

@@ -81,7 +81,7 @@ def test_a_stop_signal_ends_a_command_with_its_status_and_one_sentence(
 
 @pytest.mark.process
 @pytest.mark.search
-@pytest.mark.parametrize("number", STOP_SIGNALS)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
     tmp_path: Path, number: signal.Signals
 ):
