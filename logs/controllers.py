@@ -130,11 +130,13 @@ def npz_errors(source: str, what: str, advice: str = "") -> Iterator[None]:
 
 
 def read_arrays(data: bytes, limit: int) -> dict[str, NDArray[Any]]:
-    """Returns the arrays of an ``.npz`` file, whose sizes are checked before memory is taken."""
+    """Returns the arrays of an ``.npz`` file that unpacks to at most ``limit`` bytes."""
     if len(data) > limit:
         raise ValueError(f"it has more than {limit} bytes")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        if len(members) < len(archive.infolist()):
+            raise ValueError("it holds an array twice")
         if sum(info.file_size for info in members.values()) > limit:
             raise ValueError(f"it unpacks to more than {limit} bytes")
         return {name: _array(archive.read(info)) for name, info in members.items()}

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+import msgspec
 import zstandard
 from mcap import exceptions, records as mcap
 from mcap.opcode import Opcode
@@ -202,7 +203,7 @@ class Contents:
         """Makes an error of a parser one of the file, which begins with ``what``."""
         try:
             yield
-        except (ValueError, TypeError, RecursionError) as error:
+        except (ValueError, TypeError, RecursionError, msgspec.ValidationError) as error:
             raise self.error(f"{what}: {error}") from error
 
 

@@ -303,7 +303,7 @@ def _explained(path: Path, what: str, remedy: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{error}; {remedy}") from error
-    except ValueError as error:
+    except (ValueError, msgspec.ValidationError) as error:  # no ValueError in msgspec 0.19
         raise InputError(f"{path}: expected {what}: {error}; {remedy}") from error
 
 

@@ -220,7 +220,7 @@ def replay(
     Raises:
         InputError: The log is unusable, the robot is unknown, or the notation is invalid.
     """
-    ((logged,),), _ = arguments.trials_of(trial)
+    ((logged,),), _ = arguments.trials_of([trial])
     robot = arguments.robot_of(robot)
     assumed = arguments.hypothesis_of(hypothesis, robot)
     return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)

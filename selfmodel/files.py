@@ -143,44 +143,57 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-MAX_POINTS = 1000
-"""Maximum points in a line of a TOML file: ``tomllib`` takes the square of the keys they join."""
+MAX_KEYS = 16
+"""Maximum keys joined by dots in a TOML file; selfmodel's have at most four."""
 
-_LONG_NUMBER = re.compile(r"0[xob][0-9a-fA-F_]{16,}|[0-9_]{19,}")
+_KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
+_DOTTED = re.compile(rf"{_KEY}(?:\s*\.\s*{_KEY})*")
+_LONG_NUMBER = re.compile(r"0x[0-9a-fA-F_]{16,}|0o[0-7_]{21,}|0b[01_]{64,}|[0-9_]{19,}")
 
 
 def load_toml(text: str) -> dict[str, Any]:
     """Returns the tables of a TOML text from any source.
 
+    ``tomllib`` takes the square of the number of keys joined by dots, and reads integers that
+    Python refuses to print.
+
     Raises:
-        ValueError: The text is not TOML, has more than ``MAX_POINTS`` points in a line, nests
-            values too deeply, or has an integer of more than 64 bits, which TOML does not.
+        ValueError: The text is not TOML, joins more than ``MAX_KEYS`` keys, nests values too
+            deeply, or has an integer of more than 64 bits, which TOML does not.
     """
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.count(".") > MAX_POINTS:
-            raise ValueError(f"more than {MAX_POINTS} points (at line {number}, column 1)")
+    for run in _DOTTED.finditer(text):
+        if len(re.findall(_KEY, run[0])) > MAX_KEYS:
+            raise ValueError(f"more than {MAX_KEYS} keys are joined by dots {_place(text, run)}")
     try:
         loaded = tomllib.loads(text)
     except RecursionError:
         raise ValueError("values are nested too deeply") from None
-    except tomllib.TOMLDecodeError:
-        raise
-    except ValueError:  # Python reads no integer of more than 4300 digits
+    except ValueError as failure:
+        if isinstance(failure, tomllib.TOMLDecodeError):
+            raise
         raise _too_long(text) from None
     values: list[object] = [loaded]
     while values:
-        match values.pop():
-            case dict() as table:
-                values += table.values()
-            case list() as array:
-                values += array
-            case int() as number if not -(2**63) <= number < 2**63:
-                raise _too_long(text)
+        value = values.pop()
+        if isinstance(value, dict):
+            values += value.values()
+        elif isinstance(value, list):
+            values += value
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise _too_long(text)
     return loaded
 
 
 def _too_long(text: str) -> ValueError:
-    found = _LONG_NUMBER.search(text)
-    start = found.start() if found else 0
-    line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
-    return ValueError(f"an integer has more than 64 bits (at line {line}, column {column})")
+    return ValueError(
+        f"an integer has more than 64 bits {_place(text, _LONG_NUMBER.search(text))}".rstrip()
+    )
+
+
+def _place(text: str, found: re.Match[str] | None) -> str:
+    """Returns a place in a text in tomllib's words."""
+    if found is None:
+        return ""
+    start = found.start()
+    line = text.count("\n", 0, start) + 1
+    return f"(at line {line}, column {start - text.rfind(chr(10), 0, start)})"

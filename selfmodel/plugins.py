@@ -117,8 +117,11 @@ def repair(
 
 def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
     """Returns the name of a repair's search: as given, of the repertoire, CMA-ES or the EA."""
-    own = "cma-es" if repair == ROBUST else "ea"
-    return search or (own if repertoire is None else REPERTOIRE)
+    if search is not None:
+        return search
+    if repertoire is not None:
+        return REPERTOIRE
+    return "cma-es" if repair == ROBUST else "ea"
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:

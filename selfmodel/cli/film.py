@@ -30,8 +30,8 @@ CAMERA_DISTANCE = 2.7
 SMOOTHING = 0.5
 """Time over which the camera's path is averaged, s, so that it does not sway at each step."""
 
-HEADLIGHT = 0.45
-"""Intensity that is added to the camera's light for a model without a directional light."""
+LIGHT_DIRECTION, LIGHT = (0.2, 0.3, -0.93), (0.15, 0.45, 0.1)
+"""Light of a model without a directional one: unit vector; ambient, diffuse, specular intensity."""
 
 GROUND, OPAQUE = (0.42, 0.51, 0.6, 1.0), (0.6, 0.6, 0.6, 1.0)
 """Colours of ground without a colour, and of a transparent geom that is the only one of a body."""
@@ -196,6 +196,7 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
     camera.azimuth, camera.elevation = film.azimuth, ELEVATION
     camera.distance = CAMERA_DISTANCE * film.size
     targets = [film.gaze(shot) for shot in film.shots]
+    lacks_light = not np.any(model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
         for frame in range(len(film.time)):
             pictures = []
@@ -207,8 +208,20 @@ def filmed(film: Film) -> Iterator[NDArray[np.uint8]]:
                 mujoco.mj_camlight(model, data)
                 camera.lookat[:] = target[frame]
                 renderer.update_scene(data, camera)
+                if lacks_light:
+                    _add_light(renderer.scene)
                 pictures.append(_captioned(renderer.render(), film, shot, frame))
             yield np.concatenate(pictures, axis=1)
+
+
+def _add_light(scene: mujoco.MjvScene) -> None:
+    """Adds light from above to a scene with the light of the camera and spotlights only."""
+    light = scene.lights[scene.nlight]
+    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    light.dir[:] = LIGHT_DIRECTION
+    light.ambient[:], light.diffuse[:], light.specular[:] = LIGHT
+    light.castshadow, light.headlight = 0, 0
+    scene.nlight += 1
 
 
 def painted(film: Film) -> mujoco.MjModel:
@@ -223,8 +236,6 @@ def painted(film: Film) -> mujoco.MjModel:
     model.geom_rgba[unseen], model.geom_matid[unseen] = OPAQUE, -1
     # On wide ground, shadows are grainy at any affordable size of the shadow map.
     model.light_castshadow[:] = 0
-    if not np.any(model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL):
-        model.vis.headlight.diffuse[:] += HEADLIGHT
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
     model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
     for bodies, colour in ((film.jammed, JAMMED), (film.detached, DETACHED)):

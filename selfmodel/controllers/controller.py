@@ -159,15 +159,14 @@ def check_silent_neurons(design: Design, silent: AbstractSet[int]) -> None:
     """Raises ``InputError`` unless a design has the hidden neurons that are to be silent."""
     missing = [neuron for neuron in sorted(silent) if neuron >= design.hidden]
     if missing:
-        fault, last = f"neuron:{missing[0]}", design.hidden - 1
-        known = (
-            f"whose hidden neurons are 0 to {last}"
-            if design.hidden
-            else "which has no hidden neurons"
-        )
+        fault = f"neuron:{missing[0]}"
+        neurons, network = "which has no hidden neurons", "choose a network as the controller"
+        if design.hidden:
+            neurons = f"whose hidden neurons are 0 to {design.hidden - 1}"
+            network = "choose a larger network"
         raise InputError(
-            f"{fault} does not apply to {design.description}, {known}: leave {fault} out, or "
-            f"choose a larger network"
+            f"{fault} does not apply to {design.description}, {neurons}: leave {fault} out, or "
+            f"{network}"
         )
 
 

@@ -189,6 +189,10 @@ def _steps_in(duration: float, trajectory: Trajectory) -> int:
     return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
 
 
+def _displacement(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    return forward_displacement(trajectory)
+
+
 def _upright(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     x = trajectory["base_position"][..., 0]
     last = np.maximum(falls_of(robot, hypothesis, trajectory) - 1, 0)
@@ -219,7 +223,7 @@ _metres = partial(Score, unit="m", grows_with_time=True, needs_free_base=True)
 DISPLACEMENT = _metres(
     "displacement",
     ("base_position",),
-    lambda _robot, _hypothesis, trajectory: forward_displacement(trajectory),
+    _displacement,
 )
 """Forward displacement, m. Source: the paper, section III."""
 

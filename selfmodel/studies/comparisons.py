@@ -166,7 +166,7 @@ def _tables(outcomes: pd.DataFrame) -> Iterator[tuple[tuple[str, ...], str, pd.D
 
 def _compared(runs: pd.DataFrame, measure: str, seed: int) -> dict[str, Any]:
     """Returns the comparison of two methods, the columns, on runs that both have, not corrected."""
-    means = {str(name): float(np.mean(runs[name].to_numpy())) for name in runs}
+    means = {name: float(np.mean(runs[name].to_numpy())) for name in runs}
     first, second = sorted(means, key=lambda name: -means[name])  # stable: by name if equal
     found = (runs[first] - runs[second]).tolist()
     seeds = runs.index.get_level_values("seed").tolist()
@@ -179,8 +179,8 @@ def _compared(runs: pd.DataFrame, measure: str, seed: int) -> dict[str, Any]:
         interval = statistics.paired_interval(found, seeds, rng)
         p = statistics.sign_flip_test(found, rng)
     return {
-        "first": first,
-        "second": second,
+        "first": str(first),
+        "second": str(second),
         "n": len(found),
         "seeds": len(set(seeds)),
         "first_mean": means[first],

@@ -1,6 +1,8 @@
 """``selfmodel render``: pictures of a trial from its log, on any machine."""
 
+import dataclasses
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -45,8 +47,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     folder = tmp_path_factory.mktemp("render")
     (controller,) = random_controllers(quadruped, 1, seed=3)
     plan = TrialPlan("trial", "single", controller, STEPS, 0)
-    samples = SimulatedRobot(quadruped, parse(DAMAGE, quadruped.anatomy)).run(controller, STEPS)
-    write_trial(folder / "a.mcap", quadruped, plan, samples, TrialHeader(Settings()))
+    without = re.sub(r"<light [^>]*/>", "", quadruped.mjcf)
+    off = '<visual><headlight active="0"/></visual><worldbody>'
+    dark = dataclasses.replace(quadruped, mjcf=without.replace("<worldbody>", off, 1))
+    for name, robot in (("a.mcap", quadruped), ("dark.mcap", dark)):
+        samples = SimulatedRobot(robot, parse(DAMAGE, robot.anatomy)).run(controller, STEPS)
+        write_trial(folder / name, robot, plan, samples, TrialHeader(Settings()))
     return folder
 
 
@@ -85,9 +91,12 @@ def test_the_best_of_a_diagnosis_is_drawn_as_a_strip_whatever_there_is_of_opengl
 @draws
 @pytest.mark.process
 @pytest.mark.opengl
-def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_path: Path):
+@pytest.mark.parametrize("log", ["a.mcap", "dark.mcap"])
+def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself_and_has_light(
+    log: str, folder: Path, tmp_path: Path
+):
     out = tmp_path / "film.gif"
-    done = selfmodel_process("render", "a.mcap", "-o", str(out), "--json", cwd=folder, MUJOCO_GL="")
+    done = selfmodel_process("render", log, "-o", str(out), "--json", cwd=folder, MUJOCO_GL="")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["gl"] == WORKS
     with Image.open(out) as image:
@@ -96,6 +105,7 @@ def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself(folder: Path, tmp_p
 
     assert frame.shape == (360, 960, 3)
     assert np.ptp(frame) > 150  # there is something to be seen
+    assert frame[:300].mean() > 60  # beside the captions
 
 
 @pytest.mark.parametrize("works", [("osmesa",), ()])

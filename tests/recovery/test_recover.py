@@ -175,9 +175,11 @@ def test_a_recovery_is_of_its_seed_at_any_number_of_threads_and_sees_nothing_hid
     one = recovery(quadruped, simulator=Simulator(quadruped, 1), settings=few)
     gait = one.trials[0].plan.controller
     given = recovery(quadruped, settings=few, gait=gait)  # with two threads
+    other = recovery(quadruped, settings=dataclasses.replace(few, generations=1), seed=6)
 
     assert given.diagnosis == one.diagnosis
     assert [t.displacement for t in given.trials] == [t.displacement for t in one.trials]
+    assert other.trials[0].plan.controller != gait
     assert given.repair_evaluations < one.repair_evaluations, "a given gait saves its search"
     with pytest.raises(AssertionError, match="reached for _variant"):
         _ = Sealed(SimulatedRobot(quadruped))._variant

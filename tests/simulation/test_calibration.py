@@ -14,8 +14,9 @@ from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import fit
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
-from selfmodel.simulation.fit import consistent_information
+from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
     FACTORS,
     MAX_LOG_FACTOR,
@@ -101,6 +102,20 @@ def test_the_errors_are_those_of_the_models_and_lower_in_a_trial_that_was_not_se
     before, after = (prediction_error(r, unseen, 1) for r in (QUADRUPED, fitted().robot))
     assert after < 0.7 * before
     assert prediction_error(real(), unseen, 1) < 1e-4
+
+
+@search
+def test_with_a_weak_prior_the_factors_of_a_robot_without_noise_are_found(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """As calibration is set, the prior keeps factors near nominal, for the sake of noisy logs."""
+    weak = dataclasses.replace(fit.FLOATING, prior_weight=0.005, iterations=20)
+    monkeypatch.setattr(fit, "FLOATING", weak)
+    monkeypatch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
+    found = calibrate(QUADRUPED, trials(real(), 1, 400), threads=1)
+    off = np.abs(np.log(found.parameters.factors) - np.log(TRUE.factors))
+
+    assert off.max() < 0.05, dict(zip(factor_names(QUADRUPED), off, strict=True))
 
 
 @search
@@ -341,3 +356,10 @@ def test_slopes_without_their_noise_are_fisher_information():
     np.testing.assert_allclose(np.diag(found), np.diag(expected), rtol=0.5)
     assert np.abs(consistent_information(*noise)).max() < 2000  # 0.02 of the noise squared
     assert np.linalg.eigvalsh(consistent_information(slopes, -slopes)).min() >= -1e-9
+
+
+def test_a_parameter_is_determined_if_the_trials_halve_its_variance():
+    prior = np.array([0.15, 0.3])
+
+    assert is_determined(UNDETERMINED_SHARE * prior * 0.99, prior).all()
+    assert not is_determined(UNDETERMINED_SHARE * prior * 1.01, prior).any()

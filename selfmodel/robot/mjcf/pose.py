@@ -29,6 +29,11 @@ _LEVEL_TOLERANCE = 1e-9
 _MAX_DISTANCE = 1e6
 """Largest measured distance of a geom from the ground plane, m."""
 
+_OTHER_KEYFRAME = (
+    f"start the robot in another keyframe with keyframe=NAME, or in the reference pose with "
+    f"keyframe={NO_KEYFRAME}"
+)
+
 _COUPLINGS = (int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON))
 """Equality constraints with a polynomial of the distances from the reference pose."""
 
@@ -81,6 +86,8 @@ def bake_keyframe(work: Work) -> None:
     model = work.model
     number = _keyframe(model, work.settings.keyframe)
     qpos = np.array(model.qpos0 if number is None else model.key_qpos[number])
+    if not np.isfinite(qpos).all():
+        raise InputError(f"the keyframe has a number that is not finite: {_OTHER_KEYFRAME}")
     if not np.array_equal(qpos, model.qpos0):
         _check_equalities(model, qpos)
         _place_at(work, model, qpos)
@@ -145,9 +152,8 @@ def _check_equalities(model: mujoco.MjModel, qpos: np.ndarray) -> None:
     nonlinear = np.isin(model.eq_type, _COUPLINGS) & model.eq_data[:, 2:5].any(axis=1)
     if nonlinear.any() or violated.any():
         raise InputError(
-            f"equality constraints are violated in the keyframe, or are nonlinear: start the robot "
-            f"in another keyframe with keyframe=NAME, or in the reference pose with "
-            f"keyframe={NO_KEYFRAME}"
+            f"equality constraints are violated in the keyframe, or are nonlinear: "
+            f"{_OTHER_KEYFRAME}"
         )
 
 

@@ -182,6 +182,11 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
     types = get_type_hints(MjcfSettings, include_extras=True)
     values: dict[str, Any] = {}
     for key, value in given.items():
+        if key == "neurons":
+            raise InputError(
+                "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
+                "--neurons N to the command"
+            )
         if key not in types:
             raise unknown_name("setting", key, list(types))
         one = key in _BY_JOINT and not isinstance(value, Mapping)
