@@ -43,6 +43,13 @@ LEFT_OUT = (
 )
 """Keys of JSON that are times, versions, sentences, places or digests of whole files."""
 
+RENAMED = {
+    "rivals": "indistinguishable",
+    "unseen": "undetectable",
+    "outside": "unsearched",
+}
+"""Keys of JSON by their names before 0.2."""
+
 NO_RESULTS = (".json", ".jsonl", ".pdf", ".png", ".svg")
 """Files with times and versions: the numbers of the JSON are those that the command prints."""
 
@@ -201,7 +208,10 @@ def _is_sha256(value: object) -> bool:
 
 
 def _read(path: Path) -> Items:
-    items: Items = json.loads(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    items: Items = json.loads(
+        text, object_hook=lambda keys: {RENAMED.get(key, key): value for key, value in keys.items()}
+    )
     return items
 
 

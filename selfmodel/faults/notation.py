@@ -15,6 +15,10 @@ from selfmodel.robot.anatomy import Anatomy
 MAX_LENGTH = 20_000
 """Maximum length of a notation, characters: some 500 faults."""
 
+ROUNDING = 1e-4
+"""Distance from its bounds at which a severity is the bound: a search rounds severities to four
+decimals, and the bounds of a calibrated model have six digits."""
+
 
 def parse(
     text: str, anatomy: Anatomy, kinds: Iterable[FaultKind] = tuple(KINDS.values())
@@ -103,9 +107,9 @@ def _severity(term: str, kind: FaultKind, bounds: tuple[float, float], value: st
         severity = float(number)
     except ValueError:
         severity = math.nan
-    if not lowest <= severity <= highest:
+    if not lowest - ROUNDING <= severity <= highest + ROUNDING:
         raise InputError(
             f"the term {term!r} needs a number from {lowest:.4g} to {highest:.4g} {kind.unit} "
             f"after '={kind.prefix}', got {number!r}"
         )
-    return severity + 0.0  # -0.0 and 0.0 are one severity
+    return min(max(severity, lowest), highest) + 0.0  # -0.0 and 0.0 are one severity

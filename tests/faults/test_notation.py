@@ -79,6 +79,16 @@ def test_a_degree_is_printed_as_it_parses(said: str, printed: str):
     assert parse(printed, ANATOMIES["quadruped"]) == hypothesis
 
 
+@pytest.mark.parametrize("rounded", ["-0.523599", "-0.5236", "0.52360"])
+def test_a_severity_that_was_rounded_beyond_its_bound_is_the_bound(rounded: str):
+    anatomy = ROBOTS["hexapod"].robot().anatomy
+    (fault,) = parse(f"jam:front_left_knee={rounded}", anatomy).faults
+
+    assert abs(fault.severity) == anatomy.joint("front_left_knee").limits[0][1]
+    with pytest.raises(InputError, match=r"jam:front_left_knee=0\.524"):
+        parse("jam:front_left_knee=0.524", anatomy)
+
+
 @given(text=st.text(max_size=40))
 def test_any_text_is_either_a_hypothesis_or_an_input_error(text: str):
     try:
