@@ -40,7 +40,7 @@ demo: $(READY) ## recover a quadruped from a lost lower leg, showing what it doe
 picture: $(READY) ## draw the picture of the README from the newest run of `make demo`; needs EGL or OSMesa
 	$(BIN)/python examples/plot_lanes.py "$$(ls -dt runs/quadruped-* | head -n 1)" docs/figures/lanes.png
 
-test: $(TOOLS) ## run the fast tests: every promise, in two minutes on two cores
+test: $(TOOLS) ## run the fast tests: every promise, in two to three minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
 test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about seven minutes on two cores
