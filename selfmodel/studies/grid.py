@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent import futures
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
@@ -258,7 +258,7 @@ class Processes(Executor):
         raise futures.BrokenExecutor(f"its process ended in each of {ATTEMPTS} attempts: {reason}")
 
 
-def _one_process() -> futures.ProcessPoolExecutor:
+def _one_process() -> ProcessPoolExecutor:
     """Returns an executor of one process.
 
     Python's resource tracker, which it needs, must not end with the terminal, by SIGHUP: started
@@ -269,7 +269,9 @@ def _one_process() -> futures.ProcessPoolExecutor:
         resource_tracker.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    return futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
+    # Imported before threads begin: what ends processes at exit is registered by the import, and
+    # has to be called after what ends threads, whose pipes it would write to.
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
 
 
 def _begin_worker() -> None:
