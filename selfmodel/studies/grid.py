@@ -224,6 +224,7 @@ class Processes(Executor):
 
     def __init__(self, workers: int) -> None:
         self._threads, self._of_thread = ThreadPoolExecutor(workers), threading.local()
+        self._pools: list[ProcessPoolExecutor] = []
         self._others = set(multiprocessing.active_children())
         self._has_ended, self._starts = False, threading.Lock()
 
@@ -234,6 +235,8 @@ class Processes(Executor):
         for process in set(multiprocessing.active_children()) - self._others:
             process.kill()  # a cell may take minutes, and its result would not be wanted
         self._threads.shutdown()
+        for pool in self._pools:  # Python's exit writes to the pipe of one that is still closing
+            pool.shutdown()
 
     def submit(
         self, call: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs
@@ -249,6 +252,7 @@ class Processes(Executor):
                     break
                 if not hasattr(self._of_thread, "pool"):
                     self._of_thread.pool = _one_process()
+                    self._pools.append(self._of_thread.pool)
                 future: Future[_T] = self._of_thread.pool.submit(call, *args, **kwargs)
             try:
                 return future.result()
@@ -269,8 +273,6 @@ def _one_process() -> ProcessPoolExecutor:
         resource_tracker.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    # Imported before threads begin: what ends processes at exit is registered by the import, and
-    # has to be called after what ends threads, whose pipes it would write to.
     return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _begin_worker)
 
 
