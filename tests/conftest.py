@@ -1,7 +1,5 @@
 """Fixtures of all tests, and the choice between the fast tier and everything."""
 
-import importlib
-import json
 import os
 import signal
 
@@ -13,11 +11,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-from selfmodel.isolation import Message, run_isolated
+from selfmodel.isolation import run_isolated
 from selfmodel.robot.mjcf import load
-from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
+from tests.helpers.in_process import in_this_process
 
 settings.register_profile("full", deadline=None)  # a busy machine is no bug
 settings.register_profile("fast", deadline=None, max_examples=20)
@@ -25,15 +23,6 @@ settings.register_profile("fast", deadline=None, max_examples=20)
 # A shell's background job ignores Ctrl-C, and hands that on to the commands that are tested.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored under nohup
-
-
-def in_this_process(task: str, request: Message, **_: object) -> Message:
-    """Runs a task like ``run_isolated``, without a child process, which takes half a second."""
-    module, _, name = task.partition(":")
-    plain = Message(json.loads(json.dumps(request.header)), request.buffers)
-    with uncounted_warnings():
-        answer = getattr(importlib.import_module(module), name)(plain)
-    return Message(json.loads(json.dumps(answer.header)), answer.buffers)
 
 
 load.run_isolated = in_this_process

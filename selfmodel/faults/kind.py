@@ -102,7 +102,7 @@ class FaultKind:
 
         Faults are applied in the order of their kinds' names.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # each kind has its own
 
     def edit_specification(self, spec: "MjSpec", fault: "Fault", seed: int) -> None:
         """Edits the robot's specification before it is compiled; by default, not at all.

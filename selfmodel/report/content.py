@@ -186,6 +186,7 @@ def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
         }
         if result is not None:
             score = f"{result.score.name}, {result.score.unit}".removesuffix(", ")
+            score = f"score: {score}" if score in row else score  # of a plug-in
             found = results.get(one.name)
             for title, name in {score: "score", **TRIAL_COLUMNS}.items():
                 row[title] = getattr(found, name, None)

@@ -1,6 +1,5 @@
 """What the tests of the log share: a small robot, made-up trials of it, and one log."""
 
-import importlib
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,17 +8,16 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller, draw_genomes
-from selfmodel.isolation import Message
 from selfmodel.logs.recordings import bags, tables
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample, StepTiming
 from selfmodel.trials.trial import TrialPlan
+from tests.helpers.in_process import in_this_process
 
 MJCF = """
 <mujoco model="biped">
@@ -95,20 +93,11 @@ def log(sound: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Opens models and recordings without a child process, which takes a second each.
-
-    A test with the mark ``process`` has one.
-    """
-
-    def run(task: str, message: Message, **_: object) -> Message:
-        module, _, name = task.partition(":")
-        answer: Message = getattr(importlib.import_module(module), name)(message)
-        return answer
-
+def in_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Opens recordings without a child process, as models; a test with the mark ``process`` not."""
     if request.node.get_closest_marker("process") is None:
-        for module in (load, bags, tables):
-            monkeypatch.setattr(module, "run_isolated", run)
+        for module in (bags, tables):
+            monkeypatch.setattr(module, "run_isolated", in_this_process)
 
 
 def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:

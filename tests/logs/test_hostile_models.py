@@ -11,6 +11,7 @@ from selfmodel.errors import WorkError
 from selfmodel.logs import LogError, read_log, robots
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
+from selfmodel.robot.mjcf import load
 from tests.logs.conftest import MJCF
 
 TASKS = Path(__file__).parents[2] / "tasks"
@@ -64,6 +65,16 @@ def png(width: int, height: int) -> bytes:
 
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.usefixtures("isolated")
+def test_a_child_process_is_the_first_to_open_the_model_of_a_log(
+    trial: TrialLog, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.delattr(load, "build_and_step")  # of this process
+    opened = robot_of(attacked(trial, top("<!-- opened for the first time -->"), trial.assets))
+
+    assert opened.anatomy.names == trial.trial.trajectory.names
 
 
 @pytest.mark.parametrize(

@@ -209,7 +209,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
 def _builtin(value: object) -> object:
     """Number of numpy as Python's; msgspec knows the other types."""
     if not isinstance(value, np.generic):
-        raise NotImplementedError
+        raise NotImplementedError  # how msgspec is told that a type is unknown
     return value.item()
 
 

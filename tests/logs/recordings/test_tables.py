@@ -11,6 +11,7 @@ import pytest
 
 from selfmodel.arrays import frozen
 from selfmodel.errors import InputError
+from selfmodel.logs.recordings import tables
 from selfmodel.logs.recordings.importer import ImportedTrial, import_recording
 from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.logs.recordings.recording import TABLE, Series
@@ -30,6 +31,13 @@ def table(path: Path, *wanted: str, time: str = "") -> Series:
 
 def column(path: Path, name: str) -> np.ndarray:
     return table(path, name).columns[name].values[:, 0]
+
+
+@pytest.mark.process
+def test_a_table_is_read_in_a_child_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delattr(tables, "read_in_child")  # of this process
+
+    assert column(written(tmp_path, "time,q\n0,1.5"), "q").tolist() == [1.5]
 
 
 def written(folder: Path, text: str | bytes) -> Path:
