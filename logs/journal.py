@@ -1,7 +1,8 @@
 """Folder of a recovery: its options, one log per trial, and the diagnoses."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,8 +44,7 @@ class FolderJournal:
 
     def add(self, diagnosis: Diagnosis) -> None:
         """Writes a diagnosis after the earlier ones."""
-        earlier = read_diagnoses(self.folder, self.space)
-        values = [each.to_dict() for each in (*earlier, diagnosis)]
+        values = [*_values_of(self.folder), diagnosis.to_dict()]
         text = json.dumps(values, indent=1, allow_nan=False)
         replace_file(self.folder / DIAGNOSES, text.encode())
 
@@ -119,15 +119,26 @@ def trial_order(path: Path) -> tuple[int, str]:
 
 def read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...]:
     """Returns the diagnoses in the folder of a run; none if the run has none yet."""
+    with _explained(folder):
+        return tuple(diagnosis_from_dict(item, space.parse) for item in _values_of(folder))
+
+
+def _values_of(folder: Path) -> list[Any]:
+    """Returns the diagnoses in the folder of a run as JSON."""
     path = folder / DIAGNOSES
     if not path.exists():
-        return ()
+        return []
+    with _explained(folder):
+        return list(parse_json(read_file(path, "diagnoses", MAX_BYTES)))
+
+
+@contextmanager
+def _explained(folder: Path) -> Iterator[None]:
     try:
-        items: Any = parse_json(read_file(path, "diagnoses", MAX_BYTES))
-        return tuple(diagnosis_from_dict(item, space.parse) for item in items)
+        yield
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise CorruptError(
-            path,
+            folder / DIAGNOSES,
             f"expected the diagnoses of a run: {error or type(error).__name__}",
             advice="move it away; the diagnoses can be made again from the trials",
         ) from error
