@@ -65,6 +65,9 @@ wheel: $(TOOLS) ## build the wheel and check what it holds
 	$(BIN)/python -m build --quiet --wheel
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
+versions: wheel ## use the wheel with the lowest and the highest versions of what it needs
+	$(BIN)/python .ci/check_versions.py dist/*.whl
+
 viewers: $(TOOLS) $(VIEWERS)/pymcap/.ready $(NODE_READY) ## prove that fresh logs open in other people's tools; needs Node.js
 	rm -rf $(VIEWERS)/logs
 	mkdir $(VIEWERS)/logs
@@ -108,4 +111,4 @@ foreign: $(TOOLS) ## make recordings by an independent generator and score their
 	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
 	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl
 
-.PHONY: help setup page browser demo test test-slow test-all docs lint types wheel viewers bench results foreign
+.PHONY: help setup page browser demo test test-slow test-all docs lint types wheel versions viewers bench results foreign

@@ -1,6 +1,6 @@
-"""Checks the allowed versions: a trial, a diagnosis and a report with the lowest and the highest.
+"""Uses a wheel with the lowest and the highest allowed versions: a trial, a diagnosis, a report.
 
-Usage: python .ci/check_versions.py
+Usage: python .ci/check_versions.py dist/selfmodel-….whl
 
 The lowest versions of the dependencies are installed with Python 3.11, the highest with 3.12, each
 in an environment of its own, at the same time. A Python that is not on this machine is named and
@@ -19,18 +19,20 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
 SHORT = ("--steps", "200")
+LOGS = ("before.mcap", "after.mcap")
 COMMANDS = (
     ("trial", "quadruped", "--out", "before.mcap", "--stage", "before", *SHORT),
     ("trial", "quadruped", "--out", "after.mcap", "--damage", "break:front_left_knee", *SHORT),
-    ("diagnose", "before.mcap", "after.mcap", "--population", "8", "--generations", "2"),
-    ("report", "before.mcap", "after.mcap", "--out", "report.html"),
+    ("diagnose", *LOGS, "--population", "8", "--generations", "2", "--json"),
+    ("report", *LOGS, "--diagnosis", "printed.json", "--out", "report.html"),
 )
 
 
-def main() -> None:
+def main(wheel: Path) -> None:
     """Runs both checks; exits with what failed."""
     with ThreadPoolExecutor() as pool:
-        failures = [text for text in pool.map(check, (11, 12), (lowest(), [])) if text]
+        found = list(pool.map(check, (wheel, wheel), (11, 12), (lowest(), [])))
+    failures = [text for text in found if text]
     if failures:
         sys.exit("\n".join(failures))
 
@@ -57,8 +59,8 @@ def interpreter(minor: int) -> str | None:
     return None
 
 
-def check(minor: int, versions: list[str]) -> str | None:
-    """Installs selfmodel for Python 3.minor, with some versions of its dependencies, and uses it.
+def check(wheel: Path, minor: int, versions: list[str]) -> str | None:
+    """Installs a wheel for Python 3.minor, with some versions of its dependencies, and uses it.
 
     Returns:
         The command that failed, and what it said; None if all is well.
@@ -70,18 +72,19 @@ def check(minor: int, versions: list[str]) -> str | None:
         return None
     with tempfile.TemporaryDirectory() as folder:
         installed = f"{folder}/venv/bin/python"
-        pip = (installed, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+        pip = (sys.executable, "-m", "pip", "--python", installed, "install", "--quiet")
         for command in (
-            (python, "-m", "venv", "venv"),
-            (*pip, "--no-compile", str(ROOT), *versions),  # most modules are never imported here
+            (python, "-m", "venv", "--without-pip", "venv"),
+            (*pip, "--no-compile", str(wheel), *versions),  # most modules are never imported here
             *((installed, "-m", "selfmodel", *command) for command in COMMANDS),
         ):
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
             if done.returncode:
                 return f"{name}: {' '.join(command)}\n{done.stderr}"
+            Path(folder, "printed.json").write_text(done.stdout, encoding="utf-8")
     sys.stdout.write(f"{name}: trial, diagnosis and report work\n")
     return None
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]).resolve())

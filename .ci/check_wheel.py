@@ -1,12 +1,9 @@
-"""Checks a wheel: one top-level name, the robots' models in it, and it works where it is installed.
+"""Checks what a wheel holds: one top-level name, and the files that no module's import would miss.
 
 Usage: python .ci/check_wheel.py dist/selfmodel-….whl
 """
 
-import subprocess
 import sys
-import tempfile
-import venv
 import zipfile
 from pathlib import Path
 
@@ -29,22 +26,7 @@ def main(wheel: Path) -> None:
     missing = set(NEEDED) - set(names)
     if missing:
         sys.exit(f"{wheel}: lacks {sorted(missing)}")
-    with tempfile.TemporaryDirectory() as folder:
-        run_installed(wheel.resolve(), Path(folder))
-    sys.stdout.write(f"{wheel.name}: {len(names)} files, one top-level name, works installed\n")
-
-
-def run_installed(wheel: Path, folder: Path) -> None:
-    """Runs a trial and makes a report with the wheel, in an environment far from the sources."""
-    venv.create(folder / "venv", with_pip=True)
-    python = folder / "venv" / "bin" / "python"
-    constraints = Path("constraints.txt").resolve()
-    install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*install, "--constraint", str(constraints), str(wheel)], check=True)
-    (folder / "results.csv").write_text("robot,correct\nhexapod,true\n", encoding="utf-8")
-    commands = (["robots"], ["trial", "hexapod", "--out", "trial.mcap"], ["report", "."])
-    for arguments in commands:
-        subprocess.run([str(python), "-m", "selfmodel", *arguments], check=True, cwd=folder)
+    sys.stdout.write(f"{wheel.name}: {len(names)} files, one top-level name\n")
 
 
 if __name__ == "__main__":

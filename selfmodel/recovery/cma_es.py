@@ -7,7 +7,6 @@ that of the library ``cma``.
 from collections.abc import Sequence
 from typing import Any
 
-import cma
 import numpy as np
 
 from selfmodel.arrays import FloatArray
@@ -125,6 +124,8 @@ class _Run:
     def __init__(
         self, start: FloatArray, deviation: float, population: int, rng: np.random.Generator
     ) -> None:
+        import cma  # noqa: PLC0415  # slow to import: it loads pyplot and scipy.stats
+
         options: dict[str, Any] = {
             "bounds": [-1, 1],
             "popsize": population,
