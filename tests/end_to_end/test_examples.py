@@ -68,7 +68,7 @@ def test_a_comparator_of_ones_own_keeps_the_contract():
 def test_a_comparator_of_ones_own_plugs_in_from_the_folder_that_the_command_runs_in(tmp_path: Path):
     command = [
         *(Path(sys.executable).with_name("selfmodel"), "recover", "quadruped", "--case", "2"),
-        *(*SMALL, "--trials", "1", "--steps", "200", "--kinds", "paper"),
+        *(*SMALL, "--trials", "1", "--steps", "60", "--kinds", "break", "--repair", "paper"),
         *("--comparator", "heading_comparator:HEADING"),
         *("--out", tmp_path / "run", "--json"),
     ]
@@ -93,5 +93,5 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     again = run("ablation.py", "folder", cwd=tmp_path)
 
     assert "8 rows, 0 failed: folder/results.csv" in first
-    assert "GridBegins(total=12, finished=12)" in again
+    assert "GridBegins(total=11, finished=11)" in again
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40

@@ -85,7 +85,7 @@ def test_a_stop_signal_ends_a_command_with_its_status_and_one_sentence(
 def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
     tmp_path: Path, number: signal.Signals
 ):
-    study = ("ablate", "--robots", "quadruped", "--seeds", "9", *SMALL, "--out", "run")
+    study = ("ablate", "--robots", "quadruped", "--seeds", "9", *SMALL, "--steps", "60", "--out", "run")
     process = subprocess.Popen(
         [sys.executable, "-m", "selfmodel", *study],
         cwd=tmp_path,

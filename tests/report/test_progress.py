@@ -18,7 +18,13 @@ from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_controllers
-from tests.report.conftest import RECOVER
+
+
+RECOVER = (
+    *("recover", "quadruped", "--case", "2", "--population", "4", "--generations", "1"),
+    *("--steps", "40", "--trials", "1", "--repair", "paper", "--kinds", "break"),
+    *("--comparator", "forward-displacement"),
+)
 
 
 def recorded(folder: Path, robot: Robot) -> Progress:
@@ -81,7 +87,7 @@ def test_a_damaged_file_is_named_and_a_folder_without_one_has_none(tmp_path: Pat
 
 @pytest.mark.search
 def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
-    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     pages: list[tuple[str, int]] = []
 
@@ -93,24 +99,26 @@ def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
         path.write_bytes(data)
 
     monkeypatch.setattr("selfmodel.report.progress.replace_file", kept)
-    done = selfmodel(*RECOVER, "--report", cwd=tmp_path)
+    plain, done = (
+        selfmodel(*RECOVER, "--out", out, *options, cwd=tmp_path)
+        for out, options in (("plain", ()), ("run", ("--report",)))
+    )
 
-    assert done.returncode == 0, done.stderr
+    assert (plain.returncode, done.returncode) == (0, 0), plain.stderr + done.stderr
     assert f"report: {Path('run') / 'report.html'}" in done.stderr
     headlines = [headline for headline, _ in pages]
     assert headlines[0] == "The recovery is not finished: the trial 00-before was run."
     assert headlines[1] == "The recovery is not finished: the trial 01-after was run."
     assert headlines[2].startswith("The recovery is not finished: 1 trial of the quadruped: it ")
     assert headlines[3].startswith("The recovery is not finished: 2 trials of the quadruped: it ")
-    assert pages[3][1] == 7
+    assert pages[3][1] == 6
     last = (tmp_path / "run" / "report.html").read_text()
     assert '"headline":"The quadruped moved' in last
     # The recovery computes the same numbers with and without a report.
     for name in (SEARCHES, "diagnoses.json"):
-        assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
-    before, after = (
-        json.loads((folder / "result.json").read_text()) for folder in (run, tmp_path / "run")
-    )
+        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
+    texts = ((tmp_path / folder / "result.json").read_text() for folder in ("plain", "run"))
+    before, after = (json.loads(text.replace('"plain/', '"run/')) for text in texts)
     for key in ("seconds", "sha256"):
         del before[key], after[key]
     assert before == after
