@@ -7,7 +7,7 @@ import pytest
 
 from tests.helpers.command import SMALL, Done, selfmodel
 
-SHORT = ("quadruped", "--case", "4", *SMALL, "--steps", "60", "--trials", "1")
+SHORT = ("quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--steps", "60", "--trials", "1")
 
 
 @pytest.fixture(scope="session")

@@ -85,9 +85,9 @@ def test_a_stop_signal_ends_a_command_with_its_status_and_one_sentence(
 def test_a_stop_signal_to_a_study_and_its_workers_leaves_no_process(
     tmp_path: Path, number: signal.Signals
 ):
-    study = ("ablate", "--robots", "quadruped", "--seeds", "9", *SMALL, "--steps", "60", "--out", "run")
+    study = ("ablate", "--robots", "quadruped", "--seeds", "9", *SMALL, "--out", "run")
     process = subprocess.Popen(
-        [sys.executable, "-m", "selfmodel", *study],
+        [sys.executable, "-m", "selfmodel", *study, "--steps", "60"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,

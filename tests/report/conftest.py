@@ -12,7 +12,7 @@ from tests.helpers.command import selfmodel
 RECOVER = (
     *("recover", "quadruped", "--case", "2", "--gap", "0.1", "--population", "6"),
     *("--generations", "1", "--steps", "60", "--trials", "1", "--repair", "paper"),
-    *("--out", "run"),
+    *("--kinds", "paper", "--out", "run"),
 )
 
 

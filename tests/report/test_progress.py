@@ -19,7 +19,6 @@ from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.command import selfmodel
 from tests.helpers.drivers import random_controllers
 
-
 RECOVER = (
     *("recover", "quadruped", "--case", "2", "--population", "4", "--generations", "1"),
     *("--steps", "40", "--trials", "1", "--repair", "paper", "--kinds", "break"),
