@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
-SHORTER = {"trial": ("--steps", "200"), "diagnose": SMALL, "report": SMALL}
+SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 """Options by which commands take seconds for minutes; the block of Python reads the same logs."""
 
 
