@@ -36,6 +36,7 @@ def main() -> None:
     generating.add_argument("--seeds", default="0", help="such as 0 or 0-4")
     generating.add_argument("--gaps", default="large", help=", ".join(LEVELS))
     generating.add_argument("--duration", type=float, default=10.0, help="of each trial, s")
+    generating.add_argument("--own-gait", action="store_true", help="another than healthy trials")
     generating.set_defaults(run=_generate)
     scoring.add_argument("--rows", type=Path, help="file of the rows [OUT/scores.jsonl]")
     scoring.add_argument("--kinds", help="those of `selfmodel diagnose` [those of the group]")
@@ -52,7 +53,15 @@ def main() -> None:
 
 def _generate(options: argparse.Namespace) -> None:
     plans = [
-        Plan(robot, case, seed, gap, options.duration, options.trials or _question(case).trials)
+        Plan(
+            robot,
+            case,
+            seed,
+            gap,
+            options.duration,
+            1 if options.own_gait else options.trials or _question(case).trials,
+            options.own_gait,
+        )
         for gap, seed, case, robot in itertools.product(
             options.gaps.split(","),
             _seeds(options.seeds),

@@ -26,7 +26,11 @@ MATTERS = 0.1
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record: robot, case and gap by name, and the trials of the robot with its faults."""
+    """What to record: robot, case and gap by name, and the trials of the robot with its faults.
+
+    With ``own_gait``, there are two healthy trials, and the trial of the robot with its faults has
+    another gait: a trot for every second seed.
+    """
 
     robot: str
     case: str
@@ -34,11 +38,12 @@ class Plan:
     gap: str
     duration: float = 10.0
     trials: int = 3
+    own_gait: bool = False
 
     @property
     def name(self) -> str:
         """Name of the folder of the recording."""
-        return f"{self.robot}-{self.case}-{self.seed}-{self.gap}"
+        return f"{self.robot}-{self.case}-{self.seed}-{self.gap}{'-own' * self.own_gait}"
 
     def stream(self, *words: str) -> np.random.Generator:
         """Returns a random stream of this robot and case."""
@@ -63,6 +68,9 @@ def generate(out: Path, plan: Plan) -> Path:
     gaits = _gaits(machine, case, plan, faults)
     record = partial(_record, folder, machine, plan, gap)
     before = record(name="before", faults=(), onset=None, gait=gaits[0])
+    if plan.own_gait:
+        record(name="before-2", faults=(), onset=None, gait=gaits[1])
+        gaits = [_trot(machine, plan) if plan.seed % 2 else gaits[2]]
     moved: list[Motion] = []
     for k in range(plan.trials):
         # Trials after the onset have the faults from their start.
@@ -128,6 +136,16 @@ def _gaits(machine: Robot, case: Case, plan: Plan, faults: Faults) -> list[Gait]
     wrong = "sensor" in case.name  # so that a network has to control the robot
     kind = "network" if wrong or rng.random() < 1 / 3 else "playback"
     gaits = [draw_gait(machine, kind, rng) for _ in range(CANDIDATES)]
+    return _by_displacement(machine, plan, gaits, faults if case.group == "outside" else ())[:GAITS]
+
+
+def _by_displacement(
+    machine: Robot, plan: Plan, gaits: list[Gait], outside: Faults = ()
+) -> list[Gait]:
+    """Returns gaits by their displacement of the robot without gap and faults, the largest first.
+
+    Of those at the front, gaits that faults outside all kinds hardly change are last.
+    """
     perfect = draw_gap(machine, 0.0, plan.stream("gap"))
 
     def moved(model: mujoco.MjModel, gait: Gait, present: Faults) -> Motion:
@@ -141,16 +159,24 @@ def _gaits(machine: Robot, case: Case, plan: Plan, faults: Faults) -> list[Gait]
         float(np.linalg.norm(way)) * (1.0 if motion.is_upright() else 0.01)
         for way, motion in zip(ways, motions, strict=True)
     ]
-    best = sorted(range(CANDIDATES), key=lambda k: -distances[k])
-    if case.group == "outside":
-        other = compiled(machine, perfect, faults)
+    best = sorted(range(len(gaits)), key=lambda k: -distances[k])
+    if outside:
+        other = compiled(machine, perfect, outside)
 
         def is_unaffected(k: int) -> bool:
-            after = moved(other, gaits[k], faults).displacement(plan.duration)
+            after = moved(other, gaits[k], outside).displacement(plan.duration)
             return bool(np.linalg.norm(after - ways[k]) / np.linalg.norm(ways[k]) < MATTERS)
 
         best = sorted(best[: 2 * GAITS], key=is_unaffected)
-    return [gaits[k] for k in best[:GAITS]]
+    return [gaits[k] for k in best]
+
+
+def _trot(machine: Robot, plan: Plan) -> Gait:
+    """Returns the trot with the largest displacement of the robot without gap and faults."""
+    rng = plan.stream("trot")
+    return _by_displacement(machine, plan, [draw_gait(machine, "trot", rng) for _ in range(GAITS)])[
+        0
+    ]
 
 
 def _record(
@@ -180,6 +206,6 @@ def _record(
     noise = Noise().scaled(gap.size)
     items = recorded(machine, motion, encoders, noise, rng)
     write_bag(folder / name, items, noise.lost, rng, mcap=plan.seed % 2 == 0)
-    text = mapping(machine, encoders, plan.duration, healthy=name == "before")
+    text = mapping(machine, encoders, plan.duration, healthy=name.startswith("before"))
     (folder / f"{name}.toml").write_text(text)
     return motion

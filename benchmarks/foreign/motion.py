@@ -24,8 +24,9 @@ ground."""
 def draw_gait(robot: Robot, kind: str, rng: np.random.Generator) -> Gait:
     """Returns a random gait, which grows in the first half second.
 
-    Its kind is ``playback``, a sinusoid per motor, or ``network``, a hidden layer of tanh neurons
-    with a clock of two phases as inputs. The joints' ranges are those of the commands.
+    Its kind is ``playback``, a sinusoid per motor; ``trot``, one sinusoid for each motor of a leg
+    and every second leg in antiphase; or ``network``, a hidden layer of tanh neurons with a clock
+    of two phases as inputs. The joints' ranges are those of the commands.
     """
     model = robot.spec().compile()
     limits = np.array([model.joint(hinge).range for hinge in robot.motors.values()])
@@ -45,12 +46,33 @@ def draw_gait(robot: Robot, kind: str, rng: np.random.Generator) -> Gait:
         return network
     amplitude = rng.uniform(*robot.amplitudes, motors)
     phase, offset = rng.uniform(0, 2 * np.pi, motors), rng.uniform(-0.3, 0.3, motors)
+    if kind == "trot":
+        place, leg = _places_of_motors(robot, model)
+        amplitude, offset = amplitude[place], offset[place]
+        phase = phase[place] + np.pi * (leg % 2)
 
     def sinusoids(time: float, _angles: np.ndarray, _touch: np.ndarray) -> np.ndarray:
         wave = np.sin(2 * np.pi * frequency * time + phase)
         return np.asarray(centre + min(time / 0.5, 1.0) * half * (amplitude * wave + offset))
 
     return sinusoids
+
+
+def _places_of_motors(robot: Robot, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the place of each motor within its leg, and the number of its leg around the body."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    feet = {
+        name: data.body(body).xpos - data.body(robot.root).xpos
+        for name, body in robot.touches.items()
+    }
+    around = sorted(feet, key=lambda name: float(np.arctan2(feet[name][1], feet[name][0])))
+    legs, places = [], []
+    for hinge in robot.motors.values():
+        (foot,) = next(part.touches for part in robot.parts if hinge in part.hinges)
+        places.append(legs.count(around.index(foot)))
+        legs.append(around.index(foot))
+    return np.array(places), np.array(legs)
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,10 @@ def _diagnosed(folder: Path, question: Question) -> Row:
         "answer": None,
         "error": "",
     }
+    healthy = ["before", "before-2"] if row["truth"].get("own_gait") else ["before"]
     with tempfile.TemporaryDirectory() as logs:
-        names = ["before", *(f"after-{k + 1}" for k in range(question.trials))]
+        trials = 1 if row["truth"].get("own_gait") else question.trials
+        names = [*healthy, *(f"after-{k + 1}" for k in range(trials))]
         for name in names:
             log = str(Path(logs, f"{name}.mcap"))
             command = ("logs", "import", name, "--mapping", f"{name}.toml", "--out", log)
@@ -177,6 +179,7 @@ def judged(row: Row) -> Judgement:
         )
     verdict, best = answer["verdict"], terms(answer["diagnosis"][0]["hypothesis"].split("+"))
     expressible, right = is_expressible(real, answer["kinds"]), agrees(best, real)
+    judges = verdict != "not judged"
     onset = (answer.get("change") or {}).get("time")
     if healthy:
         verdict_right = not best and verdict in ("explained", "intact")
@@ -189,8 +192,8 @@ def judged(row: Row) -> Judgement:
     return Judgement(
         right=right if expressible else None,
         verdict_right=verdict_right,
-        false_alarm=(bool(best) or verdict == "unexplained") if healthy else None,
-        called_intact=None if healthy else not best and verdict != "unexplained",
+        false_alarm=(bool(best) or verdict == "unexplained") and judges if healthy else None,
+        called_intact=None if healthy else not best and judges and verdict != "unexplained",
         invented=bool(set(best) - set(real)),
         severity_error=_severity_error(best, real) if right else None,
         onset_error=abs(onset - truth["onset"]) if truth["onset"] and onset is not None else None,

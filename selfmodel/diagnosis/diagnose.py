@@ -20,7 +20,7 @@ from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Change, Diagnosis
 from selfmodel.diagnosis.joints import with_joint_faults
-from selfmodel.diagnosis.losses import LossFunction, LossTable, Problem, Timeline
+from selfmodel.diagnosis.losses import Calibrate, LossFunction, LossTable, Problem, Timeline
 from selfmodel.diagnosis.search import LocalSearch, evolved
 from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import GenerationCallback
@@ -52,6 +52,8 @@ class DiagnosticSearch:
         kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
         healthy_trials: Trials of the healthy robot, which measure the loss of a correct model;
             without any, no verdict is ``unexplained``.
+        calibrate: Returns the self-model that is fitted to some trials, by which an accusation is
+            checked (``adequacy``); None for a self-model that is given as it is.
 
     Attributes:
         losses: Losses of hypotheses on the trials.
@@ -69,7 +71,9 @@ class DiagnosticSearch:
         kinds: Sequence[FaultKind] = PAPER_KINDS,
         *,
         healthy_trials: Sequence[Trial] = (),
+        calibrate: Calibrate | None = None,
     ) -> None:
+        self._calibrate = calibrate
         self._settings = settings
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         self._healthy_trials = tuple(healthy_trials)
@@ -97,6 +101,7 @@ class DiagnosticSearch:
             healthy_trials=self._healthy_trials,
             names=trial_names(trials),
             settings=self._settings,
+            calibrate=self._calibrate,
         )
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(

@@ -13,7 +13,7 @@ from selfmodel.arrays import data_frame
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.trial import Trial, TrialPart, whole
 
-Verdict = Literal["intact", "explained", "ambiguous", "unexplained"]
+Verdict = Literal["intact", "explained", "ambiguous", "unexplained", "not judged"]
 """Verdicts on the best hypothesis.
 
 ``intact``: the empty hypothesis predicts the trials about as well as the self-model predicts the
@@ -22,7 +22,8 @@ for a hypothesis with faults. ``ambiguous``: other hypotheses are indistinguisha
 ``unexplained``: the best hypothesis predicts significantly worse than the self-model predicts the
 healthy robot, or significantly worse than with a fault of an unsearched kind, so a fault is
 missing; requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the
-simulation of every hypothesis diverged."""
+simulation of every hypothesis diverged. ``not judged``: a fault or an error of the self-model
+explains the trials, and the healthy trials do not decide between them; see ``adequacy``."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,14 @@ class Residual:
     trial: str
     begin: float
     end: float
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """The reason for which trials cannot be judged, a clause, and what to do about it."""
+
+    reason: str
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -168,7 +177,8 @@ class Diagnosis:
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
             first; see ``verdict.indistinguishable``.
-        verdict: ``intact``, ``explained``, ``ambiguous`` or ``unexplained``; see ``Verdict``.
+        verdict: ``intact``, ``explained``, ``ambiguous``, ``unexplained`` or ``not judged``; see
+            ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
             trials significantly better; see ``verdict.unsearched_fault``.
@@ -181,6 +191,7 @@ class Diagnosis:
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
         residual: Signals and time of the loss that is left, if it is unexplained.
+        doubt: Why the trials cannot be judged, if they cannot.
     """
 
     ranked: tuple[Candidate, ...]
@@ -196,6 +207,7 @@ class Diagnosis:
     fit: Fit | None = None
     change: Change | None = None
     residual: Residual | None = None
+    doubt: Doubt | None = None
 
     @property
     def best(self) -> Hypothesis:

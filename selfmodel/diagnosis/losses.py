@@ -24,6 +24,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
@@ -35,6 +36,9 @@ Parts = Sequence[Trial | TrialPart]
 
 LossFunction = Callable[[Sequence[Hypothesis]], FloatArray]
 """Returns the losses of some hypotheses, ``(n, pieces)``; inf where a simulation diverged."""
+
+Calibrate = Callable[[Sequence[Trial]], Robot]
+"""Returns the self-model that is fitted to some trials of the healthy robot."""
 
 OPENING, MIN_OPENING = 1 / 3, 100
 """Part of a trial that is simulated, from its beginning, if the comparator has no surrogate, and
@@ -73,6 +77,10 @@ class LossTable:
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
         self._prepared: dict[Hashable, PreparedTrial | PiecewiseTrial] = {}
         self._known: dict[tuple[Hashable, Hypothesis], Losses] = {}
+
+    def of_robot(self, robot: Robot) -> "LossTable":
+        """Returns an empty table of the same comparator, with another self-model."""
+        return LossTable(Simulator(robot, self._simulator.threads), self._comparator)
 
     def check(self, trials: Sequence[Trial]) -> None:
         """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
@@ -299,6 +307,8 @@ class Problem:
         healthy_trials: Trials of the healthy robot, or parts of them.
         names: Names of the trials of the whole diagnosis, by path.
         settings: Parameters of the search.
+        calibrate: Returns the self-model that is fitted to some trials; None for one that is given
+            as it is.
 
     Attributes:
         has_test: Whether hypotheses are compared by a paired test.
@@ -314,8 +324,10 @@ class Problem:
         healthy_trials: Parts,
         names: Mapping[str, str],
         settings: Settings,
+        calibrate: Calibrate | None = None,
     ) -> None:
         self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
+        self._calibrate = calibrate
         self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
         self.space = replace(space, observed=jams)
@@ -343,7 +355,16 @@ class Problem:
             healthy_trials=self.healthy_trials or healthy_trials,
             names=self.names,
             settings=self.settings,
+            calibrate=self._calibrate,
         )
+
+    @cached_property
+    def recalibrated(self) -> LossTable | None:
+        """Losses with the self-model that is fitted to the healthy trials and these together."""
+        if self._calibrate is None:
+            return None
+        every = [part.rows for part in (*self.healthy_trials, *self.trials)]
+        return self.table.of_robot(self._calibrate(every))
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials to explain, ``(n, pieces)``."""

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Fit
+from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, Fit
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import is_too_high
@@ -113,6 +113,14 @@ def _verdict(diagnosis: Diagnosis) -> str:
             )
         case "unexplained":
             return f"Unexplained: {_missing(diagnosis)}"
+        case "not judged":
+            return f"Not judged: {_doubt(diagnosis)}"
+
+
+def _doubt(diagnosis: Diagnosis) -> str:
+    """Returns why trials are not judged, and the remedy, as sentences."""
+    doubt = diagnosis.doubt or Doubt("the diagnosis does not say why", "repeat it")
+    return f"{doubt.reason}. To have them judged, {doubt.remedy}."
 
 
 def _missing(diagnosis: Diagnosis) -> str:

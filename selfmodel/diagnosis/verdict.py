@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmodel.diagnosis import search, significance
+from selfmodel.diagnosis.adequacy import doubt_of
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     DetectableSeverity,
@@ -104,6 +105,8 @@ def diagnosis_of(
     fit = _fit_of(best, problem)
     verdict = verdict_of(best, fit, alike, unsearched)
     has_severities = problem.has_test and not best
+    accused = best if unsearched is None else unsearched.hypothesis
+    doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
     severities = (
         detectable_severities(best, problem.space, problem.losses) if has_severities else []
     )
@@ -112,13 +115,14 @@ def diagnosis_of(
         trials=len(problem.trials),
         intact_distance=totals[INTACT],
         indistinguishable=tuple(alike[:kept]),
-        verdict=verdict,
+        verdict=verdict if doubt is None else "not judged",
         test=significance.TEST if problem.has_test else EQUAL_DISTANCES,
         unsearched=unsearched,
         undetectable=tuple(undetectable(best, problem)[:kept]) if problem.has_test else (),
         detectable=tuple(severities),
         fit=fit,
         residual=_residual_of(best, problem) if verdict == "unexplained" else None,
+        doubt=doubt,
     )
 
 

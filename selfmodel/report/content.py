@@ -116,6 +116,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
             faults = [str(one) for one in (diagnosis.best, *diagnosis.indistinguishable)]
             more = f" or one of {len(faults) - 3} others" if len(faults) > 3 else ""
             return f"has {' or '.join(faults[:3])}{more}"
+        case "not judged":
+            return "cannot be judged from these trials"
     return f"moves in a way that no searched hypothesis explains; the nearest is {diagnosis.best}"
 
 
