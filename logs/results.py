@@ -132,6 +132,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     fit: dict[str, Any] | None = None
     change: dict[str, Any] | None = None
     residual: dict[str, Any] | None = None
+    doubt: dict[str, Any] | None = None
     detectable: list[dict[str, Any]] | UnsetType = UNSET
     files: dict[str, str] | UnsetType = UNSET
     logs: tuple[str, ...] | UnsetType = UNSET

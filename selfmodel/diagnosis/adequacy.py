@@ -45,17 +45,18 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         accused: The hypothesis that is said to be true; if it is empty, no hypothesis explains the
             trials.
         fit: How well the best hypothesis predicts them.
-        problem: The trials, with comparable healthy trials; without any, nothing is doubted.
+        problem: The trials. Nothing is doubted without comparable healthy trials, without a
+            calibration, or if each controller is that of a healthy trial.
     """
-    healthy = problem.healthy([INTACT])
-    if healthy is None or not np.isfinite([fit.loss, fit.intact_loss]).all():
+    healthy = problem.healthy_trials
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or _have_one_driver(problem):
         return None
-    worst = max(problem.table.losses([INTACT], [one]).mean() for one in problem.healthy_trials)
-    if fit.intact_loss > significance.LOSS_RATIO * worst + significance.LOSS_FLOOR:
+    worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
+    if not fit.intact_loss <= significance.LOSS_RATIO * worst + significance.LOSS_FLOOR:
         return None
     reason, faster = "", faster_joints(problem)
     joints = [*fit.joints, *(fault.part for fault in accused.faults if fault.kind.is_of_joint)]
-    rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))
+    rows = ([part.rows for part in each] for each in (problem.trials, healthy))
     if uncovered := [joint for joint in joints if joint in faster]:
         reason = f"the healthy trials do not cover it: {_speeds_of(uncovered, faster)}"
     elif have_one_gait(*rows) and not faster:
@@ -79,6 +80,12 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     return Doubt(reason, "record a trial of the healthy robot with this gait") if reason else None
 
 
+def _have_one_driver(problem: Problem) -> bool:
+    """Returns whether each trial has the controller, or the very commands, of a healthy one."""
+    drivers = [part.trial.plan.controller for part in problem.healthy_trials]
+    return all(part.trial.plan.controller in drivers for part in problem.trials)
+
+
 def _speeds_of(joints: Sequence[str], faster: Mapping[str, tuple[float, float]]) -> str:
     """Returns the speeds of joints in the trials and in the healthy trials, as a clause."""
     return "; ".join(
@@ -89,8 +96,6 @@ def _speeds_of(joints: Sequence[str], faster: Mapping[str, tuple[float, float]])
 
 def is_explained_without(accused: Hypothesis, problem: Problem) -> bool:
     """Returns whether a self-model fitted to all trials predicts them as well without a fault."""
-    if problem.recalibrated is None:
-        return False
     refit = problem.recalibrated
     trials, healthy = problem.trials, problem.healthy_trials
     known = problem.table

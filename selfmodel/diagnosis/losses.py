@@ -327,7 +327,7 @@ class Problem:
         calibrate: Calibrate | None = None,
     ) -> None:
         self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
-        self._calibrate = calibrate
+        self.calibrate = calibrate
         self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
         self.space = replace(space, observed=jams)
@@ -355,16 +355,16 @@ class Problem:
             healthy_trials=self.healthy_trials or healthy_trials,
             names=self.names,
             settings=self.settings,
-            calibrate=self._calibrate,
+            calibrate=self.calibrate,
         )
 
     @cached_property
-    def recalibrated(self) -> LossTable | None:
+    def recalibrated(self) -> LossTable:
         """Losses with the self-model that is fitted to the healthy trials and these together."""
-        if self._calibrate is None:
-            return None
+        if self.calibrate is None:
+            raise ValueError("the self-model of this diagnosis is given as it is")
         every = [part.rows for part in (*self.healthy_trials, *self.trials)]
-        return self.table.of_robot(self._calibrate(every))
+        return self.table.of_robot(self.calibrate(every))
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials to explain, ``(n, pieces)``."""

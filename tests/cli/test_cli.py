@@ -6,11 +6,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from selfmodel import cli
+from selfmodel.diagnosis.diagnosis import Verdict
 from selfmodel.errors import TrialError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.files import file_digest
@@ -40,7 +42,7 @@ def test_recover_prints_one_json_object_with_every_key(short: tuple[Path, dict])
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
     assert told["comparator"] == "segment-prediction"
     assert (told["controller"], told["neurons"]) == ("network", 3)
-    assert told["verdict"] in {"intact", "explained", "ambiguous", "unexplained"}
+    assert told["verdict"] in set(get_args(Verdict))
     assert set(told["calibration"]) >= {"deviations", "error_before", "error"}
     assert told["intact_distance"] >= told["diagnosis"][0]["distance"] >= 0
     stages = [trial["stage"] for trial in told["trials"]]
