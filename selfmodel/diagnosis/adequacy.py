@@ -1,15 +1,18 @@
 """Adequacy: whether the self-model can carry an accusation, or the trials cannot be judged.
 
 A loss above that of the healthy trials has two causes: a fault, or a motion that the model predicts
-worse than those it was fitted to. A trial with a healthy trial of the same gait excludes the second
-one. For another gait, the following is asked before a robot is called damaged, unless its loss is
-too large for any error of a model that predicts the healthy trials:
+worse than those it was fitted to. In a trial with the gait of a healthy one, only the first is
+left. For other trials, the following is asked before a robot is called damaged:
 
-1. **Recalibration.** The self-model is fitted to the healthy trials and to those to explain
-   together, without a fault. What the healthy trials left open is then free to explain the others.
-   A fault has to predict all trials significantly better than this model.
-2. **Coverage.** A joint is accused only if the healthy trials move it about as fast. Commands are
-   compared: no fault changes them in a gait that is played back.
+1. **Explanation.** Does the fault explain most of the loss? If not, or if there is no fault that
+   does, the gait may be the cause, unless it is no faster than the healthy ones and the loss is too
+   large for the error of a fitted model. A fault that explains such a loss needs no more questions.
+2. **Coverage.** Do the healthy trials move the accused joints about as fast, and do they have two
+   gaits or more? With one, the error of the self-model in another gait is unknown. Speeds are those
+   of the commands: no fault changes them in a gait that is played back.
+3. **Recalibration.** Does the fault explain more than a self-model that is fitted to the healthy
+   trials and to those to explain together, without a fault? What the healthy trials left open is
+   free in it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +25,7 @@ from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import have_one_gait
+from selfmodel.trials.trial import TrialPart, have_one_gait
 
 COVERAGE = 1.25
 """Largest speed of a joint's commands, relative to that in the healthy trials, that they cover."""
@@ -45,45 +48,66 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         accused: The hypothesis that is said to be true; if it is empty, no hypothesis explains the
             trials.
         fit: How well the best hypothesis predicts them.
-        problem: The trials. Nothing is doubted without comparable healthy trials, without a
-            calibration, or if each controller is that of a healthy trial.
+        problem: The trials. Nothing is doubted without comparable healthy trials, or with a
+            self-model that is not calibrated.
     """
+    if problem.calibrate is None or problem.healthy([INTACT]) is None:
+        return None
+    if is_shown_in_known_gaits(accused, problem):
+        return None
     healthy = problem.healthy_trials
-    if problem.calibrate is None or problem.healthy([INTACT]) is None or _have_one_driver(problem):
-        return None
     worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
-    if not fit.intact_loss <= significance.LOSS_RATIO * worst + significance.LOSS_FLOOR:
-        return None
-    reason, faster = "", faster_joints(problem)
-    joints = [*fit.joints, *(fault.part for fault in accused.faults if fault.kind.is_of_joint)]
-    rows = ([part.rows for part in each] for each in (problem.trials, healthy))
-    if uncovered := [joint for joint in joints if joint in faster]:
-        reason = f"the healthy trials do not cover it: {_speeds_of(uncovered, faster)}"
-    elif have_one_gait(*rows) and not faster:
-        return None
-    elif not accused:
-        listed = _speeds_of(list(faster)[:MAX_JOINTS], faster)
-        reason = (
-            f"the mean loss is {fit.intact_loss / worst:.2g} times that of the healthy trials, "
-            f"which have other gaits{f': {listed}' if listed else ''}"
-        )
-    elif fit.left is not None and fit.left > MAX_LEFT:
-        reason = (
-            f"{accused} leaves {fit.left:.0%} of the loss beyond that of the healthy trials, which "
-            f"have other gaits"
-        )
-    elif is_explained_without(accused, problem):
-        reason = (
-            f"a self-model that is fitted to all trials predicts them about as well without "
-            f"{accused}: the healthy trials, which have other gaits, leave this open"
-        )
+    is_small = fit.intact_loss <= significance.LOSS_RATIO * worst + significance.LOSS_FLOOR
+    faster, left, reason = faster_joints(problem.trials, problem), share_left(accused, problem), ""
+    if left > MAX_LEFT:
+        if is_small or faster:
+            reason = (
+                f"{accused} leaves {left:.0%} of the loss beyond that of the healthy trials, which "
+                f"have other gaits: {_speeds_of(list(faster)[:MAX_JOINTS], faster)}"
+            ).removesuffix(": ")
+    elif is_small:
+        joints = [*fit.joints, *(one.part for one in accused.faults if one.kind.is_of_joint)]
+        if uncovered := [joint for joint in joints if joint in faster]:
+            reason = f"the healthy trials do not cover it: {_speeds_of(uncovered, faster)}"
+        elif all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy):
+            reason = (
+                f"the healthy trials have one gait, so that the error of the self-model in another "
+                f"gait is unknown, and {accused} is within what it may be"
+            )
+        elif is_explained_without(accused, problem):
+            reason = (
+                f"a self-model that is fitted to all trials predicts them about as well without "
+                f"{accused}: the healthy trials, which have other gaits, leave this open"
+            )
     return Doubt(reason, "record a trial of the healthy robot with this gait") if reason else None
 
 
-def _have_one_driver(problem: Problem) -> bool:
-    """Returns whether each trial has the controller, or the very commands, of a healthy one."""
+def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
+    """Returns whether the trials with the gait of a healthy one suffice for an accusation.
+
+    They do if a fault predicts them significantly better than no fault; without a fault, if there
+    are no other trials.
+    """
     drivers = [part.trial.plan.controller for part in problem.healthy_trials]
-    return all(part.trial.plan.controller in drivers for part in problem.trials)
+    healthy = [part.rows for part in problem.healthy_trials]
+    known = [
+        part
+        for part in problem.trials
+        if part.trial.plan.controller in drivers
+        or (have_one_gait([part.rows], healthy) and not faster_joints([part], problem))
+    ]
+    if not accused or not known:
+        return len(known) == len(problem.trials)
+    return significance.is_better(*problem.table.losses([accused, INTACT], known))
+
+
+def share_left(accused: Hypothesis, problem: Problem) -> float:
+    """Returns the share of the loss beyond that of the healthy trials that a hypothesis leaves."""
+    if not accused:
+        return 1.0
+    loss, intact = problem.losses([accused, INTACT]).mean(axis=1)
+    healthy = 0.0 if problem.reference is None else problem.reference.mean()
+    return float((loss - healthy) / (intact - healthy)) if loss > healthy else 0.0
 
 
 def _speeds_of(joints: Sequence[str], faster: Mapping[str, tuple[float, float]]) -> str:
@@ -95,17 +119,20 @@ def _speeds_of(joints: Sequence[str], faster: Mapping[str, tuple[float, float]])
 
 
 def is_explained_without(accused: Hypothesis, problem: Problem) -> bool:
-    """Returns whether a self-model fitted to all trials predicts them as well without a fault."""
-    refit = problem.recalibrated
-    trials, healthy = problem.trials, problem.healthy_trials
-    known = problem.table
-    with_fault = _joined(known.losses([accused], trials), known.losses([INTACT], healthy))
-    without = _joined(refit.losses([INTACT], trials), refit.losses([INTACT], healthy))
-    return not significance.is_better(with_fault, without)
+    """Returns whether a self-model fitted to all trials predicts them as well without a fault.
+
+    It predicts neither the trials significantly worse than the fault does, nor the healthy trials
+    significantly worse than the self-model that is fitted to them alone.
+    """
+    known, refit = problem.table, problem.recalibrated
+    return not any(
+        significance.is_better(known.losses([fault], trials)[0], refit.losses([INTACT], trials)[0])
+        for fault, trials in ((accused, problem.trials), (INTACT, problem.healthy_trials))
+    )
 
 
-def faster_joints(problem: Problem) -> dict[str, tuple[float, float]]:
-    """Returns the joints that the trials move faster than the healthy ones cover.
+def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tuple[float, float]]:
+    """Returns the joints that trials move faster than the healthy ones of a problem cover.
 
     The fastest relative to them is first. By the joint's name, the speed of its commands in the
     trials and in the healthy trials, rad/s.
@@ -113,7 +140,7 @@ def faster_joints(problem: Problem) -> dict[str, tuple[float, float]]:
     anatomy = problem.space.anatomy
     speeds, covered = (
         np.max([_speeds(part.rows.trajectory) for part in each], axis=0)
-        for each in (problem.trials, problem.healthy_trials)
+        for each in (trials, problem.healthy_trials)
     )
     joints = {}
     for joint in anatomy.joints:
@@ -129,7 +156,3 @@ def _speeds(trajectory: Trajectory) -> FloatArray:
     speeds = changes / np.diff(trajectory.time)[:, np.newaxis]
     known = speeds[np.isfinite(speeds).all(axis=1)]
     return np.quantile(known, FASTEST, axis=0) if len(known) else np.zeros(speeds.shape[1])
-
-
-def _joined(*rows: FloatArray) -> FloatArray:
-    return np.concatenate([one for (one,) in rows])
