@@ -97,7 +97,10 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def _diagnosed(folder: Path, question: Question) -> Row:
-    """Imports and diagnoses one recording; the seconds are those of the diagnosis."""
+    """Imports and diagnoses one recording; the seconds are those of the diagnosis.
+
+    One with a gait of its own has two healthy trials and one to explain.
+    """
     row: Row = {
         "name": folder.name,
         "truth": json.loads((folder / "truth.json").read_text()),
@@ -105,9 +108,10 @@ def _diagnosed(folder: Path, question: Question) -> Row:
         "answer": None,
         "error": "",
     }
-    healthy = ["before", "before-2"] if row["truth"].get("own_gait") else ["before"]
+    healthy, trials = ["before"], question.trials
+    if row["truth"].get("own_gait"):
+        healthy, trials = ["before", "before-2"], 1
     with tempfile.TemporaryDirectory() as logs:
-        trials = 1 if row["truth"].get("own_gait") else question.trials
         names = [*healthy, *(f"after-{k + 1}" for k in range(trials))]
         for name in names:
             log = str(Path(logs, f"{name}.mcap"))
@@ -154,9 +158,11 @@ class Judgement:
     """``intact`` or ``explained`` for a healthy robot; ``explained`` with the truth first or
     ``ambiguous`` with the truth named for faults of the considered kinds; else ``unexplained``."""
     false_alarm: bool | None = None
-    """Whether a healthy robot is called damaged or unexplained."""
+    """Whether a healthy robot is called damaged or unexplained, and the trials are judged."""
     called_intact: bool | None = None
     """Whether a damaged robot is called intact."""
+    not_judged: bool = False
+    """Whether the verdict is ``not judged``."""
     invented: bool = False
     """Whether the first hypothesis contains a fault that is not there."""
     severity_error: float | None = None
@@ -194,7 +200,8 @@ def judged(row: Row) -> Judgement:
         verdict_right=verdict_right,
         false_alarm=(bool(best) or verdict == "unexplained") and judges if healthy else None,
         called_intact=None if healthy else not best and judges and verdict != "unexplained",
-        invented=bool(set(best) - set(real)),
+        not_judged=not judges,
+        invented=judges and bool(set(best) - set(real)),
         severity_error=_severity_error(best, real) if right else None,
         onset_error=abs(onset - truth["onset"]) if truth["onset"] and onset is not None else None,
         onset_found=onset is not None if truth["onset"] else None,
@@ -275,6 +282,7 @@ HEADINGS = {
     "verdict_right": "verdict right",
     "false_alarm": "false alarms",
     "called_intact": "called intact",
+    "not_judged": "not judged",
     "invented": "invented",
     "severity_error": "severity error",
     "onset_found": "onset found",

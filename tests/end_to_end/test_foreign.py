@@ -1,6 +1,7 @@
 """Recordings of the independent generator: what it makes, and how answers are judged."""
 
 import ast
+import itertools
 import json
 from pathlib import Path
 
@@ -158,6 +159,20 @@ def row(truth: list[str], best: str, verdict: str, **more: object) -> dict[str, 
     }
 
 
+def test_a_trial_with_a_gait_of_its_own_has_two_healthy_trials_of_other_gaits(tmp_path: Path):
+    plan = Plan("quadruped", "healthy", 1, "none", duration=1.0, trials=1, own_gait=True)
+
+    made = generate(tmp_path, plan)
+
+    stages = {path.stem: "before" in path.read_text() for path in made.glob("*.toml")}
+    assert stages == {"before": True, "before-2": True, "after-1": False}
+    spreads = [joint_states(made / name)[2].std(axis=0) for name in stages]
+    assert all(
+        np.abs(one - other).mean() > 0.1 * other.mean()
+        for one, other in itertools.combinations(spreads, 2)
+    )
+
+
 @pytest.mark.parametrize(
     ("truth", "best", "verdict", "right"),
     [
@@ -191,6 +206,8 @@ def test_an_ambiguous_verdict_is_right_if_it_names_the_truth():
 
 def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():
     assert judged(row([], "motor:a=0.4", "explained")).false_alarm
+    assert not judged(row([], "motor:a=0.4", "not judged")).false_alarm
+    assert judged(row([], "motor:a=0.4", "not judged")).not_judged
     assert judged(row(["break:a"], "intact", "explained")).called_intact
     assert judged(row(["break:a"], "break:a+motor:b=0.5", "explained")).invented
     assert judged(row(["motor:a=0.4"], "motor:a=0.5", "explained")).severity_error == (
