@@ -61,10 +61,12 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     faster, left, reason = faster_joints(problem.trials, problem), share_left(accused, problem), ""
     if left > MAX_LEFT:
         if is_small or faster:
+            whatever = f"{accused} leaves {left:.0%}" if accused else "no hypothesis explains most"
+            listed = _speeds_of(list(faster)[:MAX_JOINTS], faster)
             reason = (
-                f"{accused} leaves {left:.0%} of the loss beyond that of the healthy trials, which "
-                f"have other gaits: {_speeds_of(list(faster)[:MAX_JOINTS], faster)}"
-            ).removesuffix(": ")
+                f"{whatever} of the loss beyond that of the healthy trials, which have other gaits"
+                f"{f': {listed}' if listed else ''}"
+            )
     elif is_small:
         joints = [*fit.joints, *(one.part for one in accused.faults if one.kind.is_of_joint)]
         if uncovered := [joint for joint in joints if joint in faster]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from selfmodel import load_robot
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.playback import played_back
 from selfmodel.diagnosis.adequacy import COVERAGE, doubt_of, faster_joints
@@ -49,6 +50,12 @@ def unlike(robot: Robot, knee: float = 1.0) -> Robot:
     return with_model(robot, model_with_parameters(robot, own), robot.control_delay)
 
 
+@pytest.fixture(scope="module")
+def weaker(quadruped: Robot) -> Robot:
+    """The robot itself, with a weak motor."""
+    return unlike(quadruped, 0.5)
+
+
 def moved(robot: Robot, gait: str, *, pace: int = 1, truth: str = "intact") -> Trial:
     """A trial of a robot under sinusoids of a gait, ``pace`` times as fast."""
     sizes = np.resize(GAITS[gait], robot.model.nu)
@@ -65,25 +72,37 @@ def healthy(real: Robot) -> list[Trial]:
 
 
 @pytest.fixture(scope="module")
+def covering(real: Robot, healthy: list[Trial]) -> list[Trial]:
+    """The same, and faster ones."""
+    return [*healthy, moved(real, "first", pace=3), moved(real, "second", pace=3)]
+
+
+@pytest.fixture(scope="module")
 def weak(real: Robot) -> Trial:
     """A trial of the robot with a weak motor in a third gait."""
     return moved(real, "third", truth=WEAK)
 
 
+@pytest.fixture(scope="module")
+def table(quadruped: Robot) -> LossTable:
+    """Losses of the self-model, which are kept from test to test."""
+    return LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+
+
 def problem_of(
-    model: Robot, trial: Trial, healthy: Sequence[Trial], refit: Robot | None = None
+    table: LossTable, trial: Trial, healthy: Sequence[Trial], refit: Robot | None = None
 ) -> Problem:
-    """The problem of a trial; a refit of the self-model to all trials gives ``refit``, or it."""
-    table = LossTable(Simulator(model, 1), SEGMENT_PREDICTION)
+    """The problem of a trial; a refit of the self-model to all trials gives ``refit``."""
+    robot = load_robot("quadruped")
     return Problem(
         table,
-        HypothesisSpace.of(DEFAULT_KINDS, model.anatomy),
+        HypothesisSpace.of(DEFAULT_KINDS, robot.anatomy),
         [trial],
         surrogate=table.surrogate([trial]),
         healthy_trials=healthy,
         names=trial_names([trial]),
         settings=Settings(),
-        calibrate=lambda _: refit or model,
+        calibrate=lambda _: refit or robot,
     )
 
 
@@ -96,28 +115,28 @@ def doubted(problem: Problem, accused: str, ratio: float = 2.0) -> Doubt | None:
 
 
 def test_what_a_refit_explains_without_a_fault_is_no_fault(
-    quadruped: Robot, healthy: list[Trial], weak: Trial
+    table: LossTable, healthy: list[Trial], weak: Trial, weaker: Robot
 ):
-    doubt = doubted(problem_of(quadruped, weak, healthy, unlike(quadruped, 0.5)), WEAK)
+    doubt = doubted(problem_of(table, weak, healthy, weaker), WEAK)
 
     assert doubt is not None
     assert WEAK in doubt.reason
-    assert doubted(problem_of(quadruped, weak, healthy), WEAK) is None
+    assert doubted(problem_of(table, weak, healthy), WEAK) is None
 
 
 def test_one_healthy_gait_does_not_tell_how_well_another_is_predicted(
-    quadruped: Robot, healthy: list[Trial], weak: Trial
+    table: LossTable, healthy: list[Trial], weak: Trial
 ):
-    doubt = doubted(problem_of(quadruped, weak, healthy[:1]), WEAK)
+    doubt = doubted(problem_of(table, weak, healthy[:1]), WEAK)
 
     assert doubt is not None
     assert "one gait" in doubt.reason
 
 
 def test_a_fault_that_leaves_most_of_the_loss_is_doubted(
-    quadruped: Robot, healthy: list[Trial], weak: Trial
+    table: LossTable, healthy: list[Trial], weak: Trial
 ):
-    doubt = doubted(problem_of(quadruped, weak, healthy), "motor:back_right_knee=0.9")
+    doubt = doubted(problem_of(table, weak, healthy), "motor:back_right_knee=0.9")
 
     assert doubt is not None
     assert "leaves" in doubt.reason
@@ -125,19 +144,18 @@ def test_a_fault_that_leaves_most_of_the_loss_is_doubted(
 
 @pytest.mark.parametrize("accused", ["intact", WEAK])
 def test_the_same_gait_as_that_of_a_healthy_trial_is_not_doubted(
-    quadruped: Robot, real: Robot, healthy: list[Trial], accused: str
+    table: LossTable, real: Robot, healthy: list[Trial], accused: str
 ):
     same = moved(real, "first", truth=WEAK)
 
-    assert doubted(problem_of(quadruped, same, healthy, real), accused) is None
+    assert doubted(problem_of(table, same, healthy, real), accused) is None
 
 
 @pytest.mark.parametrize("accused", ["intact", WEAK])
 def test_a_loss_beyond_any_error_of_a_fitted_model_is_not_doubted(
-    quadruped: Robot, real: Robot, healthy: list[Trial], weak: Trial, accused: str
+    table: LossTable, covering: list[Trial], weak: Trial, weaker: Robot, accused: str
 ):
-    covering = [*healthy, moved(real, "first", pace=3), moved(real, "second", pace=3)]
-    problem = problem_of(quadruped, weak, covering, unlike(quadruped, 0.5))
+    problem = problem_of(table, weak, covering, weaker)
 
     small, large = (doubted(problem, accused, LOSS_RATIO * factor) for factor in (0.9, 1.5))
 
@@ -147,37 +165,37 @@ def test_a_loss_beyond_any_error_of_a_fitted_model_is_not_doubted(
 
 @pytest.mark.parametrize("ratio", [2.0, 2 * LOSS_RATIO])
 def test_an_unexplained_motion_that_is_faster_than_the_healthy_ones_is_not_judged(
-    quadruped: Robot, real: Robot, healthy: list[Trial], ratio: float
+    table: LossTable, real: Robot, healthy: list[Trial], ratio: float
 ):
-    doubt = doubted(problem_of(quadruped, moved(real, "first", pace=2), healthy), "intact", ratio)
+    doubt = doubted(problem_of(table, moved(real, "first", pace=2), healthy), "intact", ratio)
 
     assert doubt is not None
     assert KNEE in doubt.reason
 
 
 def test_a_joint_that_moves_faster_than_in_the_healthy_trials_is_not_accused(
-    quadruped: Robot, real: Robot, healthy: list[Trial]
+    table: LossTable, real: Robot, healthy: list[Trial]
 ):
     fast = moved(real, "first", pace=2, truth=WEAK)
 
-    doubt = doubted(problem_of(quadruped, fast, healthy), WEAK)
+    doubt = doubted(problem_of(table, fast, healthy), WEAK)
 
     assert doubt is not None
     assert doubt.reason.startswith("the healthy trials do not cover it: front_left_knee")
 
 
 def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(
-    quadruped: Robot, healthy: list[Trial], weak: Trial
+    table: LossTable, healthy: list[Trial], weak: Trial, weaker: Robot
 ):
-    problem = problem_of(quadruped, weak, healthy, unlike(quadruped, 0.5))
+    problem = problem_of(table, weak, healthy, weaker)
     problem.calibrate = None
 
     assert doubted(problem, WEAK) is None
 
 
-def test_speeds_are_those_of_commands_by_joint(quadruped: Robot):
+def test_speeds_are_those_of_commands_by_joint(table: LossTable, quadruped: Robot):
     slow, fast = (moved(quadruped, "third", pace=pace) for pace in (1, 2))
-    problem, other = problem_of(quadruped, fast, [slow]), problem_of(quadruped, slow, [fast])
+    problem, other = problem_of(table, fast, [slow]), problem_of(table, slow, [fast])
 
     faster = faster_joints(problem.trials, problem)
 
