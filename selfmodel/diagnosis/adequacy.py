@@ -6,7 +6,9 @@ left. For other trials, the following is asked before a robot is called damaged:
 
 1. **Explanation.** Does the fault explain most of the loss? If not, or if there is no fault that
    does, the gait may be the cause, unless it is no faster than the healthy ones and the loss is too
-   large for the error of a fitted model. A fault that explains such a loss needs no more questions.
+   large for the error of a fitted model: more than ``LOSS_RATIO`` times that of the worst healthy
+   trial, or its square if the healthy trials have one gait. A fault that explains such a loss needs
+   no more questions.
 2. **Coverage.** Do the healthy trials move the accused joints about as fast, and do they have two
    gaits or more? With one, the error of the self-model in another gait is unknown. Speeds are those
    of the commands: no fault changes them in a gait that is played back.
@@ -57,7 +59,9 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         return None
     healthy = problem.healthy_trials
     worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
-    is_small = fit.intact_loss <= significance.LOSS_RATIO * worst + significance.LOSS_FLOOR
+    has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
+    ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
+    is_small = fit.intact_loss <= ratio * worst + significance.LOSS_FLOOR
     faster, left, reason = faster_joints(problem.trials, problem), share_left(accused, problem), ""
     if left > MAX_LEFT:
         if is_small or faster:
@@ -71,7 +75,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         joints = [*fit.joints, *(one.part for one in accused.faults if one.kind.is_of_joint)]
         if uncovered := [joint for joint in joints if joint in faster]:
             reason = f"the healthy trials do not cover it: {_speeds_of(uncovered, faster)}"
-        elif all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy):
+        elif has_one_gait:
             reason = (
                 f"the healthy trials have one gait, so that the error of the self-model in another "
                 f"gait is unknown, and {accused} is within what it may be"

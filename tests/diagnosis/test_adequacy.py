@@ -127,10 +127,12 @@ def test_what_a_refit_explains_without_a_fault_is_no_fault(
 def test_one_healthy_gait_does_not_tell_how_well_another_is_predicted(
     table: LossTable, healthy: list[Trial], weak: Trial
 ):
-    doubt = doubted(problem_of(table, weak, healthy[:1]), WEAK)
+    problem = problem_of(table, weak, healthy[:1])
+    doubt = doubted(problem, WEAK, 1.5 * LOSS_RATIO)
 
     assert doubt is not None
     assert "one gait" in doubt.reason
+    assert doubted(problem, WEAK, 1.5 * LOSS_RATIO**2) is None
 
 
 def test_a_fault_that_leaves_most_of_the_loss_is_doubted(
