@@ -67,7 +67,7 @@ def _places_of_motors(robot: Robot, model: mujoco.MjModel) -> tuple[np.ndarray, 
         for name, body in robot.touches.items()
     }
     around = sorted(feet, key=lambda name: float(np.arctan2(feet[name][1], feet[name][0])))
-    legs, places = [], []
+    legs, places = list[int](), list[int]()
     for hinge in robot.motors.values():
         (foot,) = next(part.touches for part in robot.parts if hinge in part.hinges)
         places.append(legs.count(around.index(foot)))
