@@ -23,6 +23,7 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery import recover as recovery_loop
+from selfmodel.recovery.measurable import check_measurable, observed_of
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
@@ -33,7 +34,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.studies.experiment import check_motion, draw_reality
+from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
@@ -75,11 +76,11 @@ def evolve_controller(
 
     Raises:
         InputError: The design or the robot is unknown, the notation is invalid, a motor has no
-            command range, or the base is fixed and the score is a displacement.
+            command range, or the robot cannot have the score.
     """
     arguments.check_seed(seed)
     robot = arguments.robot_of(robot)
-    check_motion(score, robot)
+    check_measurable(score, robot)
     chosen = plugins.design(design, robot) if isinstance(design, str) else design
     repair = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
     repaired = repair(
@@ -361,14 +362,14 @@ def recover(
         on_event: Called with the progress of the recovery.
 
     Raises:
-        InputError: The folder contains files, an argument is invalid, or the base is fixed and the
-            score is a displacement.
+        InputError: The folder contains files, an argument is invalid, or the score needs what is
+            not observed of the robot.
         TrialError: A physical robot could not finish a trial.
     """
     arguments.check_seed(seed)
     robot, count = arguments.robot_of(robot), thread_count(threads)
     score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
-    check_motion(score, robot)
+    check_measurable(score, robot, observed_of(healthy, damaged))
     chosen, searched = settings or Settings(), arguments.kinds_of(kinds)
     drawn = plugins.design(design, robot) if isinstance(design, str) else design
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))

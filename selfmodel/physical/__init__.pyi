@@ -1,6 +1,7 @@
 from .environment import EnvironmentRobot as EnvironmentRobot
 from .interface import (
     Limit as Limit,
+    ObservedRobot as ObservedRobot,
     PhysicalRobot as PhysicalRobot,
     TimedRobot as TimedRobot,
     joint_limits as joint_limits,

@@ -2,7 +2,15 @@
 
 import math
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Generator,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
@@ -84,6 +92,8 @@ class EnvironmentRobot:
         env: The environment. Its actions are the motor targets, in the order of the model's motors.
         robot: The robot as its model describes it.
         observe: Converts an observation to signals.
+        signals: Signals that its observations have. By default, without ``observe``, those in
+            ``env.observation_spec()``; if none is known, all are taken to be observed.
         stop: Stops the robot safely, at any time and repeatedly. The default is ``env.step(safe)``.
             Before ``reset`` and after the last step of an episode, a ``dm_env`` environment ignores
             the targets and resets, so the robot then moves to its initial pose.
@@ -111,6 +121,7 @@ class EnvironmentRobot:
     robot: Robot
     _: KW_ONLY
     observe: Observe = signals_by_name
+    signals: Collection[Signal] = ()
     stop: Callable[[], object] | None = None
     safe: FloatArray | None = None
     limits: Sequence[Limit] = ()
@@ -146,6 +157,9 @@ class EnvironmentRobot:
                 f"robot while the environment hangs; got {seconds!r} and "
                 f"{'no function' if self.stop is None else 'a function'}"
             )
+        spec = self.env.observation_spec() if self.observe is signals_by_name else {}
+        named = self.signals or [signal for signal in SIGNALS if signal in spec]
+        self.signals = {*named, "commands"} if named else SIGNALS
         self.silent_neurons = frozenset(self.silent_neurons)
         self._halt = self.stop or partial(_step_to, self.env, targets)
 

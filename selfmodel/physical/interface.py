@@ -1,6 +1,6 @@
 """The interface of a physical robot, and the limits beyond which one is stopped."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -50,6 +50,16 @@ class TimedRobot(PhysicalRobot, Protocol):
     @property
     def clock(self) -> Callable[[], float]:
         """Monotonic clock: returns the time, s, from any origin."""
+        ...
+
+
+@runtime_checkable
+class ObservedRobot(PhysicalRobot, Protocol):
+    """Physical robot that declares what it observes; all others are taken to observe everything."""
+
+    @property
+    def signals(self) -> Collection[Signal]:
+        """Signals that its samples have, commands included; the others are NaN."""
         ...
 
 

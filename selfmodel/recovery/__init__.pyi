@@ -16,6 +16,8 @@ from .result import Database as Database, Event as Event, Recovery as Recovery
 from .scores import (
     DISPLACEMENT as DISPLACEMENT,
     ENERGY as ENERGY,
+    STEPS as STEPS,
     Score as Score,
     upright_within as upright_within,
 )
+from .tracking import Reference as Reference, tracking as tracking

@@ -22,6 +22,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
+from selfmodel.recovery.measurable import check_measurable, observed_in
 from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import UPRIGHT, Score, fall_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
@@ -159,7 +160,9 @@ class RecoveryLoop:
     def _fit_self_model(self) -> None:
         """Fits the self-model to the healthy trials; a new repair simulates the fitted one."""
         healthy_trials, nominal = self.known.trials, self.simulator
-        self.choose_comparator(nominal.robot, healthy_trials)  # refused before the failure
+        # Refused before the failure.
+        check_measurable(self.score, nominal.robot, observed_in(healthy_trials[0]))
+        self.choose_comparator(nominal.robot, healthy_trials)
         self._calibration = self.calibrate(healthy_trials) if self.calibrate else None
         if self._calibration is not None:
             self.on_event(self._calibration)

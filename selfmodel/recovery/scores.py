@@ -41,6 +41,11 @@ COLLISION_TIME = 0.05
 half of the measurements. Wrong measurements of single steps are shorter; legs that pass through
 each other at the pace of a walk are longer."""
 
+STEP_TIME, STANDS, SWINGS = 0.1, 0.75, 0.25
+"""Time over which a foot's contact is averaged, s, and the shares of it above which the foot stands
+and below which it swings; in between it goes on as before. A bounce, a tremor and a wrong reading
+are no step."""
+
 WORK_WEIGHT = 0.1
 """Metres that a work of the robot's weight times a metre costs: a gait with a cost of transport of
 3, that of a fast legged robot, keeps 70 % of its displacement."""
@@ -62,8 +67,10 @@ class Score:
         unit: Unit of the score; "" for none.
         grows_with_time: Whether rollouts of half the steps rank controllers approximately as whole
             ones do, so that a search may begin with them.
-        needs_free_base: Whether the score is a displacement of the base, which a fixed base does
-            not have.
+        needs_free_base: Whether only a robot that moves its base has the score, such as a
+            displacement.
+        needs_touch: Whether only a robot with touch sensors has the score.
+        optional: Signals of ``record`` without which a trial has a score all the same.
     """
 
     name: str
@@ -72,6 +79,8 @@ class Score:
     unit: str = ""
     grows_with_time: bool = False
     needs_free_base: bool = False
+    needs_touch: bool = False
+    optional: tuple[Signal, ...] = ()
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
         """Returns the score of a trial of a robot with faults; NaN if it was not observed."""
@@ -207,6 +216,19 @@ def _upright_less_work(robot: Robot, hypothesis: Hypothesis, trajectory: Traject
     return np.asarray(_upright(robot, hypothesis, trajectory) - WORK_WEIGHT * cost)
 
 
+def _steps(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    feet = [k for k, one in enumerate(robot.anatomy.sensors) if one.kind == "touch"]
+    touch = _held(trajectory["sensors"][..., feet].swapaxes(-1, -2))
+    window = _steps_in(STEP_TIME, trajectory)
+    total = np.cumsum(np.nan_to_num(touch), axis=-1)
+    share = (total[..., window:] - total[..., :-window]) / window
+    stands = _held(np.where(share > STANDS, 1.0, np.where(share < SWINGS, 0.0, np.nan)))
+    landings = np.count_nonzero((stands[..., 1:] == 1) & (stands[..., :-1] == 0), axis=-2)
+    end = falls_of(robot, hypothesis, trajectory)
+    before = np.arange(landings.shape[-1]) + window + 1 < end[..., np.newaxis]
+    return np.where(before, landings, 0.0).sum(axis=-1)
+
+
 def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:
     """Returns the mechanical work of the joints, J, ``(...)``: work on a motor counts as spent.
 
@@ -227,7 +249,9 @@ DISPLACEMENT = _metres(
 )
 """Forward displacement, m. Source: the paper, section III."""
 
-UPRIGHT = _metres("upright", ("base_position", "base_orientation"), _upright)
+UPRIGHT = _metres(
+    "upright", ("base_position", "base_orientation"), _upright, optional=("base_orientation",)
+)
 """Forward displacement up to the last step before the robot falls, m.
 
 A robot has fallen at the first step from which its base is, for most of ``FALLEN_TIME`` (near the
@@ -241,6 +265,7 @@ ENERGY = _metres(
     (*UPRIGHT.record, "joint_efforts", "joint_velocities"),
     _upright_less_work,
     grows_with_time=False,
+    optional=UPRIGHT.optional,
 )
 """Displacement up to the first fall, m, less ``WORK_WEIGHT`` times the work over the weight, m.
 
@@ -248,8 +273,23 @@ The work over the weight and the distance is the cost of transport (Gabrielli an
 price speed?*, 1950).
 """
 
+STEPS = Score(
+    "steps",
+    ("sensors", *UPRIGHT.record),
+    _steps,
+    unit="steps",
+    grows_with_time=True,
+    needs_free_base=True,
+    needs_touch=True,
+    optional=UPRIGHT.record,
+)
+"""Number of times that feet come down before the robot falls, for a robot without odometry.
+
+A foot comes down when it stands after it swung; see ``STEP_TIME``. Steps on the spot count as well.
+"""
+
 SCORES: Mapping[str, Score] = MappingProxyType(
-    {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY)}
+    {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY, STEPS)}
 )
 """Scores by name."""
 
@@ -307,7 +347,7 @@ def upright_within(
     name = f"{UPRIGHT.name} within {' and '.join(texts)}" if texts else UPRIGHT.name
     record = (*UPRIGHT.record, "joint_velocities", "joint_efforts")
     signals = (*record, "joint_positions") if compares_bodies else record
-    return _metres(name, signals, of)
+    return _metres(name, signals, of, optional=signals[1:])
 
 
 def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:

@@ -25,6 +25,7 @@ from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
+from selfmodel.recovery.measurable import check_measurable, observed_of
 from selfmodel.recovery.recover import RecoveryLoop, random_stream
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
@@ -109,6 +110,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
     else:
         healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
+    check_measurable(experiment.score, robot, observed_of(healthy, damaged))
     journal = create_journal(
         experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
@@ -205,7 +207,7 @@ def choose_score(
     """Returns the score of that name for a robot.
 
     Args:
-        name: ``displacement``, ``upright``, ``energy``, ``return`` or ``tracking``; the name of an
+        name: A name of ``SCORES``, ``return`` or ``tracking``; the name of an
             entry point in the group ``selfmodel.scores``, or ``package.module:object``.
         entry: The robot.
         design: Design of the controllers.
@@ -264,20 +266,10 @@ def _limited(name: str, limits: Sequence[float | None]) -> Score:
 
 
 def check_score(name: str, entry: Entry) -> None:
-    """Checks that a robot has a score of that name, and that its base moves if that is needed."""
+    """Checks that a robot has a score of that name, which can be measured on it."""
     if name != TRACKING:
         robot = entry.robot()
-        check_motion(plugins.score(name, robot.name, entry), robot)
-
-
-def check_motion(score: Score, robot: Robot) -> None:
-    """Checks that the base of a robot moves if its score is a displacement."""
-    if robot.has_fixed_base and score.needs_free_base:
-        raise InputError(
-            f"the base of {robot.name} is fixed, and the score {score.name} is a displacement of "
-            f"the base: give --score {TRACKING}, with --reference FILE for a joint trajectory to "
-            f"follow, or with --controller cpg alone for the motion of a random CPG"
-        )
+        check_measurable(plugins.score(name, robot.name, entry), robot)
 
 
 def read_reference(path: Path, robot: Robot) -> Reference:

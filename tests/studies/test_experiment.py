@@ -14,6 +14,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.recovery.measurable import check_measurable
 from selfmodel.recovery.scores import ENERGY, UPRIGHT, Score, upright_within
 from selfmodel.recovery.tracking import Reference
 from selfmodel.robot.designs import cpg_for, network_for
@@ -22,7 +23,6 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import (
     ChosenScore,
-    check_motion,
     choose_score,
     is_correct,
     read_reference,
@@ -94,11 +94,11 @@ def test_a_score_in_python_is_refused_by_what_it_needs_and_not_by_its_name(
     score: Score, tmp_path: Path
 ):
     physical = selfmodel.simulated_robot(arm())
-    with pytest.raises(InputError, match=rf"the score {score.name} is a displacement of the base"):
+    with pytest.raises(InputError, match=rf"base of robot is fixed, and the score {score.name}"):
         selfmodel.recover(physical, physical, arm(), tmp_path / "run", score=score)
     with pytest.raises(InputError, match="give --score tracking"):
         selfmodel.evolve_controller(arm(), score=score)
-    check_motion(dataclasses.replace(score, needs_free_base=False), arm())
+    check_measurable(dataclasses.replace(score, needs_free_base=False), arm())
     assert not (tmp_path / "run").exists()
 
 
