@@ -27,7 +27,7 @@ from selfmodel.files import read_file, sync
 from selfmodel.logs import errors, records
 from selfmodel.logs.errors import LogError
 from selfmodel.logs.files import no_folder, partial_path, publish, refuse_existing, taken
-from selfmodel.logs.messages import schema_text
+from selfmodel.logs.messages import CHANNELS, schema_text
 from selfmodel.version import __version__
 
 CHUNK = 256 * 2**10
@@ -83,7 +83,8 @@ class LogFile:
         if kind not in self._schemas:
             text = schema_text(kind).encode()
             self._schemas[kind] = self._mcap.register_schema(kind, "ros2msg", text)
-        return self._mcap.register_channel(topic, "cdr", self._schemas[kind])
+        metadata = dict(CHANNELS.get(topic, {}))
+        return self._mcap.register_channel(topic, "cdr", self._schemas[kind], metadata)
 
     def messages(self, channels: Sequence[int], rows: Sequence[Row]) -> None:
         """Writes messages on some channels."""

@@ -89,7 +89,8 @@ class Template:
         kind: Message type, such as ``sensor_msgs/msg/JointState``.
         content: Texts, lists of texts and of messages, and lengths of sequences of numbers, by
             field; a text is empty and a sequence has no numbers unless given. Arrays of fixed
-            length, which are covariances, are zeros; all other numbers are gaps.
+            length, which are covariances, are zeros after the first number; all other numbers are
+            gaps.
 
     Attributes:
         payload: Message with zeros in the gaps.
@@ -120,7 +121,8 @@ class Template:
                 self._length(value or 0)
                 self._gap(value or 0)
             case "float64[36]":
-                self._reserve(8, 8 * 36)
+                self._gap(1)
+                self._reserve(8, 8 * 35)
             case _ if kind.endswith("[]"):
                 self._length(len(value))
                 for item in value:
@@ -227,14 +229,29 @@ WORLD = "world"
 DESCRIPTION = "/robot_description"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 TRANSFORMS = "/tf"
+COMMANDS = "/joint_commands"
+
+CHANNELS: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        DESCRIPTION: {
+            "offered_qos_profiles": "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
+            "  deadline: {sec: 0, nsec: 0}\n  lifespan: {sec: 0, nsec: 0}\n  liveliness: 1\n"
+            "  liveliness_lease_duration: {sec: 0, nsec: 0}\n"
+            "  avoid_ros_namespace_conventions: false"
+        }
+    }
+)
+"""Metadata of channels by topic. A player of ROS 2 keeps the description for who subscribes later:
+the last one (history 1, depth 1), reliable (1) and transient local (durability 1)."""
 
 FRAMES_PERIOD = 0.05
 """Period of ``/tf``, s: at every step, this topic for display would be a fifth of a log."""
 
-Derived = Literal["child_linear_velocity", "transforms"]
+Derived = Literal["child_linear_velocity", "pose_unknown", "twist_unknown", "transforms"]
 """Quantities for other tools, which the reader ignores: the velocity of the base in its own frame,
-``(steps, 3)`` m/s; position and quaternion (x y z w) of each body in its parent's frame,
-``(steps, 7 bodies)``."""
+``(steps, 3)`` m/s; the first number of the covariances of the base's pose and twist, -1 if some of
+it is not known and otherwise 0, ``(steps, 1)``; position and quaternion (x y z w) of each body in
+its parent's frame, ``(steps, 7 bodies)``."""
 
 Part = Signal | Derived | Literal["timing"]
 """Quantity in a message. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a late
@@ -271,7 +288,9 @@ def _order(part: Part, width: int) -> Sequence[int]:
     return _XYZW if part == "base_orientation" else range(width)
 
 
-def topics(names: Names, root: str, *, timed: bool = False) -> tuple[Topic, ...]:
+def topics(
+    names: Names, root: str, *, timed: bool = False, driven: Sequence[str] = ()
+) -> tuple[Topic, ...]:
     """Returns the topics that a trajectory is read from.
 
     ``/odom`` contains the velocity of the base in the frame of the base, as its type requires.
@@ -282,6 +301,8 @@ def topics(names: Names, root: str, *, timed: bool = False) -> tuple[Topic, ...]
         names: Columns of the trajectory's signals.
         root: Name of the root body, the child frame of ``/odom``.
         timed: Whether the robot has its own clock, and thereby the topic ``TIMING``.
+        driven: Names of the motors in the messages, such as of the joints that they drive; by
+            default their own.
     """
     hinges, motors, sensors = len(names.hinges), len(names.motors), len(names.sensors)
     state, readings = "sensor_msgs/msg/JointState", "selfmodel_msgs/msg/SensorReadings"
@@ -296,7 +317,10 @@ def topics(names: Names, root: str, *, timed: bool = False) -> tuple[Topic, ...]
             joint_efforts=hinges,
         ),
         Topic(
-            "/joint_commands", state, {"name": names.motors, "position": motors}, commands=motors
+            COMMANDS,
+            state,
+            {"name": driven or names.motors, "position": motors},
+            commands=motors,
         ),
         Topic("/sensors", readings, {"name": names.sensors, "value": sensors}, sensors=sensors),
         Topic(
@@ -305,8 +329,10 @@ def topics(names: Names, root: str, *, timed: bool = False) -> tuple[Topic, ...]
             {"header": world, "child_frame_id": root},
             base_position=3,
             base_orientation=4,
+            pose_unknown=1,
             child_linear_velocity=3,
             base_angular_velocity=3,
+            twist_unknown=1,
         ),
         Topic(
             "/base_linear_velocity",

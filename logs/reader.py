@@ -7,6 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, frozen
@@ -16,7 +17,16 @@ from selfmodel.errors import InputError
 from selfmodel.logs import errors, records
 from selfmodel.logs.controllers import parse_controller
 from selfmodel.logs.log_file import Contents, Messages, read_contents
-from selfmodel.logs.messages import TIMING, Part, Topic, is_known, names_in, schema_text, topics
+from selfmodel.logs.messages import (
+    COMMANDS,
+    TIMING,
+    Part,
+    Topic,
+    is_known,
+    names_in,
+    schema_text,
+    topics,
+)
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS, Names
 from selfmodel.trials.trajectory import Trajectory
@@ -231,7 +241,7 @@ def read_trajectory(
     contents: Contents, record: records.TrialRecord, steps: int, controller: Controller | None
 ) -> Trajectory:
     """Returns the trajectory in the messages of a log; they must have the names of a controller."""
-    names = read_names(contents)
+    names = read_names(contents, record)
     ends = controller.design if controller else names
     if (names.sensors, names.motors) != (ends.sensors, ends.motors):
         raise contents.error(
@@ -239,23 +249,46 @@ def read_trajectory(
             f"its messages have {names.sensors} and {names.motors}"
         )
     parts: dict[Part, FloatArray] = {}
-    for topic in topics(names, record.root):
+    for topic in topics(names, record.root, driven=_names_on(contents, COMMANDS)):
         parts |= _rows(contents, topic, record, steps)
     time = np.arange(steps, dtype=np.float64) * record.control_timestep
     return Trajectory(names, frozen(time), {signal: frozen(parts[signal]) for signal in SIGNALS})
 
 
-def read_names(contents: Contents) -> Names:
-    """Returns the column names of the signals, from the first message of each topic."""
+def read_names(contents: Contents, record: records.TrialRecord) -> Names:
+    """Returns the column names of the signals, from the first message of each topic.
 
-    def names(topic: str) -> tuple[str, ...]:
-        payload = _messages(contents, topic).payloads[0]
-        with contents.mismatch(f"on {topic}"):
-            return names_in(payload)
-
+    A record with the names of the motors precedes those in the commands.
+    """
+    motors = _names_on(contents, COMMANDS)
+    if record.motors:
+        with contents.mismatch("the motors in its record cannot be read"):
+            named = msgspec.json.decode(record.motors, type=tuple[str, ...])
+        if len(named) != len(motors):
+            what = f"its record has {len(named)} motors, its commands are of {len(motors)}"
+            raise contents.error(what)
+        motors = named
     return Names(
-        sensors=names("/sensors"), motors=names("/joint_commands"), hinges=names("/joint_states")
+        sensors=_names_on(contents, "/sensors"),
+        motors=motors,
+        hinges=_names_on(contents, "/joint_states"),
     )
+
+
+def _names_on(contents: Contents, topic: str) -> tuple[str, ...]:
+    payload = _messages(contents, topic).payloads[0]
+    with contents.mismatch(f"on {topic}"):
+        return names_in(payload)
+
+
+def first_stamp(contents: Contents) -> int:
+    """Returns the time of the first step, ns: 0, or that of the recording of an import.
+
+    An import by an earlier version begins at 0.
+    """
+    first = _messages(contents, "/joint_states").times[0][0]
+    recorded = contents.metadata.get(records.IMPORT, {}).get("start")
+    return first if recorded == str(first) else 0
 
 
 def _messages(contents: Contents, topic: str) -> Messages:
@@ -280,8 +313,9 @@ def _rows(
         raise contents.error(what, errors.CorruptError)
     with contents.mismatch(f"on {topic.name}"):
         stamps, values = topic.template.decode(messages.payloads)
-    expected = np.rint(np.arange(steps, dtype=np.float64) * record.control_timestep * 1e9)
-    times = np.array(messages.times, dtype=np.float64)  # exact for the first hundred days
+    since = np.rint(np.arange(steps, dtype=np.float64) * record.control_timestep * 1e9)
+    expected = since.astype(np.int64) + first_stamp(contents)
+    times = np.array(messages.times, dtype=np.uint64).astype(np.int64)
     if np.any(stamps != expected) or np.any(times != expected[:, np.newaxis]):
         what = f"the times on {topic.name} are not the multiples of the control time step"
         raise contents.error(what)

@@ -56,13 +56,16 @@ TRUTH, GAP = "truth", "gap"
 
 STATUSES = FINISHED, INTERRUPTED, STOPPED = "finished", "interrupted", "stopped"
 
+MAX_START = 2 * 10**18
+"""Latest time stamp of the first step of an imported trial, ns: those of ROS end in 2038."""
+
 MAX_TEXT = 1000
 """Maximum length of a text in a record, characters."""
 
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 
 
-class TrialRecord(Struct, frozen=True):
+class TrialRecord(Struct, frozen=True, omit_defaults=True):
     """Record ``selfmodel.trial``, written before the trial starts.
 
     Attributes:
@@ -78,6 +81,8 @@ class TrialRecord(Struct, frozen=True):
         controller_sha256: SHA-256 of the attached controller, or "" without one: then only the
             commands are known.
         model_sha256: SHA-256 of the attached model.
+        motors: Names of the motors, as JSON, if ``/joint_commands`` has the names of the joints
+            that they drive; "" if it has theirs.
     """
 
     format: Text
@@ -90,6 +95,7 @@ class TrialRecord(Struct, frozen=True):
     seed: Annotated[int, Meta(ge=0, le=MAX_SEED)]
     controller_sha256: Text
     model_sha256: Text
+    motors: str = ""
 
 
 class ResultRecord(Struct, frozen=True, omit_defaults=True):
@@ -126,10 +132,19 @@ def record_of(kind: type[Record], texts: Mapping[str, str]) -> Record:
 
 @dataclass(frozen=True)
 class Imported:
-    """Origin of an imported trial: source and quality by name, and the mapping as TOML."""
+    """Origin of an imported trial: source and quality by name, and the mapping as TOML.
+
+    ``start`` of the facts is the recorded time of the first step, ns.
+    """
 
     facts: Mapping[str, str]
     mapping: str
+
+    @property
+    def start(self) -> int:
+        """Time stamp of the first step, ns: that of the recording, or 0 if ROS has no such time."""
+        start = int(self.facts["start"])
+        return start if 0 <= start < MAX_START else 0
 
 
 @dataclass(frozen=True)

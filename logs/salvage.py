@@ -86,13 +86,13 @@ def _cut(contents: Contents, record: records.TrialRecord, reason: str) -> int:
     what = f"nothing can be salvaged before its first damage: {reason}"
     nothing = CorruptError(contents.path, what)
     try:
-        names = reader.read_names(contents)
+        names, first = reader.read_names(contents, record), reader.first_stamp(contents)
     except LogError as error:
         raise nothing from error
     every = topics(names, record.root, timed=record.format == records.TIMED_FORMAT)
 
     def time_of(step: int) -> int:
-        return round(step * record.control_timestep * 1e9)
+        return first + round(step * record.control_timestep * 1e9)
 
     def first_steps(topic: str) -> int:
         """Number of messages before the first one that is missing."""

@@ -13,8 +13,8 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.logs.messages import WORLD, Part
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.logs.messages import WORLD, Part, transforms
 from selfmodel.robot.motion import POSE, Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer
@@ -158,33 +158,54 @@ def parent_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 class Kinematics:
-    """Forward kinematics of a robot without faults, like ROS's robot_state_publisher."""
+    """Forward kinematics of a robot without faults, like ROS's robot_state_publisher.
+
+    Attributes:
+        topics: Topics of the transforms of all bodies, and of all but the root body, for steps in
+            which the base was not observed.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
+        bodies, parents = body_names(self._model), parent_names(self._model)
+        every = range(len(bodies))
+        self._fixed = robot.has_fixed_base
+        self._columns = [list(every), [body for body in every if bodies[body] != robot.root]]
+        self.topics = [
+            transforms([bodies[k] for k in chosen], [parents[k] for k in chosen])
+            for chosen in self._columns
+        ]
         # A joint that is not observed keeps its last position.
         self._qpos = robot.model.qpos0[np.newaxis].copy()
         fields = {"qpos": self._qpos, "qvel": np.zeros((1, robot.model.nv))}
         self._write = state_writer(robot, fields.__getitem__)
 
-    def transforms(self, rows: Mapping[Part, FloatArray]) -> FloatArray:
+    def transforms(self, rows: Mapping[Part, FloatArray]) -> list[tuple[IndexArray, FloatArray]]:
         """Returns the pose of each body in the frame of its parent, given the signals of ``POSE``.
 
         Returns:
-            Position x y z in metres and quaternion x y z w of each body, ``(steps, 7 bodies)``,
-            rounded by ``to_micrometres``.
+            For each of ``topics``, the steps of its messages, and of these the position x y z in
+            metres and the quaternion x y z w of each of its bodies, ``(steps, 7 bodies)``, rounded
+            by ``to_micrometres``.
         """
-        qpos = np.empty((len(rows["base_position"]), self._model.nq))
+        base = np.concatenate([rows["base_position"], rows["base_orientation"]], axis=1)
+        known = np.isfinite(base).all(axis=1) | self._fixed
+        qpos = np.empty((len(base), self._model.nq))
         for k, row in enumerate(qpos):
-            self._write({signal: rows[signal][k : k + 1] for signal in POSE})
+            observed = POSE if known[k] else POSE[:1]
+            self._write({signal: rows[signal][k : k + 1] for signal in observed})
             row[:] = self._qpos[0]
         poses = body_poses(self._model, qpos)
         parents, children = poses[:, self._model.body_parentid[1:]], poses[:, 1:]
         with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
             moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
             turned = product(parents[..., 3:] * _INVERSE, children[..., 3:])
-        relative = np.concatenate([moved, turned[..., _XYZW]], axis=-1)
-        return to_micrometres(relative).reshape(len(qpos), 7 * (self._model.nbody - 1))
+        relative = to_micrometres(np.concatenate([moved, turned[..., _XYZW]], axis=-1))
+        steps = np.flatnonzero(known), np.flatnonzero(~known)
+        return [
+            (chosen, relative[chosen][:, columns].reshape(len(chosen), 7 * len(columns)))
+            for chosen, columns in zip(steps, self._columns, strict=True)
+        ]
 
 
 _INVERSE = (1.0, -1.0, -1.0, -1.0)

@@ -1,6 +1,7 @@
 """Writer of a trial's log, while the trial runs: a kill loses at most the last steps."""
 
 import itertools
+import json
 import platform
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
@@ -25,6 +26,7 @@ from selfmodel.logs.log_file import LogFile, Row
 from selfmodel.logs.messages import Part
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical import safety
+from selfmodel.robot.actuators import driven_names
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample
@@ -99,14 +101,16 @@ class TrialWriter:
         self.path = path
         self.steps = 0
         self._robot, self._plan, self._header = robot, plan, header
+        driven = driven_names(robot.model)
+        self._kinematics = viewers.Kinematics(robot)
         self._topics = (
-            *messages.topics(names, robot.root, timed=header.timed),
-            messages.transforms(viewers.body_names(robot.model), viewers.parent_names(robot.model)),
+            *messages.topics(names, robot.root, timed=header.timed, driven=driven),
+            *self._kinematics.topics,
         )
+        self._first_stamp = header.imported.start if header.imported else 0
         widths: dict[Part, int] = {signal: names.width(signal) for signal in SIGNALS}
         if header.timed:
             widths["timing"] = 3
-        self._kinematics = viewers.Kinematics(robot)
         self._rows = {part: np.empty((FLUSH_STEPS, width)) for part, width in widths.items()}
         self._written = 0
         self._start = self._end = 0.0
@@ -117,7 +121,9 @@ class TrialWriter:
         with ExitStack() as undo:
             undo.callback(self._log.close)  # an interrupted `__enter__` has no `__exit__`
             _write_preamble(self._log, self._robot, self._plan, self._header)
-            self._channels = [self._log.channel(topic.name, topic.type) for topic in self._topics]
+            types = {topic.name: topic.type for topic in self._topics}
+            numbers = {name: self._log.channel(name, kind) for name, kind in types.items()}
+            self._channels = [numbers[topic.name] for topic in self._topics]
             self._log.sync()  # the disk has the preamble before the robot moves
             undo.pop_all()
         self._sound = True
@@ -203,23 +209,27 @@ class TrialWriter:
         self._sound = True
 
     def _encoded(self, rows: Mapping[Part, FloatArray]) -> list[Row]:
-        """Messages of the steps in some rows, in order; the last topic is not in every step."""
+        """Messages of the steps in some rows, in order; the transforms are not in every step."""
         steps = np.arange(self._written, self.steps)
-        stamps = np.rint(steps * self._robot.control_timestep * 1e9).astype(np.int64)
-        stride = messages.frames_stride(self._robot.control_timestep)
-        drawn = slice(-self._written % stride, None, stride)
+        period = self._robot.control_timestep
+        stamps = np.rint(steps * period * 1e9).astype(np.int64) + self._first_stamp
+        child = viewers.to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
         parts: dict[Part, FloatArray] = {
             **rows,
-            "child_linear_velocity": viewers.to_micrometres(
-                viewers.to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
-            ),
-            "transforms": self._kinematics.transforms({k: v[drawn] for k, v in rows.items()}),
+            "child_linear_velocity": viewers.to_micrometres(child),
+            "pose_unknown": _unknown(rows["base_position"], rows["base_orientation"]),
+            "twist_unknown": _unknown(child, rows["base_angular_velocity"]),
         }
+        drawn = np.flatnonzero(steps % messages.frames_stride(period) == 0)
+        poses = self._kinematics.transforms({part: values[drawn] for part, values in rows.items()})
+        content = [
+            *((np.arange(len(steps)), parts) for _ in self._topics[: -len(poses)]),
+            *((drawn[chosen], {"transforms": values}) for chosen, values in poses),
+        ]
         encoded: list[Row] = []
-        for index, topic in enumerate(self._topics):
-            chosen = drawn if index == len(self._topics) - 1 else slice(None)
+        for index, (topic, (chosen, own)) in enumerate(zip(self._topics, content, strict=True)):
             times = stamps[chosen]
-            payloads = topic.template.encode(times, topic.pack(parts))
+            payloads = topic.template.encode(times, topic.pack(own))
             encoded += zip(
                 steps[chosen].tolist(), itertools.repeat(index), times.tolist(), payloads
             )
@@ -234,6 +244,12 @@ class TrialWriter:
         )
 
 
+def _unknown(*values: FloatArray) -> FloatArray:
+    """Returns -1 for each step with a number that is not known, and else 0, ``(steps, 1)``."""
+    known = np.isfinite(np.concatenate(values, axis=1)).all(axis=1, keepdims=True)
+    return np.where(known, 0.0, -1.0)
+
+
 def _stop_reason(error: BaseException) -> str:
     text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
     # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
@@ -245,6 +261,7 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
     driver = plan.controller
     controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
     model = robot.mjcf.encode()
+    motors, driven = robot.anatomy.motors, driven_names(robot.model)
     record = records.TrialRecord(
         format=records.TIMED_FORMAT if header.timed else records.FORMAT,
         name=plan.name,
@@ -256,6 +273,7 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         seed=plan.seed,
         controller_sha256=records.sha256(controller) if controller else "",
         model_sha256=records.sha256(model),
+        motors="" if driven == motors else json.dumps(motors),
     )
     software = {
         "selfmodel": __version__,
@@ -279,4 +297,5 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         log.metadata(records.IMPORT, header.imported.facts)
         log.attach(records.MAPPING_FILE, header.imported.mapping.encode())
     channel = log.channel(messages.DESCRIPTION, messages.DESCRIPTION_TYPE)
-    log.messages([channel], [(0, 0, 0, messages.description(viewers.urdf(robot)))])
+    start = header.imported.start if header.imported else 0
+    log.messages([channel], [(0, 0, start, messages.description(viewers.urdf(robot)))])

@@ -1,5 +1,7 @@
 """Actuators of a compiled model: what they and its tendons move, and their command ranges."""
 
+from collections import Counter
+
 import mujoco
 import numpy as np
 
@@ -38,6 +40,18 @@ def motor_joints(model: mujoco.MjModel, motor: int) -> frozenset[int]:
     if kind in _JOINT:
         return frozenset({target})
     return tendon_joints(model, target) if kind == _TENDON else frozenset()
+
+
+def driven_names(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Returns for each motor the name of the joint that it alone drives, or else its own name."""
+    own = [model.actuator(motor).name for motor in range(model.nu)]
+    joints = [motor_joints(model, motor) for motor in range(model.nu)]
+    driven = Counter(joint for moved in joints for joint in moved)
+    names = [
+        model.joint(min(moved)).name if len(moved) == 1 and driven[min(moved)] == 1 else name
+        for name, moved in zip(own, joints, strict=True)
+    ]
+    return tuple(names if len(set(names)) == len(names) else own)
 
 
 def motor_bodies(model: mujoco.MjModel, motor: int) -> frozenset[int]:

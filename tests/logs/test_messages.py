@@ -8,19 +8,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
+from mcap.reader import make_reader
+from rosbags.interfaces import QosDurability, QosHistory, QosReliability
+from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from selfmodel.arrays import FloatArray
+from selfmodel.logs import SchemaMismatchError, read_log
 from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.messages import description, names_in, schema_text, topics, transforms
-from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.records import TRIAL, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.signals import Names
-from tests.logs.conftest import plan_of
+from selfmodel.trials.signals import Names, Signal
+from tests.logs.conftest import MJCF, plan_of
+from tests.logs.edits import rewritten, says
 
 OURS = "selfmodel_msgs/msg/SensorReadings"
 TYPES = [
@@ -47,7 +52,7 @@ def store() -> Typestore:
 
 
 def numbers(value: object) -> Iterator[float]:
-    """All float64 values of a message in order, without covariances."""
+    """All float64 values of a message in order; of a covariance the first one."""
     if isinstance(value, float):
         yield value
     elif isinstance(value, list | np.ndarray):
@@ -55,8 +60,8 @@ def numbers(value: object) -> Iterator[float]:
             yield from numbers(item)
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
-            if field.name != "covariance":
-                yield from numbers(getattr(value, field.name))
+            own = getattr(value, field.name)
+            yield from numbers(own[:1] if field.name == "covariance" else own)
 
 
 @settings(max_examples=8, deadline=None)
@@ -107,7 +112,7 @@ def test_a_message_of_another_layout_is_not_decoded(where: str):
     if where == "length":
         third += b"\0"
     else:
-        third[{"name": 24, "frame": 12, "covariance": 120}[where]] ^= 1
+        third[{"name": 24, "frame": 12, "covariance": 160}[where]] ^= 1
     payloads[2] = bytes(third)
     with pytest.raises(ValueError, match="message 2 has"):
         topic.template.decode(payloads)
@@ -141,6 +146,67 @@ def test_viewers_are_told_where_each_body_is_and_how_the_base_moves(
             place, turn = where[frame.child_frame_id]
             np.testing.assert_allclose(place, data.xpos[body], atol=5e-6)
             np.testing.assert_allclose(turn, data.xquat[body], atol=5e-6)
+
+
+@pytest.mark.parametrize("lost", ["base_position", "base_orientation", "base_linear_velocity"])
+def test_what_is_not_observed_of_the_base_is_no_transform_and_marked_as_unknown(
+    store: Typestore, biped: Robot, tmp_path: Path, lost: Signal
+):
+    plan, from_step = plan_of(biped, 80), 30
+    samples = list(SimulatedRobot(biped).run(plan.controller, 80))
+    for sample in samples[from_step:]:
+        sample.values[lost][-1] = np.nan
+    known = write_trial(tmp_path / "b.mcap", biped, plan, samples, TrialHeader(Settings()))
+    has_pose, topics_read = lost == "base_linear_velocity", read_contents(known).topics
+    data = mujoco.MjData(biped.model)
+    for step in (25, 30, 75):
+        odom = store.deserialize_cdr(topics_read["/odom"].payloads[step], "nav_msgs/msg/Odometry")
+        marks = [part.covariance[0] for part in (odom.pose, odom.twist)]
+        turns = lost != "base_position"  # without an orientation, no velocity in the base's frame
+        assert marks == ([0, 0] if step < from_step else [0.0 if has_pose else -1, -1.0 * turns])
+        frames = store.deserialize_cdr(
+            topics_read["/tf"].payloads[step // 5], "tf2_msgs/msg/TFMessage"
+        )
+        assert np.isfinite(list(numbers(frames))).all()
+        data.qpos[7:] = samples[step].values["joint_positions"]
+        mujoco.mj_kinematics(biped.model, data)
+        parents = {frame.header.frame_id for frame in frames.transforms}
+        assert ("world" in parents) == (has_pose or step < from_step)
+        where = {"torso": (np.zeros(3), np.array([1.0, 0, 0, 0]))}
+        for frame in frames.transforms:
+            if frame.header.frame_id != "world":
+                moved = composed(where[frame.header.frame_id], frame.transform)
+                where[frame.child_frame_id] = moved
+        assert set(where) == {"torso", "left_leg", "left_foot", "right_leg", "right_foot"}
+        place = data.body("left_foot").xpos - data.body("torso").xpos
+        np.testing.assert_allclose(where["left_foot"][0], place, atol=5e-6)
+
+
+def test_a_player_keeps_the_description_for_who_comes_later(log: Path):
+    with log.open("rb") as file:
+        channels = make_reader(file).get_summary().channels.values()
+    (told,) = [one.metadata for one in channels if one.topic == "/robot_description"]
+    (offered,) = parse_qos(told["offered_qos_profiles"])
+    assert (offered.durability, offered.depth) == (QosDurability.TRANSIENT_LOCAL, 1)
+    assert (offered.reliability, offered.history) == (QosReliability.RELIABLE, QosHistory.KEEP_LAST)
+
+
+def test_a_command_has_the_name_of_the_joint_that_its_motor_alone_drives(tmp_path: Path):
+    mjcf = MJCF.replace('position name="left_hip_x"', 'position name="m1"')
+    both = mjcf.replace(
+        "</actuator>", '<motor name="m2" joint="right_hip_x" ctrlrange="-1 1"/></actuator>'
+    )
+    robot = Robot("biped", both, 0.01)
+    plan = plan_of(robot, 20)
+    samples = SimulatedRobot(robot).run(plan.controller, 20)
+    path = write_trial(tmp_path / "b.mcap", robot, plan, samples, TrialHeader(Settings()))
+    told = names_in(read_contents(path).topics["/joint_commands"].payloads[0])
+    assert told == ("left_hip_x", "left_hip_y", "right_hip_x", "right_hip_y", "m2")
+    motors = ("m1", *told[1:])
+    assert read_log(path).trial.trajectory.names.motors == motors
+    rewritten(path, says(TRIAL, motors='["m1"]'))
+    with pytest.raises(SchemaMismatchError, match="1 motors, its commands are of 5"):
+        read_log(path)
 
 
 def composed(

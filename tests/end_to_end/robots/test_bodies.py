@@ -161,7 +161,7 @@ def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
 def test_the_frames_of_a_log_are_where_the_bodies_are(body: Robot):
     run = happened(body, INTACT)
     told = ("joint_positions", "base_position", "base_orientation")
-    frames = Kinematics(body).transforms({signal: run[signal] for signal in told})
+    (_, frames), _ = Kinematics(body).transforms({signal: run[signal] for signal in told})
     root = body_names(body.model).index(body.root)
 
     np.testing.assert_allclose(frames[:, 7 * root : 7 * root + 3], run["base_position"], atol=1e-6)

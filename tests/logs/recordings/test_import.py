@@ -10,8 +10,10 @@ from mcap.reader import make_reader
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.logs import read_log
+from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.recordings.importer import import_recording, write_recording
 from selfmodel.logs.recordings.mapping_file import parse_mapping
+from selfmodel.logs.salvage import salvage
 from selfmodel.robot.robot import Robot
 from tests.logs.conftest import MJCF
 from tests.logs.recordings.bags import (
@@ -178,6 +180,12 @@ def test_a_log_of_an_import_reads_as_what_was_imported(bag: Path, biped: Robot, 
     assert attached.decode() == text
     assert json.loads(told["sources_sha256"]).keys() == {"bag.mcap"}
     assert json.loads(told["topics"])["/odom"]["latency"] == pytest.approx(0.015)
+    topics = read_contents(path).topics
+    for topic in ("/joint_states", "/tf", "/robot_description"):
+        assert topics[topic].times[0] == (recording.origin, recording.origin)
+    path.write_bytes(path.read_bytes()[:-100])
+    salvage(path, tmp_path / "saved.mcap")
+    assert read_log(tmp_path / "saved.mcap").trial.trajectory.steps == trial.trajectory.steps
 
 
 def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
