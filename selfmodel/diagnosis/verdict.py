@@ -327,9 +327,10 @@ def _with_unsearched(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesi
     """Returns hypotheses with a fault of an unsearched kind, each with that fault.
 
     Kinds that edit the specification, such as rough terrain, are excluded: each hypothesis needs a
-    compiled model.
+    compiled model. So are kinds that do not suit the robot, such as wind on a bench.
     """
-    kinds = [kind for kind in ALL_KINDS if kind not in space.kinds and not kind.edits_specification]
+    suited = [kind for kind in ALL_KINDS if kind.suits(space.anatomy)]
+    kinds = [kind for kind in suited if kind not in space.kinds and not kind.edits_specification]
     unsearched: dict[Hypothesis, Fault] = {}
     for fault in replace(space, kinds=tuple(kinds)).coarse_candidates:
         others = [other for other in best.faults if other.part != fault.part]

@@ -12,7 +12,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults import notation
 from selfmodel.faults.hypothesis import Hypothesis, canonical
 from selfmodel.faults.kind import Fault, FaultKind
-from selfmodel.faults.registry import notation_kinds
+from selfmodel.faults.registry import notation_kinds, suitable
 from selfmodel.robot.anatomy import Anatomy
 
 GENE_VALUES = 4
@@ -45,13 +45,14 @@ class HypothesisSpace:
     def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
         """Returns the search space of the kinds that apply to a robot, in their order.
 
+        Of the default kinds, those are left out that are not to be expected on its base.
         Then come the kinds that a fault degenerates to at some severities: ``jam-angle`` implies
         ``jam``, and ``sensor-gain`` implies ``sensor``.
 
         Raises:
             InputError: No kind applies to the robot, or a kind is not searchable.
         """
-        requested = tuple(kinds)
+        requested = suitable(tuple(kinds), anatomy)
         names = ", ".join(kind.name for kind in requested if not kind.searchable)
         if names:
             raise InputError(f"no diagnosis may propose {names}: leave {names} out")

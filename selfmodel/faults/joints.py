@@ -218,6 +218,17 @@ class LostGrip(JointFault):
         variant.scale_grip(sorted(anatomy.joint(fault.part).bodies), fault.severity)
 
 
+class LoadedLink(JointFault):
+    """A mass, kg, at the centre of mass of the link that a joint moves, such as in an arm's hand.
+
+    A robot has at most one. A payload on the base of a walking robot is ``payload``.
+    """
+
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
+        """Adds the mass."""
+        variant.load_link(anatomy.joint(fault.part).hinges[0], fault.severity)
+
+
 BROKEN = BrokenJoint(name="break")
 JAMMED = Jammed(name="jam", is_of_joint=True)
 JAMMED_AT_ANGLE = JammedAtAngle(
@@ -272,8 +283,18 @@ ENCODER_SLIP = EncoderSlip(
 )
 LOST_GRIP = LostGrip(
     name="grip",
+    base="free",
     bounds=(0.0, 1.0),
     levels=(0.1, 0.2, 0.4),
     degenerates_to={1.0: None},
     unit="of its friction",
+)
+LOADED_LINK = LoadedLink(
+    name="load",
+    base="fixed",
+    bounds=(0.0, 100.0),
+    levels=(0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0),
+    degenerates_to={0.0: None},
+    is_single=True,
+    unit="kg",
 )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import total_ordering
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Literal, Optional
 
 import numpy as np
 
@@ -52,6 +52,8 @@ class FaultKind:
         is_single: Whether a hypothesis has at most one fault of the kind, at one part.
         searchable: Whether a diagnosis may propose the kind; otherwise only a simulated physical
             robot has it.
+        base: Base of the robots on which the kind is to be expected, such as ``free`` for wind. On
+            others it is searched if it is named, and not as one of the default kinds.
     """
 
     name: str
@@ -66,6 +68,7 @@ class FaultKind:
     is_of_joint: bool = False
     is_single: bool = False
     searchable: bool = True
+    base: Literal["any", "free", "fixed"] = "any"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "keyword", self.keyword or self.name)
@@ -88,6 +91,10 @@ class FaultKind:
         They are in the order of a gene's third value; ``ENVIRONMENT`` alone for an environment.
         """
         return (ENVIRONMENT,)
+
+    def suits(self, anatomy: Anatomy) -> bool:
+        """Returns whether the kind is to be expected on a robot; see ``base``."""
+        return self.base in ("any", "free" if anatomy.floating_base else "fixed")
 
     def bounds_at(self, _anatomy: Anatomy, _part: str) -> tuple[float, float] | None:
         """Returns ``bounds`` at one part."""

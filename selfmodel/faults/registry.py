@@ -15,7 +15,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(sensors.SENSOR_GAIN, sensors.SENSOR_BIAS, sensors.SENSOR_NOISE),
         *(world.FRICTION, world.SLOPE, world.ROUGHNESS, world.WIND, world.CROSSWIND),
         *(world.PAYLOAD, joints.DAMPED_JOINT, joints.JOINT_FRICTION, joints.LOST_GRIP),
-        *(world.GROWN_DELAY, joints.ENCODER_OFFSET, joints.ENCODER_SLIP),
+        *(world.GROWN_DELAY, joints.ENCODER_OFFSET, joints.ENCODER_SLIP, joints.LOADED_LINK),
     )
 }
 """All built-in kinds by name."""
@@ -24,7 +24,7 @@ PAPER_KINDS: tuple[FaultKind, ...] = (joints.BROKEN, joints.JAMMED, sensors.FAIL
 """Kinds of the paper's diagnosis, in the order of its genome."""
 
 _BODY_KINDS = tuple(KINDS[name] for name in ("break", "jam", "jam-angle", "sensor", "motor"))
-_ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload"))
+_ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload", "load"))
 
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)
 """All built-in kinds that a diagnosis may propose."""
@@ -41,6 +41,12 @@ KIND_SETS: Mapping[str, tuple[FaultKind, ...]] = {
 
 DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["default"]
 """Kinds that a diagnosis, a recovery or an ablation searches if none are given."""
+
+
+def suitable(kinds: Sequence[FaultKind], anatomy: Anatomy) -> tuple[FaultKind, ...]:
+    """Returns kinds to search; of the default kinds, if all are given, those that suit a robot."""
+    whole = set(kinds).issuperset(DEFAULT_KINDS)
+    return tuple(kind for kind in kinds if kind.suits(anatomy) or not whole)
 
 
 def kind_names(names: str) -> str:

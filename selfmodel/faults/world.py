@@ -240,12 +240,14 @@ _SPEEDS = (-30.0, -25.0, -20.0, -16.0, -12.0, -8.0, -4.0, 4.0, 8.0, 12.0, 16.0, 
 
 FRICTION = Friction(
     name="friction",
+    base="free",
     bounds=(0.01, 3.0),
     levels=(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
     unit="(coefficient)",
 )
 SLOPE = Slope(
     name="slope",
+    base="free",
     bounds=(-0.6, 0.6),
     levels=(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
     degenerates_to={0.0: None},
@@ -254,6 +256,7 @@ SLOPE = Slope(
 WIND, CROSSWIND = (
     Wind(
         name=name,
+        base="free",
         axis=axis,
         bounds=(-40.0, 40.0),
         levels=_SPEEDS,
@@ -279,6 +282,7 @@ GROWN_DELAY = GrownDelay(
 )
 ROUGHNESS = Roughness(
     name="roughness",
+    base="free",
     bounds=(0.0, 0.1),
     levels=(0.01, 0.02, 0.04),
     degenerates_to={0.0: None},

@@ -227,6 +227,11 @@ class ModelVariant:
         reach = float(np.abs(_matrix(body.iquat).T @ ahead) @ np.sqrt(squares)) / 2
         _add_point_mass(body, mass, forward * reach * ahead)
 
+    def load_link(self, hinge: str, mass: float) -> None:
+        """Adds a point mass, kg, at the centre of mass of the body that a hinge moves."""
+        body = self.model.body(self.model.joint(hinge).bodyid[0])
+        _add_point_mass(body, mass, np.zeros(3))
+
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between static geoms and the geoms that can touch them."""
         model = self.model

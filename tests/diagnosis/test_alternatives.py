@@ -28,6 +28,7 @@ from selfmodel.faults.world import PAYLOAD
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from tests.diagnosis.synthetic import Synthetic
+from tests.helpers.robots.arms import arm
 
 PIECES = 60
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
@@ -170,6 +171,19 @@ def test_beside_an_exact_or_diverged_hypothesis_no_unsearched_fault_is_simulated
     problem = Synthetic(PAPER, losses, coarse=never, before=of({}))
 
     assert unsearched_fault(INTACT, problem) is None
+
+
+def test_no_wind_and_no_ground_are_asked_about_on_a_bench():
+    asked: set[str] = set()
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        asked.update(fault.kind.name for one in hypotheses for fault in one.faults)
+        return np.ones((len(hypotheses), PIECES)) + np.arange(PIECES) / 100
+
+    space = HypothesisSpace.of(PAPER_KINDS, arm().anatomy)
+    assert unsearched_fault(INTACT, Synthetic(space, losses, before=losses)) is None
+    assert {"motor", "load"} <= asked
+    assert asked.isdisjoint({"wind", "crosswind", "friction", "slope", "grip"})
 
 
 def test_only_unsearched_kinds_are_asked_about_and_none_that_reshapes_the_model():

@@ -9,6 +9,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import (
     ALL_KINDS,
+    KIND_SETS,
     KINDS,
     PAPER_KINDS,
 )
@@ -16,6 +17,7 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import check_fault_kind
+from tests.helpers.robots.arms import arm
 
 ANGLES = (KINDS["break"], KINDS["jam-angle"])
 
@@ -33,7 +35,8 @@ BARE = """\
 
 def test_what_strikes_a_robot_stays_in_its_order_and_brings_its_other_names(robot: Robot):
     assert HypothesisSpace.of(PAPER_KINDS, robot.anatomy).kinds == PAPER_KINDS
-    assert HypothesisSpace.of(ALL_KINDS, robot.anatomy).kinds == ALL_KINDS
+    walking = tuple(kind for kind in ALL_KINDS if kind.name != "load")
+    assert HypothesisSpace.of(ALL_KINDS, robot.anatomy).kinds == walking
     assert HypothesisSpace.of(ANGLES, robot.anatomy).kinds == (*ANGLES, KINDS["jam"])
     gains = (KINDS["sensor-gain"], KINDS["motor"])
     assert HypothesisSpace.of(gains, robot.anatomy).kinds == (*gains, KINDS["sensor"])
@@ -45,6 +48,16 @@ def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
     assert HypothesisSpace.of(PAPER_KINDS, anatomy).kinds == (KINDS["break"], KINDS["jam"])
     with pytest.raises(InputError, match="sensor, sensor-gain cannot affect any part"):
         HypothesisSpace.of((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
+
+
+def test_the_default_kinds_are_those_of_the_robots_base_and_others_are_searched_if_named():
+    of_ground_and_air = {"friction", "slope", "wind", "crosswind", "roughness", "grip"}
+    for kinds in (KIND_SETS["default"], ALL_KINDS, (*KIND_SETS["default"], KINDS["damping"])):
+        names = {kind.name for kind in HypothesisSpace.of(kinds, arm().anatomy).kinds}
+        assert names.isdisjoint({*of_ground_and_air, "payload"})
+        assert {"motor", "load"} <= names
+    named = (KINDS["motor"], KINDS["wind"], KINDS["slope"])
+    assert HypothesisSpace.of(named, arm().anatomy).kinds == named
 
 
 def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):

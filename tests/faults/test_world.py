@@ -19,6 +19,7 @@ from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_motion
+from tests.helpers.robots.arms import arm
 
 STEPS = 60
 STATES = tuple(
@@ -92,6 +93,20 @@ def test_a_payload_is_a_fraction_of_the_healthy_mass_beside_a_broken_limb(quadru
 
     added = both.body("torso").mass - broken.body("torso").mass
     assert added == pytest.approx(0.5 * quadruped.model.body_subtreemass[0])
+
+
+def test_a_load_is_a_mass_in_kg_at_the_centre_of_a_link_of_an_arm():
+    robot = arm()
+    spec = mujoco.MjSpec.from_string(robot.mjcf)
+    link = robot.model.body("link4")
+    body = spec.body("link4")
+    body.explicitinertial, body.mass = True, link.mass[0] + 0.7
+    body.ipos, body.inertia, body.iquat = link.ipos, link.inertia, link.iquat
+    loaded = built(robot, "load:joint4=0.7")
+    moved = follow(robot, loaded, STEPS)
+    assert_same_paths(moved, follow(robot, spec.compile(), STEPS))
+    bare = follow(robot, built(robot, "intact"), STEPS)
+    assert np.abs(moved["joint2"] - bare["joint2"]).max() > 1e-3
 
 
 def test_a_robot_with_a_fixed_base_has_no_payload():
