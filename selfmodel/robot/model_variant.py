@@ -228,9 +228,13 @@ class ModelVariant:
         _add_point_mass(body, mass, forward * reach * ahead)
 
     def load_link(self, hinge: str, mass: float) -> None:
-        """Adds a point mass, kg, at the centre of mass of the body that a hinge moves."""
-        body = self.model.body(self.model.joint(hinge).bodyid[0])
-        _add_point_mass(body, mass, np.zeros(3))
+        """Adds a point mass, kg, at the centre of mass of the body that a hinge moves.
+
+        A detached body has no mass.
+        """
+        if hinge not in self.detached:
+            body = self.model.body(self.model.joint(hinge).bodyid[0])
+            _add_point_mass(body, mass, np.zeros(3))
 
     def set_friction(self, coefficient: float) -> None:
         """Sets the sliding friction between static geoms and the geoms that can touch them."""

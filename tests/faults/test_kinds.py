@@ -181,7 +181,7 @@ def names_of(names: str) -> tuple[str, ...]:
     [
         ("brake", "unknown kind 'brake': did you mean break"),
         ("papr", "unknown kind 'papr': did you mean paper"),
-        ("brake", "encoder-offset, encoder-slip, paper, body, environment, default, all$"),
+        ("brake", "encoder-slip, load, paper, body, environment, default, all$"),
         ("", "unknown kind ''"),
         ("break,", "unknown kind ''"),
         ("neuron", "unknown kind 'neuron'"),
