@@ -227,7 +227,7 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
 
 
 @pytest.mark.parametrize(
-    ("run", "options"), [("short", ()), ("recovered_as_the_paper_did", PAPERS)]
+    ("run", "options"), [("short", ("--kinds", "paper")), ("recovered_as_the_paper_did", PAPERS)]
 )
 def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     run: str, options: tuple[str, ...], request: pytest.FixtureRequest
