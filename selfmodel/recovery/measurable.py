@@ -20,9 +20,11 @@ def observed_of(*robots: PhysicalRobot) -> frozenset[Signal]:
 
 
 def observed_in(trial: Trial) -> frozenset[Signal]:
-    """Returns the signals of which a trial has some number."""
+    """Returns the signals of which a trial has some number, and those without a column."""
     signals = trial.trajectory.signals
-    return frozenset(one for one in SIGNALS if np.isfinite(signals[one]).any())
+    return frozenset(
+        one for one in SIGNALS if np.isfinite(signals[one]).any() or not signals[one].size
+    )
 
 
 def check_measurable(
