@@ -15,7 +15,7 @@ import mcap
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError, TrialError, describe
 from selfmodel.logs import messages, records, viewers
@@ -222,7 +222,7 @@ class TrialWriter:
         }
         drawn = np.flatnonzero(steps % messages.frames_stride(period) == 0)
         poses = self._kinematics.transforms({part: values[drawn] for part, values in rows.items()})
-        content = [
+        content: list[tuple[IndexArray, Mapping[Part, FloatArray]]] = [
             *((np.arange(len(steps)), parts) for _ in self._topics[: -len(poses)]),
             *((drawn[chosen], {"transforms": values}) for chosen, values in poses),
         ]

@@ -226,7 +226,7 @@ def _steps(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> Floa
     landings = np.count_nonzero((stands[..., 1:] == 1) & (stands[..., :-1] == 0), axis=-2)
     end = falls_of(robot, hypothesis, trajectory)
     before = np.arange(landings.shape[-1]) + window + 1 < end[..., np.newaxis]
-    return np.where(before, landings, 0.0).sum(axis=-1)
+    return np.asarray(np.where(before, landings, 0.0).sum(axis=-1))
 
 
 def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:
