@@ -222,10 +222,10 @@ class TrialWriter:
         }
         drawn = np.flatnonzero(steps % messages.frames_stride(period) == 0)
         poses = self._kinematics.transforms({part: values[drawn] for part, values in rows.items()})
-        content: list[tuple[IndexArray, Mapping[Part, FloatArray]]] = [
-            *((np.arange(len(steps)), parts) for _ in self._topics[: -len(poses)]),
-            *((drawn[chosen], {"transforms": values}) for chosen, values in poses),
-        ]
+        content: list[tuple[IndexArray, Mapping[Part, FloatArray]]] = []
+        content += [(np.arange(len(steps)), parts)] * (len(self._topics) - len(poses))
+        for chosen, values in poses:
+            content.append((drawn[chosen], {"transforms": values}))
         encoded: list[Row] = []
         for index, (topic, (chosen, own)) in enumerate(zip(self._topics, content, strict=True)):
             times = stamps[chosen]
