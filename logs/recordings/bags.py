@@ -46,18 +46,20 @@ _EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
-def read_bag(path: Path, topics: Collection[str] | None = None) -> Recording:
+def read_bag(path: Path, topics: Mapping[str, Collection[str]] | None = None) -> Recording:
     """Returns a bag, after a check of all its files.
 
     Args:
         path: Folder of a rosbag2 bag, or one of its files; or a ROS 1 bag.
-        topics: Topics to decode, where their type is in ``messages.DECODERS``; None for all. Only
-            types and counts of the others are read.
+        topics: Columns to decode by topic; None for all topics. Only types and counts of the others
+            are read. Of a type in ``messages.DECODERS``, all columns are decoded; of another one,
+            all of the first message, and of the others those listed.
 
     Raises:
         InputError: The bag does not exist, is damaged, or cannot be read.
     """
-    request = Message({"path": str(path), "topics": None if topics is None else sorted(topics)})
+    wanted = None if topics is None else {name: sorted(some) for name, some in topics.items()}
+    request = Message({"path": str(path), "topics": wanted})
     task = f"{__name__}:read_in_child"
     return unpacked(run_isolated(task, request, what=str(path), seconds=RECORDING_SECONDS))
 
@@ -70,8 +72,8 @@ def read_in_child(request: Message) -> Message:
     for file in files:
         with _explained(file):
             for item in _stored(file):
-                decoded = wanted is None or item.topic in wanted
-                topics.setdefault(item.topic, _Topic()).add(item, decoded=decoded)
+                columns = () if wanted is None else wanted.get(item.topic)
+                topics.setdefault(item.topic, _Topic()).add(item, columns)
     series = {name: topic.series() for name, topic in topics.items()}
     return packed(Recording(series, {file.name: file_digest(file) for file in files}))
 
@@ -119,6 +121,7 @@ class _Stored(NamedTuple):
     topic: str
     type: str
     encoding: str
+    definition: str = ""
     time: int = 0
     data: bytes | None = None
 
@@ -145,6 +148,11 @@ def _stored(file: Path) -> Iterator[_Stored]:
     raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
 
 
+def _text(encoding: str, definition: bytes) -> str:
+    """Definition of a message type, if it is in ROS's own language."""
+    return definition.decode(errors="replace") if encoding in ("ros2msg", "ros1msg") else ""
+
+
 class _BoundedReader(io.BufferedReader):
     """File whose reads are bounded by its size: a damaged length is more than any memory."""
 
@@ -158,7 +166,7 @@ class _BoundedReader(io.BufferedReader):
 
 
 def _mcap(file: Path) -> Iterator[_Stored]:
-    types, topics = {0: ""}, {}
+    types, topics = {0: ("", "")}, {}
     count, claimed = 0, None
     with _BoundedReader(file) as opened:
         # No record is larger than its file.
@@ -166,10 +174,10 @@ def _mcap(file: Path) -> Iterator[_Stored]:
         for record in reader.records:
             match record:
                 case mcap.records.Schema():
-                    types[record.id] = record.name
+                    types[record.id] = record.name, _text(record.encoding, record.data)
                 case mcap.records.Channel():
-                    kind = types.get(record.schema_id, "")
-                    topics[record.id] = _Stored(record.topic, kind, record.message_encoding)
+                    kind, text = types.get(record.schema_id, ("", ""))
+                    topics[record.id] = _Stored(record.topic, kind, record.message_encoding, text)
                     yield topics[record.id]
                 case mcap.records.Message():
                     count += 1
@@ -196,18 +204,21 @@ def _sqlite(file: Path) -> Iterator[_Stored]:
     # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
-        tables = (
-            "SELECT count(*) FROM sqlite_schema WHERE name IN ('topics', 'messages') AND rootpage"
-        )
-        if database.execute(tables).fetchone() != (2,):  # a view has no page, and may be endless
+        # A view has no page, and may be endless.
+        tables = {n for (n,) in database.execute("SELECT name FROM sqlite_schema WHERE rootpage")}
+        if not tables >= {"topics", "messages"}:
             raise ValueError("it has no tables of topics and messages")
         # Reading a page that is damaged may skip its messages silently.
         (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
             raise ValueError(verdict)
+        texts = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        known = database.execute(texts) if "message_definitions" in tables else ()  # since Iron
+        defined = {str(kind): _text(e, str(text).encode()) for kind, e, text in known}
         texts = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         topics = {
-            number: _Stored(str(n), str(t), str(e)) for number, n, t, e in database.execute(texts)
+            number: _Stored(str(n), str(t), str(e), defined.get(str(t), ""))
+            for number, n, t, e in database.execute(texts)
         }
         yield from topics.values()
         rows = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
@@ -217,7 +228,10 @@ def _sqlite(file: Path) -> Iterator[_Stored]:
 
 def _ros1(file: Path) -> Iterator[_Stored]:
     with rosbag1.Reader(file) as reader:
-        topics = {c.id: _Stored(c.topic, c.msgtype, messages.ROS1) for c in reader.connections}
+        topics = {
+            c.id: _Stored(c.topic, c.msgtype, messages.ROS1, c.msgdef.data)
+            for c in reader.connections
+        }
         yield from topics.values()
         count = 0
         for connection, time, data in reader.messages():
@@ -270,6 +284,7 @@ class _Topic:
         times: Time stamp (0 without one) and log time of each decoded message, ns.
         layouts: Indices and rows of these by the names in them, nearly always the same.
         refused: Numbers of messages left out, by reason.
+        listed: Columns to decode of the messages after the first.
     """
 
     types: dict[str, None] = field(default_factory=dict)
@@ -277,9 +292,10 @@ class _Topic:
     times: list[tuple[int, int]] = field(default_factory=list)
     layouts: dict[tuple[str, ...], list[tuple[int, "FloatArray"]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
+    listed: tuple[str, ...] = ()
 
-    def add(self, item: _Stored, *, decoded: bool) -> None:
-        """Adds a message, or an announcement."""
+    def add(self, item: _Stored, columns: Collection[str] | None) -> None:
+        """Adds a message, or an announcement; ``columns`` of it, all if empty, or None."""
         package, _, name = item.type.rpartition("/")
         kind = item.type if package.endswith("/msg") else f"{package}/msg/{name}"  # old bags
         known = item.encoding in (messages.CDR, messages.ROS1)
@@ -287,14 +303,24 @@ class _Topic:
         if item.data is None:
             return
         self.count += 1
-        if decoded and known and kind in messages.DECODERS:
-            try:
-                stamp, (names, rows) = messages.decode(item.data, kind, item.encoding)
-            except messages.RefusedError as refused:
-                self.refused[str(refused)] += 1
-                return
-            self.layouts.setdefault(names, []).append((len(self.times), rows))
-            self.times.append((stamp, item.time))
+        if columns is None or not known or not package:
+            return
+        is_first = not self.layouts
+        if kind not in messages.DECODERS and not (is_first or self.listed):
+            return
+        try:
+            stamp, (names, rows) = messages.decode(
+                item.data, kind, item.encoding, item.definition, self.listed
+            )
+        except messages.UndefinedError:
+            return
+        except messages.RefusedError as refused:
+            self.refused[str(refused)] += 1
+            return
+        if is_first:
+            self.listed = tuple(name for name in columns if name in set(names))
+        self.layouts.setdefault(names, []).append((len(self.times), rows))
+        self.times.append((stamp, item.time))
 
     def series(self) -> Series:
         """Returns the messages as arrays; a column may be in messages of several layouts."""
@@ -312,4 +338,6 @@ class _Topic:
             columns[name] = Column(index[order], values[order])
         stamps, logged = np.array(self.times, dtype=np.int64).reshape(-1, 2).T
         kind = " and ".join(self.types)
-        return Series(kind, self.count, stamps, logged, tuple(parts), columns, self.refused)
+        is_table = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
+        names = tuple(parts)
+        return Series(kind, self.count, stamps, logged, names, columns, self.refused, is_table)

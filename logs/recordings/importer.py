@@ -146,15 +146,18 @@ def _read(path: Path, mapping: RecordingMapping) -> Recording:
                 f"the mapping of a table needs [time] and the names of columns, and has none for "
                 f"{path}: make one with --suggest",
             )
-        return read_bag(path, {place.topic for place in places})
+        wanted: dict[str, set[str]] = {}
+        for place in places:
+            wanted.setdefault(place.topic, set()).update(place.columns)
+        return read_bag(path, wanted)
     if not is_table(path):
         raise mapping.error(
             ("time",),
             f"[time] is for tables ({', '.join(FORMATS)}), got the bag {path}: make a mapping of "
             f"it with --suggest",
         )
-    wanted = {name for place in places for name in place.columns}
-    table = read_table(path, wanted, time=time.column, unit=TIMES[time.unit])
+    listed = {name for place in places for name in place.columns}
+    table = read_table(path, listed, time=time.column, unit=TIMES[time.unit])
     names = table.series[TABLE].names
     if time.column not in names:
         raise mapping.unknown(("time", "column"), "column of the table", time.column, names)
@@ -182,6 +185,7 @@ def _tracks(
     for key, place in mapping.places.items():
         columns = recording.series[place.topic].columns
         known = [columns[name] for name in place.columns if name in columns]
+        known = [one for one in known if one.values.shape[1] > place.numbers[0]]
         raw = (
             resample.track(clocks[place.topic], known, slice(*place.numbers)) if known else NOTHING
         )

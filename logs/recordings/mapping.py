@@ -1,6 +1,8 @@
 """Mapping from the topics of a bag, or the columns of a table, to the parts of a robot, as TOML.
 
-The classes are the tables of the file, and their fields its keys: any other key is an error.
+A topic of a type without a role is a table, whose columns are the numbers in its messages, such as
+``motor_state[3].q``. The classes are the tables of the file, and their fields its keys: any other
+key is an error.
 """
 
 import math
@@ -143,10 +145,14 @@ class Imu(Section):
     orientation: Quaternion = None
     angular_velocity: Vector = None
 
+    @property
+    def has_columns(self) -> bool:
+        """Whether a vector has columns of its own."""
+        return any(isinstance(getattr(self, key), tuple) for key in self.__struct_fields__)
+
     def __post_init__(self) -> None:
         """Checks that something is mapped."""
-        vectors = [key for key in self.__struct_fields__ if isinstance(getattr(self, key), tuple)]
-        if not self.topic and not vectors:
+        if not self.topic and not self.has_columns:
             raise ValueError("this table needs topic, or the columns of a vector: add one")
 
 
@@ -239,8 +245,10 @@ class Trial(Section, kw_only=True):
                 link = joints.links.get(hinge, Link(NONE))
                 scale = joints.conversion(link)[0] if key == "velocities" else link.sign
                 if name != NONE:
-                    path = ("joints", key, hinge)
-                    yield (f"joint_{key}", hinge), Place(path, TABLE, (name,), scale=scale)
+                    place = Place(
+                        ("joints", key, hinge), joints.topic or TABLE, (name,), scale=scale
+                    )
+                    yield (f"joint_{key}", hinge), place
         for motor, link in commands.links.items():
             column = str(commands.order.index(link.name)) if commands.order else link.name
             place = partial(Place, ("commands", "names", motor), commands.topic or TABLE, (column,))
@@ -249,7 +257,7 @@ class Trial(Section, kw_only=True):
         yield from _vectors("imu", self.imu)
         for name, touch in self.touch.items():
             column = touch.column or ("" if touch.index is None else str(touch.index))
-            path = ("touch", name, "index" if touch.topic else "column")
+            path = ("touch", name, "column" if touch.column or not touch.topic else "index")
             yield ("touch", name), Place(path, touch.topic or TABLE, (column,))
         for sensor, name in self.sensors.items():
             yield ("sensors", sensor), Place(("sensors", sensor), TABLE, (name,))
@@ -263,7 +271,7 @@ def _vectors(body: str, section: Imu | None) -> Places:
         if isinstance(section, Base) and key in ("position", "linear_velocity"):
             scale = UNITS[section.unit]
         quantity = (f"{body}_{key}", "")
-        if section.topic:
+        if columns := getattr(section, key):
+            yield quantity, Place((body, key), section.topic or TABLE, columns, scale=scale)
+        elif section.topic and not section.has_columns:
             yield quantity, Place((body, "topic"), section.topic, ("",), numbers, scale)
-        elif columns := getattr(section, key):
-            yield quantity, Place((body, key), TABLE, columns, scale=scale)

@@ -11,11 +11,11 @@ from typing import Any, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, listed, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.logs.recordings.mapping import NONE, UNKNOWN, VECTORS, Angles, Keys, Place, Trial
-from selfmodel.logs.recordings.messages import ARRAY, TYPES
-from selfmodel.logs.recordings.recording import TABLE, Recording
+from selfmodel.logs.recordings.messages import ARRAY, DECODERS, TYPES
+from selfmodel.logs.recordings.recording import TABLE, Recording, Series
 from selfmodel.robot.anatomy import Anatomy
 
 
@@ -70,35 +70,41 @@ def parse_mapping(text: str, name: str) -> RecordingMapping:
     return mapping
 
 
-_OWN_KEYS: Mapping[str, tuple[Keys, Keys]] = {
-    "": (("clock",), ("sensors",)),
-    "joints": (("topic",), ("velocities", "efforts")),
-    "commands": (("topic", "order"), ()),
-    "base": (("topic",), (*VECTORS["base"], "velocity_frame")),
-    "imu": (("topic",), tuple(VECTORS["imu"])),
-    "touch": (("topic", "index"), ("column",)),
+_OF_BAG: Mapping[str, Keys] = {
+    "joints": ("topic",),
+    "commands": ("topic", "order"),
+    "base": ("topic",),
+    "imu": ("topic",),
+    "touch": ("topic", "index"),
 }
-"""Keys that a table of the file has in the mapping of a bag only, and of a table only."""
+"""Keys that a table of the file has in the mapping of a bag only."""
+
+_COLUMN_KEYS = frozenset({"velocities", "efforts", "column", *VECTORS["base"], *VECTORS["imu"]})
+"""Keys of columns, of a table or of a topic that is one."""
 
 
 def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
     """Checks that the keys are those of a table, whose mapping has ``[time]``, or of a bag."""
     trial, is_table = mapping.trial, mapping.trial.time is not None
-    use = "a bag: remove it" if is_table else "a table: remove it, or add [time]"
-    for role, (of_bag, of_table) in _OWN_KEYS.items():
-        sections: dict[Keys, Any] = {(role,): tables.get(role, {})} if role else {(): tables}
-        if role == "touch":
-            sections = {(role, name): section for name, section in sections[role,].items()}
-        for path, section in sections.items():
-            for key in of_bag if is_table else of_table:
-                if key in section:
-                    raise mapping.error((*path, key), f"{key} is a key of the mapping of {use}")
+    if not is_table:
+        if "sensors" in tables:
+            advice = "remove it, or add [time]"
+            sentence = f"sensors is a key of the mapping of a table: {advice}"
+            raise mapping.error(("sensors",), sentence)
+        return
+    sections: dict[Keys, Any] = {(role,): tables.get(role, {}) for role in _OF_BAG}
+    sections |= {("touch", name): section for name, section in sections.pop(("touch",)).items()}
+    unfit = [
+        (*path, key) for path, held in sections.items() for key in _OF_BAG[path[0]] if key in held
+    ]
+    for path in [("clock",)] * ("clock" in tables) + unfit:
+        raise mapping.error(path, f"{path[-1]} is a key of the mapping of a bag: remove it")
     base = trial.base
-    if is_table and base is not None and base.position is None and base.orientation is None:
+    if base is not None and base.position is None and base.orientation is None:
         raise mapping.error(
             ("base",), "[base] needs position or orientation, and has neither: add one"
         )
-    for name, touch in trial.touch.items() if is_table else ():
+    for name, touch in trial.touch.items():
         if not touch.column:
             raise mapping.error(("touch", name), f"[touch.{name}] needs column: add it")
 
@@ -155,11 +161,11 @@ def check_robot(mapping: RecordingMapping, anatomy: Anatomy) -> None:
         ("joints", "efforts"): (trial.joints.efforts, "hinge", anatomy.hinges),
         ("sensors",): (trial.sensors, "sensor", anatomy.names.sensors),
     }
-    for path, (listed, what, known) in parts.items():
-        for name in listed:
+    for path, (mapped, what, known) in parts.items():
+        for name in mapped:
             if name not in known:
                 raise mapping.unknown((*path, name), f"{what} of the robot", name, known)
-        if path[-1] == "names" and (missing := [name for name in known if name not in listed]):
+        if path[-1] == "names" and (missing := [name for name in known if name not in mapped]):
             advice = f", with {NONE!r} for a hinge without an encoder" if what == "hinge" else ""
             raise mapping.error(
                 path,
@@ -174,7 +180,8 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
         _check_topic(mapping, recording, place)
     order = mapping.trial.commands.order
     for place in mapping.places.values():
-        columns = recording.series[place.topic].names
+        series = recording.series[place.topic]
+        columns = series.names
         if place.role == ("commands",) and order:
             if len(order) != len(columns):
                 raise mapping.error(
@@ -185,7 +192,8 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
             continue
         for name in place.columns:
             if name and name not in columns:
-                kind = "number" if place.role[0] == "touch" else "joint"
+                is_joint = place.role[0] in ("joints", "commands") and not series.is_table
+                kind = "joint" if is_joint else "number"
                 what = "column of the table" if place.topic == TABLE else f"{kind} on {place.topic}"
                 error = str(unknown_name(what, name, columns))
                 lost = f"; {NONE!r} is for a hinge without an encoder"
@@ -194,7 +202,7 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
 
 def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) -> None:
     """Checks that a topic exists, has a suitable type, and has messages."""
-    role, topic, trial = place.role, place.topic, mapping.trial
+    role, topic = place.role, place.topic
     series = recording.series.get(topic)
     if topic == TABLE:
         if series is None:
@@ -202,19 +210,39 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
             raise mapping.error(role, sentence)
         return
     path, kinds = (*role, "topic"), TYPES[role[0]]
-    fitting = [name for name, other in recording.series.items() if other.type in kinds]
+    fitting = [name for name, one in recording.series.items() if one.type in kinds or one.is_table]
     if series is None:
         known = fitting or sorted(recording.series)
         raise mapping.unknown(path, "topic of the recording", topic, known)
-    if series.type not in kinds:
-        raise mapping.error(
-            path,
-            f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, got {topic} of "
-            f"{series.type or 'no type'}: name one that fits, of "
-            f"{', '.join(fitting) or 'which the bag has none'}",
-        )
     if not series.count:
         raise mapping.error(path, f"expected messages on {topic}, got none: name another one")
+    if topic not in fitting:
+        is_known = series.type in DECODERS
+        raise mapping.error(
+            path,
+            f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, or of a type that the "
+            f"bag defines, got {topic} of {series.type or 'no type'}"
+            f"{'' if is_known else ', which it does not'}: name one that fits, of "
+            f"{', '.join(fitting) or 'which the bag has none'}",
+        )
+    if series.is_table and place.columns == ("",):
+        raise mapping.error(
+            role,
+            f"{topic} is of {series.type}, which has no role of its own: name its numbers under "
+            f"{' or '.join(VECTORS.get(role[0], ('column',)))}, of {listed(series.names, 8)}",
+        )
+    if (key := place.path[len(role)]) in _COLUMN_KEYS and not series.is_table:
+        raise mapping.error(
+            place.path,
+            f"{key} is for a table, or a topic of a type without a role, got {topic} of "
+            f"{series.type}: remove it",
+        )
+    _check_array(mapping, series, place)
+
+
+def _check_array(mapping: RecordingMapping, series: Series, place: Place) -> None:
+    """Checks that the numbers of a Float64MultiArray, and no others, are named by their place."""
+    role, topic, trial = place.role, place.topic, mapping.trial
     if role[0] not in ("commands", "touch"):
         return
     key, table = (

@@ -1,14 +1,16 @@
 """Messages of ROS 1 and ROS 2, decoded without ROS into names and rows of numbers."""
 
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zstandard
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -33,7 +35,10 @@ TYPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "touch": (WRENCH, *NUMBERS, ARRAY),
     }
 )
-"""Message types that can play each role."""
+"""Message types that can play each role; every other type is a table of the fields that it has."""
+
+MAX_ELEMENTS = 100
+"""Length of the longest list in a message whose numbers are columns: an image has none."""
 
 Rows = tuple[tuple[str, ...], "FloatArray"]
 """Names in a message, and a row of numbers for each, ``(names, width)``."""
@@ -49,28 +54,87 @@ class RefusedError(ValueError):
     """A message contradicts itself; it is counted and left out."""
 
 
-def decode(data: bytes, kind: str, encoding: str) -> tuple[int, Rows]:
-    """Returns the time stamp of a message, ns (0 if it has none), and its rows."""
+class UndefinedError(ValueError):
+    """Neither the recording nor a distribution of ROS defines a type."""
+
+
+def decode(
+    data: bytes, kind: str, encoding: str, definition: str = "", columns: Collection[str] = ()
+) -> tuple[int, Rows]:
+    """Returns the time stamp of a message, ns (0 if it has none), and its rows.
+
+    Args:
+        data: Encoded message.
+        kind: Its type.
+        encoding: ``CDR`` or ``ROS1``.
+        definition: Text of a type that is not in ``DECODERS`` and of those in it; "" where ROS or
+            ``DEFINITIONS`` has it.
+        columns: Names of the numbers to return of such a type, of those that it has; or all.
+
+    Raises:
+        RefusedError: The message contradicts itself.
+        UndefinedError: The type has no definition.
+    """
     if encoding == CDR and data.startswith(ZSTD_MAGIC):
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
             data = reader.readall()
+    store = _store(encoding, *((kind, definition) if kind not in DECODERS else ()))
     message: Any = (
-        _store(Stores.ROS1_NOETIC).deserialize_ros1(data, kind)
+        store.deserialize_ros1(data, kind)
         if encoding == ROS1
-        else _store(Stores.ROS2_HUMBLE).deserialize_cdr(data, kind)
+        else store.deserialize_cdr(data, kind)
     )
     stamp = 0
     if hasattr(message, "header"):
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
     if stamp < 0:
         raise RefusedError("with a stamp before 1970")
-    return stamp, DECODERS[kind](message)
+    if kind in DECODERS:
+        return stamp, DECODERS[kind](message)
+    numbers = {name: _number(message, name) for name in columns} or dict(_numbers(message))
+    return stamp, (tuple(numbers), np.array([*numbers.values()], dtype=np.float64)[:, np.newaxis])
 
 
 @cache
-def _store(store: Stores) -> "Typestore":
-    """Message types; those in ``DECODERS`` are the same in every distribution of ROS 1 or 2."""
-    return get_typestore(store)
+def _store(encoding: str, kind: str = "", definition: str = "") -> "Typestore":
+    """Message types of ROS, which are the same for ``DECODERS`` in all distributions, and more."""
+    store = get_typestore(Stores.ROS1_NOETIC if encoding == ROS1 else Stores.ROS2_HUMBLE)
+    if not kind or kind in store.fielddefs:
+        return store
+    try:
+        found = get_types_from_msg(definition or DEFINITIONS[kind], kind)
+        store.register({name: of for name, of in found.items() if name not in store.fielddefs})
+    except (KeyError, TypesysError) as failure:
+        raise UndefinedError(kind) from failure
+    return store
+
+
+def _numbers(value: Any, name: str = "") -> Iterator[tuple[str, float]]:  # noqa: ANN401
+    """Numbers in a message by name, such as ``motor_state[3].q``."""
+    if is_dataclass(value):
+        for field in fields(value):
+            inner = f"{name}.{field.name}" if name else field.name
+            yield from _numbers(getattr(value, field.name), inner)
+    elif isinstance(value, list | np.ndarray):
+        for place, item in enumerate(value if len(value) <= MAX_ELEMENTS else ()):
+            yield from _numbers(item, f"{name}[{place}]")
+    elif isinstance(value, int | float | np.number | np.bool_):
+        yield name, float(value)
+
+
+def _number(message: Any, name: str) -> float:  # noqa: ANN401
+    """Number of that name in a message; NaN in one whose list is shorter."""
+    value = message
+    for part in _parts(name):
+        if isinstance(part, int) and part >= len(value):
+            return math.nan
+        value = value[part] if isinstance(part, int) else getattr(value, part)
+    return float(value)
+
+
+@cache
+def _parts(name: str) -> tuple[str | int, ...]:
+    return tuple(int(part) if part.isdecimal() else part for part in re.findall(r"\w+", name))
 
 
 def _named(names: list[str], *columns: "FloatArray") -> Rows:
@@ -150,3 +214,92 @@ Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry
 (orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
 Float64MultiArray are named by their index; of types with one column, it has no name.
 """
+
+
+_LINE = "=" * 80
+_UNITREE_HEAD = """\
+uint8[2] head
+uint8 level_flag
+uint8 frame_reserve
+uint32[2] sn
+uint32[2] version
+uint16 bandwidth
+"""
+
+DEFINITIONS: Mapping[str, str] = MappingProxyType(
+    {
+        "unitree_go/msg/LowState": f"""\
+{_UNITREE_HEAD}IMUState imu_state
+MotorState[20] motor_state
+BmsState bms_state
+int16[4] foot_force
+int16[4] foot_force_est
+uint32 tick
+uint8[40] wireless_remote
+uint8 bit_flag
+float32 adc_reel
+int8 temperature_ntc1
+int8 temperature_ntc2
+float32 power_v
+float32 power_a
+uint16[4] fan_frequency
+uint32 reserve
+uint32 crc
+{_LINE}
+MSG: unitree_go/IMUState
+float32[4] quaternion
+float32[3] gyroscope
+float32[3] accelerometer
+float32[3] rpy
+int8 temperature
+{_LINE}
+MSG: unitree_go/MotorState
+uint8 mode
+float32 q
+float32 dq
+float32 ddq
+float32 tau_est
+float32 q_raw
+float32 dq_raw
+float32 ddq_raw
+int8 temperature
+uint32 lost
+uint32[2] reserve
+{_LINE}
+MSG: unitree_go/BmsState
+uint8 version_high
+uint8 version_low
+uint8 status
+uint8 soc
+int32 current
+uint16 cycle
+int8[2] bq_ntc
+int8[2] mcu_ntc
+uint16[15] cell_vol
+""",
+        "unitree_go/msg/LowCmd": f"""\
+{_UNITREE_HEAD}MotorCmd[20] motor_cmd
+BmsCmd bms_cmd
+uint8[40] wireless_remote
+uint8[12] led
+uint8[2] fan
+uint8 gpio
+uint32 reserve
+uint32 crc
+{_LINE}
+MSG: unitree_go/MotorCmd
+uint8 mode
+float32 q
+float32 dq
+float32 tau
+float32 kp
+float32 kd
+uint32[3] reserve
+{_LINE}
+MSG: unitree_go/BmsCmd
+uint8 off
+uint8[3] reserve
+""",
+    }
+)
+"""Definitions of types in bags that have none: those in SQLite of ROS 2 before Iron."""

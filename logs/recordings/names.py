@@ -46,6 +46,12 @@ _WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
 """Sets of exclusive words: names with two words of one set never match."""
 
+UNITREE_LEGS = ("FR", "FL", "RR", "RL")
+UNITREE = tuple(f"{leg}_{part}" for leg in UNITREE_LEGS for part in ("hip", "thigh", "calf"))
+"""Joints of Unitree's quadrupeds in the order of their messages, whose other motors are unused."""
+
+_ELEMENT = re.compile(r"(?P<list>.+?)\[(?P<place>\d+)\](?P<field>(?:\.\w+)*)")
+
 
 def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, tuple[str, bool]]:
     """Returns the most similar offered name for each wanted name, each used once.
@@ -106,8 +112,8 @@ def _sets(words: Mapping[str, str]) -> Mapping[str, frozenset[str]]:
 
 _QUANTITIES = _sets(
     {
-        "command": "command commands cmd target targets desired des setpoint goal "
-        "reference ref action actions ctrl control",
+        "command": "command commands commanded cmd target targets desired des setpoint goal "
+        "reference ref action actions ctrl control qdes qref qcmd qtarget",
         "velocity": "velocity velocities vel qd dq qvel qdot",
         "effort": "effort efforts torque torques tau",
         "sensor": "sensor sensors reading readings",
@@ -118,13 +124,16 @@ _QUANTITIES = _sets(
 
 _VECTORS = _sets(
     {
-        "orientation": "orientation quat quaternion rot rotation q",
-        "angular_velocity": "angular gyro omega gyroscope",
+        "orientation": "orientation quat quaternion rot rotation attitude q",
+        "angular_velocity": "angular gyro omega gyroscope w",
         "linear_velocity": "velocity vel linear twist v",
         "position": "position pos odom pose p",
     }
 )
 """Words of the quantities of a base or an IMU, in the order of the decision."""
+
+_NUMBERED = ("orientation", "angular_velocity")
+"""Quantities whose components may be numbers: ``pos_0`` to ``pos_2`` are of three joints."""
 
 _OTHERS = _sets(
     {
@@ -134,7 +143,8 @@ _OTHERS = _sets(
         "imu": "imu gyro gyroscope",
     }
 )
-_COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW])[\])]?$")
+_COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW]|(?<!\d)\d)[\])]?$")
+_PART_OF_COMMAND = ("command", "cmd", "target", "desired", "setpoint", "reference")
 
 
 @dataclass(frozen=True)
@@ -160,14 +170,21 @@ def classified(names: Sequence[str]) -> Classified:
         if set(words) & _OTHERS["time"] and set(words) <= _OTHERS["time"] | _OTHERS["unit"]:
             found.times.append(name)
             continue
-        for quantity, known in _QUANTITIES.items():
-            if known & set(words):
-                fillers = _OTHERS["filler"].union(*_QUANTITIES.values())
-                label = "_".join(word for word in words if word not in fillers)
-                found.parts.setdefault(quantity, {}).setdefault(label, name)
-                break
+        if quantity := "command" if is_command(name) else quantity_of(name):
+            fillers = _OTHERS["filler"].union(*_QUANTITIES.values())
+            label = "_".join(word for word in words if word not in fillers)
+            found.parts.setdefault(quantity, {}).setdefault(label, name)
         else:
             found.others.append(name)
+    return found
+
+
+def elements(names: Sequence[str]) -> dict[tuple[str, str], list[str]]:
+    """Returns the elements of lists in messages in order, by list and field of the element."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name in names:
+        if match := _ELEMENT.fullmatch(name):
+            found.setdefault((match["list"], match["field"]), []).append(name)
     return found
 
 
@@ -183,12 +200,34 @@ def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
             groups.setdefault(match["group"], {}).setdefault(match["axis"].lower(), name)
     found: dict[str, dict[str, tuple[str, ...]]] = {"base": {}, "imu": {}}
     for group, axes in groups.items():
-        words = set(words_of(group))
-        order = "wxyz" if len(axes) == 4 else "xyz"
+        words = set(words_of(group)) or {"p"}
+        order = next((o for o in ("wxyz", "xyz", "0123", "012") if set(axes) == set(o)), "")
         for quantity, known in _VECTORS.items():
-            width = 4 if quantity == "orientation" else 3
-            if words & known and set(axes) == set(order) and len(order) == width:
+            fitting = ("xyz", "012") if quantity != "orientation" else ("wxyz", "0123")
+            if order not in fitting or (order == fitting[1] and quantity not in _NUMBERED):
+                continue
+            if words & (known - {"q", "w"} if order == fitting[1] else known):
                 body = "imu" if words & _OTHERS["imu"] else "base"
                 found[body].setdefault(quantity, tuple(axes[axis] for axis in order))
                 break
     return found
+
+
+def is_command(name: str) -> bool:
+    """Returns whether a name has a word of commands, such as ``/lowcmd`` and ``q_des``."""
+    words = words_of(name)
+    parts = any(part in word for part in _PART_OF_COMMAND for word in words)
+    return parts or not _QUANTITIES["command"].isdisjoint(words)
+
+
+def is_touch(name: str) -> bool:
+    """Returns whether a name may be that of a contact: it has a word such as ``foot``."""
+    touch = any(_WORDS.get(word, (word,)) == ("touch",) for word in words_of(name))
+    return touch and not is_command(name)
+
+
+def quantity_of(name: str) -> str:
+    """Returns what a name measures or commands, such as ``velocity``; "" if it does not say."""
+    words = words_of(name)
+    measured = list(_QUANTITIES.items())[1:]
+    return next((quantity for quantity, known in measured if known.intersection(words)), "")

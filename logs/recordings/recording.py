@@ -45,6 +45,7 @@ class Series:
         names: Names of all columns.
         columns: Columns by name, those that were read; each message may have other names.
         refused: Numbers of messages left out, by reason.
+        is_table: Whether the columns are the numbers of a type without a role.
     """
 
     type: str
@@ -54,6 +55,7 @@ class Series:
     names: tuple[str, ...]
     columns: Mapping[str, Column]
     refused: Mapping[str, int]
+    is_table: bool = False
 
 
 @dataclass(frozen=True, eq=False)

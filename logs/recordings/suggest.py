@@ -13,13 +13,23 @@ from selfmodel.errors import listed
 from selfmodel.logs.recordings.bags import read_bag
 from selfmodel.logs.recordings.mapping import NONE, UNKNOWN
 from selfmodel.logs.recordings.messages import ARRAY, JOINT_STATE, NUMBERS, ODOMETRY, TYPES, WRENCH
-from selfmodel.logs.recordings.names import classified, matched, unit_of_time
+from selfmodel.logs.recordings.names import (
+    UNITREE,
+    UNITREE_LEGS,
+    classified,
+    elements,
+    is_command,
+    is_touch,
+    matched,
+    quantity_of,
+    unit_of_time,
+)
 from selfmodel.logs.recordings.recording import TABLE, Recording, Series
 from selfmodel.logs.recordings.tables import is_table, read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import PREFIXES, column_names
 
-_COMMANDED = ("command", "cmd", "target", "desired", "setpoint", "goal", "reference")
+_UNSURE = "  # CHECK: not sure"
 
 _LONGEST_PERIODS = {"s": 0.5, "ms": 500.0, "us": 5e5}
 """Longest usual period of the rows that is assumed of each unit of time."""
@@ -36,14 +46,14 @@ class _Offer:
         what: Word for the recording.
         heads: First lines of tables of the mapping; one without lines is left out.
         names: Names by quantity and label, which may be a joint's.
-        touches: Thresholds by names that may be of touch sensors; None for a Bool.
+        touches: Lines of the table of a touch sensor, by names that may be of one.
         known: All names of a table.
     """
 
     what: str
     heads: Mapping[str, Sequence[str]]
     names: Mapping[str, Mapping[str, str]]
-    touches: Mapping[str, float | None]
+    touches: Mapping[str, Sequence[str]]
     known: Sequence[str] = field(default=())
 
 
@@ -153,18 +163,15 @@ def _touches(offer: _Offer, sensors: Sequence[str]) -> Iterator[str]:
             yield f"# No {where} is similar to {escaped(sensor)}: it is not observed."
             continue
         name, sure = matches[sensor]
-        yield f"[touch.{key(sensor)}]"
-        yield _entry(where, name, sure)
-        if (threshold := offer.touches[name]) is not None:
-            yield f"threshold = {threshold}  # CHECK: it reads 1 above this"
-        yield ""
+        first, *others = offer.touches[name]
+        yield f"[touch.{key(sensor)}]\n{first}{'' if sure else _UNSURE}\n{_text([*others, ''])}"
 
 
 # ---------------------------------------------------------------- bags
 
 
 def _in_bag(bag: Recording, robot: Robot) -> _Offer:
-    series = bag.series
+    series, hinges, motors = bag.series, robot.anatomy.hinges, robot.anatomy.motors
 
     def able(role: str) -> list[str]:
         """Topics that can play a role, in the order of the role's types."""
@@ -172,29 +179,41 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
         topics = [topic for topic in topics if series[topic].count]
         return sorted(topics, key=lambda topic: TYPES[role].index(series[topic].type))
 
-    def is_command(topic: str) -> bool:
-        words = any(word in topic.lower() for word in _COMMANDED)
-        return series[topic].type != JOINT_STATE or words
+    def commands_only(topic: str) -> bool:
+        return series[topic].type != JOINT_STATE or is_command(topic)
 
-    joints = [topic for topic in able("joints") if not is_command(topic)]
-    joints.sort(key=lambda topic: -_fit(series[topic], robot.anatomy.hinges))
+    joints = [topic for topic in able("joints") if not commands_only(topic)]
+    joints.sort(key=lambda topic: -_fit(series[topic], hinges))
     commands = [topic for topic in able("commands") if topic not in joints[:1]]
-    motors = robot.anatomy.motors
-    commands.sort(key=lambda topic: (not is_command(topic), -_fit(series[topic], motors)))
-    encoders = [name for topic in joints[:1] for name in series[topic].names]
+    commands.sort(key=lambda topic: (not commands_only(topic), -_fit(series[topic], motors)))
+    names = {"position": {name: name for topic in joints[:1] for name in series[topic].names}}
     commanded = [name for topic in commands[:1] for name in series[topic].names]
     order = []
     if commands and series[commands[0]].type == ARRAY:
-        if len(encoders) == len(commanded):
-            commanded = encoders
+        if len(names["position"]) == len(commanded):
+            commanded = list(names["position"])
         else:
             commanded = [f"column_{k}" for k in range(len(commanded))]
-        names = ", ".join(map(quoted, commanded))
-        order = [f"order = [{names}]  # CHECK: the bag has no names"]
+        listed_names = ", ".join(map(quoted, commanded))
+        order = [f"order = [{listed_names}]  # CHECK: the bag has no names"]
+    names["command"] = {name: name for name in commanded}
+    tables = sorted((t for t in series if series[t].is_table), key=lambda t: -series[t].count)
+    lists = _lists([(topic, series[topic]) for topic in tables], robot)
+    if "position" in lists and not any(_fit(series[topic], hinges) for topic in joints[:1]):
+        topic, names["position"] = lists["position"]
+        joints = [topic]
+        names |= {q: lists[q][1] for q in ("velocity", "effort") if lists.get(q, [""])[0] == topic}
+    if "command" in lists and not any(_fit(series[topic], motors) for topic in commands[:1]):
+        topic, names["command"] = lists["command"]
+        commands, order = [topic], []
     base, imu, unit = able("base"), able("imu"), 'unit = "rad"  # CHECK: rad or deg'
     of_base = [_topic(base), 'frame = "start"', 'unit = "m"'] if base else []
     if base and series[base[0]].type != ODOMETRY:
         of_base.append("# It has no velocities, and none are derived.")
+    of_imu = [_topic(imu)] if imu else []
+    for topic in tables:
+        vectors = classified(series[topic].names).vectors["imu"]
+        of_imu = of_imu or [_topic([topic]), *_vectors(vectors)] if vectors else of_imu
     return _Offer(
         what="bag",
         heads={
@@ -202,18 +221,52 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
             "joints": [_topic(joints), unit],
             "commands": [_topic(commands), unit, *order],
             "base": of_base,
-            "imu": [_topic(imu)] if imu else [],
+            "imu": of_imu,
         },
-        names={
-            "position": {name: name for name in encoders},
-            "command": {name: name for name in commanded},
-        },
+        names=names,
         touches={
-            topic: None if series[topic].type.endswith("Bool") else 5.0
+            topic: [f"topic = {quoted(topic)}", *_threshold(5.0, series[topic].type)]
             for topic in able("touch")
-            if series[topic].type in (WRENCH, *NUMBERS)
+            if series[topic].type == WRENCH or (series[topic].type in NUMBERS and is_touch(topic))
+        }
+        | {
+            label: [f"topic = {quoted(topic)}", f"column = {quoted(name)}", *_threshold(20.0)]
+            for topic, columns in [lists[q] for q in ("touch",) if q in lists]
+            for label, name in columns.items()
         },
     )
+
+
+def _threshold(value: float, kind: str = "") -> list[str]:
+    """Line of a touch sensor's threshold; a Bool needs none."""
+    return [] if kind.endswith("Bool") else [f"threshold = {value}  # CHECK: it reads 1 above this"]
+
+
+def _lists(
+    tables: Sequence[tuple[str, Series]], robot: Robot
+) -> dict[str, tuple[str, dict[str, str]]]:
+    """Topic and columns of lists in messages by quantity, with a label for each element.
+
+    The elements are those of Unitree's joints and feet, or else those of the robot's parts in
+    order.
+    """
+    found: dict[str, tuple[str, dict[str, str]]] = {}
+    for topic, series in tables:
+        is_unitree = series.type.startswith("unitree")
+        for (name, field_name), columns in elements(series.names).items():
+            quantity = quantity_of(field_name or name)
+            if is_command(f"{topic}.{name}"):
+                quantity = "command" if quantity == "position" else ""
+            elif is_unitree and is_touch(name):
+                quantity = "touch"
+            anatomy = robot.anatomy
+            parts = anatomy.motors if quantity == "command" else anatomy.hinges
+            labels = [str(place) for place in range(len(parts))]
+            if is_unitree:
+                labels = [f"{leg}_foot" for leg in UNITREE_LEGS] if quantity == "touch" else UNITREE
+            if quantity and len(columns) >= len(labels):
+                found.setdefault(quantity, (topic, dict(zip(labels, columns, strict=False))))
+    return found
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
@@ -265,7 +318,11 @@ def _in_table(path: Path, robot: Robot) -> _Offer:
             "imu": _vectors(columns.vectors["imu"]),
         },
         names=parts,
-        touches=dict.fromkeys(columns.others, 0.5),
+        touches={
+            name: [f"column = {quoted(name)}", *_threshold(0.5)]
+            for name in columns.others
+            if is_touch(name)
+        },
         known=names,
     )
 
@@ -287,16 +344,22 @@ def _time(path: Path, times: Sequence[str], names: Sequence[str]) -> list[str]:
 
 
 def _vectors(vectors: Mapping[str, Sequence[str]]) -> list[str]:
-    return [
-        f"{quantity} = [{', '.join(map(quoted, columns))}]" for quantity, columns in vectors.items()
-    ]
+    lines = []
+    for quantity, columns in vectors.items():
+        order = (
+            "  # CHECK: w, x, y, z"
+            if len(columns) == 4 and "w" not in columns[0].lower()[-2:]
+            else ""
+        )
+        lines.append(f"{quantity} = [{', '.join(map(quoted, columns))}]{order}")
+    return lines
 
 
 # ---------------------------------------------------------------- TOML
 
 
 def _entry(name: str, value: str, sure: bool) -> str:  # noqa: FBT001  # of a match
-    return f"{key(name)} = {quoted(value)}" + ("" if sure else "  # CHECK: not sure")
+    return f"{key(name)} = {quoted(value)}" + ("" if sure else _UNSURE)
 
 
 def _listed(names: Sequence[str]) -> str:

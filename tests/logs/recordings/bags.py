@@ -7,7 +7,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ROS = get_typestore(Stores.ROS2_HUMBLE)
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
@@ -104,8 +104,11 @@ def made(kind: str, **values: object) -> object:
             fields[name] = made(about, **(value or {}))
         elif node == Nodetype.BASE:
             fields[name] = value or ("" if about[0] == "string" else 0)
-        elif about[0][1] == ("float64", 0):
-            fields[name] = np.zeros(about[1]) if value is None else np.array(value, np.float64)
+        elif about[0][0] == Nodetype.BASE and about[0][1][0] != "string":
+            given = np.zeros(about[1]) if value is None else value
+            fields[name] = np.array(given, about[0][1][0].replace("byte", "uint8"))
+        elif node == Nodetype.ARRAY:
+            fields[name] = [made(about[0][1], **of) for of in value]
         else:
             fields[name] = list(value or [])
     return ROS.types[kind](**fields)
@@ -180,3 +183,59 @@ def wrench(stamp: int, force: Sequence[float]) -> object:
     return made(
         "geometry_msgs/msg/WrenchStamped", header=header(stamp), wrench={"force": vector(force)}
     )
+
+
+# ---------------------------------------------------------------- Unitree
+
+MOTORS = 20
+"""Motors in a message of Unitree's; a quadruped has twelve."""
+
+# unitree_ros2, unitree_go/msg: IMUState, MotorState, BmsState, LowState; MotorCmd, BmsCmd, LowCmd.
+_UNITREE = {
+    "IMUState": "float32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\n"
+    "float32[3] rpy\nint8 temperature\n",
+    "MotorState": "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 ddq\nfloat32 tau_est\n"
+    "float32 q_raw\nfloat32 dq_raw\nfloat32 ddq_raw\nint8 temperature\nuint32 lost\n"
+    "uint32[2] reserve\n",
+    "BmsState": "uint8 version_high\nuint8 version_low\nuint8 status\nuint8 soc\nint32 current\n"
+    "uint16 cycle\nint8[2] bq_ntc\nint8[2] mcu_ntc\nuint16[15] cell_vol\n",
+    "LowState": "uint8[2] head\nuint8 level_flag\nuint8 frame_reserve\nuint32[2] sn\n"
+    "uint32[2] version\nuint16 bandwidth\nIMUState imu_state\nMotorState[20] motor_state\n"
+    "BmsState bms_state\nint16[4] foot_force\nint16[4] foot_force_est\nuint32 tick\n"
+    "uint8[40] wireless_remote\nuint8 bit_flag\nfloat32 adc_reel\nint8 temperature_ntc1\n"
+    "int8 temperature_ntc2\nfloat32 power_v\nfloat32 power_a\nuint16[4] fan_frequency\n"
+    "uint32 reserve\nuint32 crc\n",
+    "MotorCmd": "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau\nfloat32 kp\nfloat32 kd\n"
+    "uint32[3] reserve\n",
+    "BmsCmd": "uint8 off\nuint8[3] reserve\n",
+    "LowCmd": "uint8[2] head\nuint8 level_flag\nuint8 frame_reserve\nuint32[2] sn\n"
+    "uint32[2] version\nuint16 bandwidth\nMotorCmd[20] motor_cmd\nBmsCmd bms_cmd\n"
+    "uint8[40] wireless_remote\nuint8[12] led\nuint8[2] fan\nuint8 gpio\nuint32 reserve\n"
+    "uint32 crc\n",
+}
+for _name, _text in _UNITREE.items():
+    ROS.register(get_types_from_msg(_text, f"unitree_go/msg/{_name}"))
+
+
+def low_state(
+    position: Sequence[float],
+    velocity: Sequence[float],
+    effort: Sequence[float],
+    *,
+    wxyz: Sequence[float] = (1, 0, 0, 0),
+    gyroscope: Sequence[float] = (0, 0, 0),
+    feet: Sequence[int] = (0, 0, 0, 0),
+) -> object:
+    """A LowState, whose motors beyond those given are at 0."""
+    motors = [
+        {"q": q, "dq": dq, "tau_est": tau}
+        for q, dq, tau in zip(position, velocity, effort, strict=True)
+    ]
+    motors += [{}] * (MOTORS - len(motors))
+    imu_state = {"quaternion": wxyz, "gyroscope": gyroscope}
+    return made("unitree_go/msg/LowState", imu_state=imu_state, motor_state=motors, foot_force=feet)
+
+
+def low_command(position: Sequence[float]) -> object:
+    motors = [{"q": q, "kp": 60.0} for q in position]
+    return made("unitree_go/msg/LowCmd", motor_cmd=motors + [{}] * (MOTORS - len(motors)))

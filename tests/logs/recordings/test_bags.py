@@ -117,7 +117,7 @@ def test_split_files_are_one_bag(*, listed: bool, biped: Robot, expected: dict, 
     os.mkfifo(whole / "a.mcap.pipe")  # waits for nobody
 
     assert signals(whole, biped) == expected
-    digests = read_bag(whole, ()).digests
+    digests = read_bag(whole, {}).digests
     assert list(digests) == names
     assert digests[names[0]] == hashlib.sha256((whole / names[0]).read_bytes()).hexdigest()
 
@@ -177,7 +177,7 @@ def test_what_a_recorder_left_beside_its_database_is_not_passed_over(tmp_path: P
         recorder.execute("DELETE FROM messages WHERE id > 5")
         recorder.commit()
         with pytest.raises(InputError, match=r"-wal .*wal_checkpoint"):
-            read_bag(database, ())
+            read_bag(database, {})
 
 
 ENDLESS = (
