@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
@@ -79,7 +80,7 @@ _OF_BAG: Mapping[str, Keys] = {
 }
 """Keys that a table of the file has in the mapping of a bag only."""
 
-_COLUMN_KEYS = frozenset({"velocities", "efforts", "column", *VECTORS["base"], *VECTORS["imu"]})
+_COLUMN_KEYS = frozenset({"velocities", "efforts", "column", "velocity_frame", *VECTORS["base"]})
 """Keys of columns, of a table or of a topic that is one."""
 
 
@@ -195,7 +196,8 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
                 is_joint = place.role[0] in ("joints", "commands") and not series.is_table
                 kind = "joint" if is_joint else "number"
                 what = "column of the table" if place.topic == TABLE else f"{kind} on {place.topic}"
-                error = str(unknown_name(what, name, columns))
+                near = get_close_matches(name, columns, 12, 0) if series.is_table else columns
+                error = str(unknown_name(what, name, near))
                 lost = f"; {NONE!r} is for a hinge without an encoder"
                 raise mapping.error(place.path, error + (lost if place.role == ("joints",) else ""))
 
@@ -220,9 +222,9 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
         is_known = series.type in DECODERS
         raise mapping.error(
             path,
-            f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, or of a type that the "
-            f"bag defines, got {topic} of {series.type or 'no type'}"
-            f"{'' if is_known else ', which it does not'}: name one that fits, of "
+            f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, got {topic} of "
+            f"{series.type or 'no type'}{'' if is_known else ', which the bag does not define'}: "
+            f"name one that fits, of "
             f"{', '.join(fitting) or 'which the bag has none'}",
         )
     if series.is_table and place.columns == ("",):
@@ -231,9 +233,12 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
             f"{topic} is of {series.type}, which has no role of its own: name its numbers under "
             f"{' or '.join(VECTORS.get(role[0], ('column',)))}, of {listed(series.names, 8)}",
         )
-    if (key := place.path[len(role)]) in _COLUMN_KEYS and not series.is_table:
+    path, key = place.path, place.path[len(role)]
+    if (base := mapping.trial.base) and role == ("base",) and base.velocity_frame == "world":
+        path, key = ("base", "velocity_frame"), "velocity_frame"
+    if key in _COLUMN_KEYS and not series.is_table:
         raise mapping.error(
-            place.path,
+            path,
             f"{key} is for a table, or a topic of a type without a role, got {topic} of "
             f"{series.type}: remove it",
         )

@@ -49,7 +49,9 @@ def line_of(text: str, mapping: str = MAPPING) -> int:
         ('"LHY", "LHX"]', '"LHY", "RHX"]', "RHX is listed twice in order"),
         ('"LHY", "LHX"]', '"LHY", "LHX", "X"]', "must name the 4 numbers .* got 5 names"),
         ('topic = "/odom"', "topic = /odom", "expected TOML"),
-        ("threshold = 5.0", 'column = "c"', "column is a key of the mapping of a table"),
+        ("threshold = 5.0", 'column = "c"', "column is for a table, or a topic .* got /left_foot"),
+        ('topic = "/imu"', "orientation=['w','x','y','z']\ntopic='/imu'", "orientation is for a"),
+        ('topic = "/odom"', "velocity_frame='world'\ntopic='/odom'", "velocity_frame is for a ta"),
     ],
 )
 def test_a_mistake_has_its_line(right: str, wrong: str, named: str, biped: Robot, bag: Path):
