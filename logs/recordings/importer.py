@@ -102,7 +102,9 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
         if place.role != ("sensors",):
             roles.setdefault(place.topic, {})[".".join(place.role)] = None
     qualities = {
-        topic: quality(recording.series[topic], clocks[topic], origin, tuple(names))
+        topic: quality(
+            recording.series[topic], clocks[topic], origin, robot.control_timestep, tuple(names)
+        )
         for topic, names in roles.items()
     }
     warnings = notes(mapping.trial, trajectory, qualities, robot)
@@ -235,7 +237,7 @@ def _steps(mapping: RecordingMapping, tracks: Tracks, timestep: float) -> tuple[
                 f"{place.topic} has no number for {part or 'the base'}: name another one",
             )
     first = max(int(track.times[0]) for track in needed.values())
-    last = min(int(track.times[-1]) for track in _lasting(needed))
+    last = min(int(track.times[-1]) for track in _lasting(needed, timestep * 1e9))
     trial = mapping.trial
     origin = first + round(trial.start * 1e9)
     period = timestep * 1e9
@@ -273,8 +275,8 @@ def _required(tracks: Tracks) -> Tracks:
     return needed | {key: track for key, track in tracks.items() if key[0] == "touch"}
 
 
-def _lasting(needed: Tracks) -> list[Track]:
-    """Tracks whose end is the end of the trial.
+def _lasting(needed: Tracks, step: float) -> list[Track]:
+    """Tracks whose end is the end of the trial, of control steps in ns.
 
     The last command is held, so the end of the commands does not end the trial. Nor does that of
     an encoder that was lost: another one has a sample more than a gap (``reach``) after its last.
@@ -287,7 +289,7 @@ def _lasting(needed: Tracks) -> list[Track]:
         if quantity != "commands"
         and (
             quantity != "joint_positions"
-            or end - int(track.times[-1]) <= resample.reach(track.times)
+            or end - int(track.times[-1]) <= resample.reach(track.times, step)[-1]
         )
     ]
 

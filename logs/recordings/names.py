@@ -112,8 +112,8 @@ def _sets(words: Mapping[str, str]) -> Mapping[str, frozenset[str]]:
 
 _QUANTITIES = _sets(
     {
-        "command": "command commands commanded cmd target targets desired des setpoint goal "
-        "reference ref action actions ctrl control qdes qref qcmd qtarget",
+        "command": "command commands cmd target targets desired des setpoint goal "
+        "reference ref action actions ctrl control qdes qref posdes posref",
         "velocity": "velocity velocities vel qd dq qvel qdot",
         "effort": "effort efforts torque torques tau",
         "sensor": "sensor sensors reading readings",
@@ -124,8 +124,8 @@ _QUANTITIES = _sets(
 
 _VECTORS = _sets(
     {
-        "orientation": "orientation quat quaternion rot rotation attitude q",
-        "angular_velocity": "angular gyro omega gyroscope w",
+        "orientation": "orientation ori quat quaternion rot rotation attitude q",
+        "angular_velocity": "angular ang gyro omega gyroscope w",
         "linear_velocity": "velocity vel linear twist v",
         "position": "position pos odom pose p",
     }
@@ -194,19 +194,19 @@ def unit_of_time(name: str) -> str:
 
 
 def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
-    groups: dict[str, dict[str, str]] = {}
+    groups: dict[tuple[str, bool], dict[str, str]] = {}
     for name in names:
         if match := _COMPONENT.fullmatch(name):
-            groups.setdefault(match["group"], {}).setdefault(match["axis"].lower(), name)
+            axis = match["axis"].lower()
+            groups.setdefault((match["group"], axis.isdecimal()), {}).setdefault(axis, name)
     found: dict[str, dict[str, tuple[str, ...]]] = {"base": {}, "imu": {}}
-    for group, axes in groups.items():
+    for (group, numbered), axes in groups.items():
         words = set(words_of(group)) or {"p"}
-        order = next((o for o in ("wxyz", "xyz", "0123", "012") if set(axes) == set(o)), "")
         for quantity, known in _VECTORS.items():
-            fitting = ("xyz", "012") if quantity != "orientation" else ("wxyz", "0123")
-            if order not in fitting or (order == fitting[1] and quantity not in _NUMBERED):
-                continue
-            if words & (known - {"q", "w"} if order == fitting[1] else known):
+            width = 4 if quantity == "orientation" else 3
+            order = "0123"[:width] if numbered else "wxyz"[-width:]
+            fitting = (known - {"q", "w"} if quantity in _NUMBERED else ()) if numbered else known
+            if words.intersection(fitting) and set(axes) == set(order):
                 body = "imu" if words & _OTHERS["imu"] else "base"
                 found[body].setdefault(quantity, tuple(axes[axis] for axis in order))
                 break

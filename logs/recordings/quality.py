@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.logs.recordings.mapping import NONE, Trial
 from selfmodel.logs.recordings.recording import Series
-from selfmodel.logs.recordings.resample import MAX_PERIOD_RATIO, Clocked
+from selfmodel.logs.recordings.resample import Clocked, reach
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
 
@@ -20,7 +20,7 @@ MAX_GAPS_IN_FACTS, MAX_GAPS_IN_NOTES = 100, 5
 
 
 class Gap(NamedTuple):
-    """Time between two messages longer than ``MAX_PERIOD_RATIO`` usual ones, s, from the start."""
+    """Time between two messages that is longer than ``resample.reach``, s, from the start."""
 
     start: float
     length: float
@@ -71,13 +71,15 @@ class Quality:
         }
 
 
-def quality(series: Series, clock: Clocked, origin: int, roles: tuple[str, ...]) -> Quality:
-    """Returns the quality of a topic in a trial that starts at ``origin``, ns."""
+def quality(
+    series: Series, clock: Clocked, origin: int, timestep: float, roles: tuple[str, ...]
+) -> Quality:
+    """Returns the quality of a topic in a trial that starts at ``origin``, ns, with steps in s."""
     usable = clock.times[clock.usable]
     times = np.unique(usable)
     periods = np.diff(times) / 1e9
     usual = float(np.median(periods)) if len(periods) else None
-    silent = periods > MAX_PERIOD_RATIO * (usual or 0.0)
+    silent = periods > reach(times, timestep * 1e9)[:-1] / 1e9
     return Quality(
         roles=roles,
         type=series.type,

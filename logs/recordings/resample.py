@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.logs.recordings.recording import Column, IntArray, Series
@@ -15,7 +16,10 @@ MAX_MEASUREMENT = 1e12
 """Magnitude above which a value is no measurement, in any unit; its square is finite."""
 
 MAX_PERIOD_RATIO = 1.5
-"""Minimum gap between two samples, in usual (median) periods."""
+"""Minimum gap between two samples, in usual periods; see ``reach``."""
+
+RATE_WINDOW = 25
+"""Number of periods whose median is the usual period around one of them: rates may change."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +103,9 @@ def track(clock: Clocked, columns: Sequence[Column], numbers: slice) -> Track:
 
 # ---------------------------------------------------------------- interpolation
 
-Method = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
-"""Interpolation of samples at ``(m,)`` times, ``(m, width)``, at the times of the steps, within a
-limit (``reach``): ``(steps, width)``."""
+Method = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
+"""Interpolation of samples at ``(m,)`` times, ``(m, width)``, at the times of the steps, within
+limits (``reach``): ``(steps, width)``."""
 
 
 def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: int) -> FloatArray:
@@ -114,17 +118,31 @@ def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: 
         return np.full((len(steps), width), np.nan)
     # float64 represents nanoseconds exactly for a hundred days.
     times = (track.times - origin).astype(np.float64)
-    return method(times, track.values, steps.astype(np.float64), reach(times))
+    return method(times, track.values, steps.astype(np.float64), reach(times, float(steps[1])))
 
 
-def reach(times: FloatArray | IntArray) -> float:
-    """Returns the maximum distance of two samples between which a series is interpolated."""
-    return MAX_PERIOD_RATIO * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+def reach(times: FloatArray | IntArray, step: float = 0.0) -> FloatArray:
+    """Returns the maximum distance after each sample over which a series is interpolated, ``(m,)``.
+
+    It is ``MAX_PERIOD_RATIO`` usual periods, and at least a control step. The usual period is the
+    longest of three medians: of all periods, and of those before and after the sample.
+    """
+    periods = np.diff(times).astype(np.float64)
+    if not len(periods):
+        return np.zeros(len(times))
+    usual = np.full(len(periods), np.median(periods))
+    if (last := len(periods) - RATE_WINDOW) >= 0:
+        medians = np.median(sliding_window_view(periods, RATE_WINDOW), axis=1)
+        place = np.arange(len(periods))
+        for first in (np.minimum(place, last), np.maximum(place - RATE_WINDOW + 1, 0)):
+            usual = np.maximum(usual, medians[first])
+    limits = np.maximum(MAX_PERIOD_RATIO * usual, step)
+    return np.append(limits, limits[-1])
 
 
-def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+def linear(times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray) -> FloatArray:
     """Returns linearly interpolated values; exactly the sample at the time of a sample."""
-    before, after, share, valid = _bracket(times, at, limit)
+    before, after, share, valid = _bracket(times, at, limits)
     result = np.full((len(at), values.shape[1]), np.nan)
     low, high = values[before[valid]], values[after[valid]]
     part = share[valid, np.newaxis]
@@ -132,14 +150,14 @@ def linear(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) 
     return result
 
 
-def angles(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+def angles(times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray) -> FloatArray:
     """Returns angles interpolated along the shorter arc; a jump above pi is a wrap-around."""
-    return linear(times, np.unwrap(values, axis=0), at, limit)
+    return linear(times, np.unwrap(values, axis=0), at, limits)
 
 
-def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
+def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray) -> FloatArray:
     """Returns unit quaternions interpolated along the shortest arc, of either sign."""
-    before, after, share, valid = _bracket(times, at, limit)
+    before, after, share, valid = _bracket(times, at, limits)
     result = np.full((len(at), 4), np.nan)
     low, high = values[before[valid]], values[after[valid]]
     cosine = np.sum(low * high, axis=1, keepdims=True)
@@ -161,41 +179,41 @@ def slerp(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -
 
 
 def slerp_or_sample(
-    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+    times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray
 ) -> FloatArray:
     """Returns orientations as ``slerp``, with the bits of the sample at the time of a sample."""
     before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, None)
     exact = times[before] == at
-    return np.where(exact[:, np.newaxis], values[before], slerp(times, values, at, limit))
+    return np.where(exact[:, np.newaxis], values[before], slerp(times, values, at, limits))
 
 
-def hold(times: FloatArray, values: FloatArray, at: FloatArray, limit: float) -> FloatArray:
-    """Returns the last sample before each step (zero-order hold), of an age up to the limit."""
+def hold(times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray) -> FloatArray:
+    """Returns the last sample before each step (zero-order hold), of an age up to its limit."""
     before = np.searchsorted(times, at, side="right") - 1
     result = np.full((len(at), values.shape[1]), np.nan)
     held = before >= 0
-    held[held] = at[held] - times[before[held]] <= limit
+    held[held] = at[held] - times[before[held]] <= limits[before[held]]
     result[held] = values[before[held]]
     return result
 
 
 def hold_forever(
-    times: FloatArray, values: FloatArray, at: FloatArray, _limit: float
+    times: FloatArray, values: FloatArray, at: FloatArray, _limits: FloatArray
 ) -> FloatArray:
     """Returns the last sample before each step, of any age: a command stands until the next."""
-    return hold(times, values, at, np.inf)
+    return hold(times, values, at, np.full(len(times), np.inf))
 
 
 def hold_outside_gaps(
-    times: FloatArray, values: FloatArray, at: FloatArray, limit: float
+    times: FloatArray, values: FloatArray, at: FloatArray, limits: FloatArray
 ) -> FloatArray:
     """Returns the last sample before each step where ``linear`` has one."""
-    unknown = np.isnan(linear(times, values, at, limit))
-    return np.where(unknown, np.nan, hold(times, values, at, np.inf))
+    unknown = np.isnan(linear(times, values, at, limits))
+    return np.where(unknown, np.nan, hold_forever(times, values, at, limits))
 
 
 def _bracket(
-    times: FloatArray, at: FloatArray, limit: float
+    times: FloatArray, at: FloatArray, limits: FloatArray
 ) -> tuple[IndexArray, IndexArray, FloatArray, BoolArray]:
     """Samples before and after each time, the fraction between them, and its validity."""
     last = len(times) - 1
@@ -205,7 +223,7 @@ def _bracket(
     after = np.minimum(before + 1, last)
     period = times[after] - times[before]
     exact = inside & (times[before] == at)
-    valid = exact | (inside & (after > before) & (period <= limit))
+    valid = exact | (inside & (after > before) & (period <= limits[before]))
     share = np.zeros(len(at))
     between = valid & ~exact
     share[between] = (at[between] - times[before[between]]) / period[between]

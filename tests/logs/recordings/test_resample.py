@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -20,11 +21,18 @@ def series(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def gaps(times: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Where nothing is known, in the plainest words."""
-    limit = 1.5 * np.median(np.diff(times))
+    periods = np.diff(times)
     unknown = []
     for t in at:
         before, after = times[times <= t], times[times >= t]
-        unknown.append(not len(before) or not len(after) or bool(after[0] - before[-1] > limit))
+        if not len(before) or not len(after) or after[0] == before[-1]:
+            unknown.append(not len(before) or not len(after))
+            continue
+        k, usual = len(before) - 1, [np.median(periods)]
+        if len(periods) >= 25:
+            usual += [np.median(periods[k:][:25] if k + 25 <= len(periods) else periods[-25:])]
+            usual += [np.median(periods[: k + 1][-25:] if k >= 24 else periods[:25])]
+        unknown.append(bool(after[0] - before[-1] > 1.5 * max(usual)))
     return np.array(unknown)
 
 
@@ -75,6 +83,26 @@ def test_orientations_take_the_shortest_arc_whatever_their_signs(data: tuple, se
         expected = oracle.as_quat(scalar_first=True)
         # At half a turn between two, either way round is the shortest.
         assert np.allclose(np.abs(np.sum(result[~unknown] * expected, axis=1)), 1)
+
+
+RATES = {
+    "first slow": [20] * 30 + [5] * 200,
+    "then slow": [5] * 200 + [20] * 30,
+    "two drivers": [2, 6] * 60,
+}
+
+
+@pytest.mark.parametrize("periods", RATES.values(), ids=RATES)
+def test_nothing_is_a_gap_within_its_own_rate(periods: list[int]):
+    lost = 80  # where the rate is the usual one: two samples are missing there
+    times = np.cumsum([0, *periods[:lost], 3 * max(periods[lost - 5 : lost]), *periods[lost:]])
+    silent = np.diff(times) > reach(times.astype(float))[:-1]
+    assert np.flatnonzero(silent).tolist() == [lost]
+
+
+def test_samples_within_a_control_step_are_no_gap():
+    times = np.cumsum([0, 2, 2, 2, 6, 2, 2, 2, 2, 12, 2, 2]).astype(float)
+    assert np.flatnonzero(np.diff(times) > reach(times, 10.0)[:-1]).tolist() == [8]
 
 
 def test_a_measurement_that_is_held_grows_too_old():

@@ -9,7 +9,7 @@ from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.logs.recordings.names import likeness, matched
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.robot.robot import Robot
-from tests.logs.recordings.bags import T0, joint_state, write_bag
+from tests.logs.recordings.bags import T0, joint_state, made, write_bag
 from tests.logs.recordings.conftest import imported, recorded
 from tests.logs.recordings.table_files import HINGES, write_csv, write_npz
 
@@ -88,6 +88,9 @@ def suggestion(path: Path, robot: Robot) -> str:
         ("position.{}", "velocity.{}", "command.{}"),
         ("{}_pos", "{}_vel", "{}_target"),
         ("q_{}", "dq_{}", "q_des_{}"),
+        ("{}.q", "{}.dq", "qdes_{}"),
+        ("pos_{}", "vel_{}", "posref.{}"),
+        ("{}/position", "{}/velocity", "lowcmd/{}"),
         ("joint_{}_angle", "{}.qd", "{}.cmd"),
     ],
 )
@@ -106,6 +109,45 @@ def test_usual_names_are_mapped(
         assert mapping.joints.links[hinge].name == position.format(hinge)
         assert mapping.joints.velocities[hinge] == velocity.format(hinge)
         assert mapping.commands.links[hinge].name == command.format(hinge)
+
+
+@pytest.mark.parametrize(
+    ("form", "axes", "body"),
+    [
+        ("q{}", "wxyz", "base"),
+        ("orientation_{}", "wxyz", "base"),
+        ("/imu/orientation/{}", "wxyz", "imu"),
+        ("imu_quat[{}]", "0123", "imu"),
+    ],
+)
+def test_a_quaternion_is_known_by_its_name(
+    form: str, axes: str, body: str, biped: Robot, tmp_path: Path
+):
+    joints = [f"q_{k}" for k in range(4)]  # beside which it is none of them
+    quaternion = [form.format(axis) for axis in axes]
+    found = {name: np.zeros(3) for name in ["time", *joints, "x", "y", "z", *quaternion[::-1]]}
+
+    text = suggestion(write_npz(tmp_path / "t.npz", found), biped)
+
+    assert [f'"{joint}"' in text for joint in joints] == [True] * 4
+    listed = ", ".join(f'"{name}"' for name in quaternion)
+    check = "  # CHECK: w, x, y, z" if axes == "0123" else ""
+    assert f"orientation = [{listed}]{check}\n" in text.partition(f"[{body}]")[2]
+    assert 'position = ["x", "y", "z"]' in text
+
+
+def test_a_contact_is_none_without_a_word_for_it(biped: Robot, tmp_path: Path):
+    row = np.zeros(3)
+    names = ["time", "qdes_left", "u_left", "right_foot_target", "left_foot_force"]
+    text = suggestion(write_csv(tmp_path / "t.csv", dict.fromkeys(names, row)), biped)
+    assert '[touch.left_touch]\ncolumn = "left_foot_force"' in text
+    assert "# No column is similar to right_touch" in text
+
+    numbers = [f"/{name}" for name in ("cmd/left_foot", "left_controller", "right_contact")]
+    items = [(name, T0, made("std_msgs/msg/Float64")) for name in numbers]
+    text = suggestion(write_bag(tmp_path / "bag", items), biped)
+    assert '[touch.right_touch]\ntopic = "/right_contact"' in text
+    assert "# No topic is similar to left_touch" in text
 
 
 def test_numbered_columns_are_mapped_in_order_and_marked(biped: Robot, tmp_path: Path):

@@ -222,7 +222,7 @@ def test_rows_are_sorted_and_those_without_a_time_or_number_are_left_out(
         (("q_3", "q_9"), "MAP.toml:14: unknown column of the table 'q_9': did you mean q_"),
         (('left_hip_y = "qd_1"', 'knee = "qd_1"'), "unknown hinge of the robot 'knee'"),
         (('"base_pos_x", ', ""), "position must be a list of length 3"),
-        (('[time]\ncolumn = "time"\nunit = "s"', ""), r"remove it, or add \[time\]"),
+        (('[time]\ncolumn = "time"\nunit = "s"', ""), r"a table needs \[time\]"),
         (('unit = "s"', 'unit = "min"'), "unknown unit 'min'"),
         (
             ("[commands]\n", '[commands]\ntopic = "/x"\n'),
