@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -69,11 +70,12 @@ def read_in_child(request: Message) -> Message:
     path, wanted = Path(request.header["path"]), request.header["topics"]
     topics: dict[str, _Topic] = {}
     files = bag_files(path)
+    place = count()
     for file in files:
         with _explained(file):
             for item in _stored(file):
                 columns = () if wanted is None else wanted.get(item.topic)
-                topics.setdefault(item.topic, _Topic()).add(item, columns)
+                topics.setdefault(item.topic, _Topic()).add(item, next(place), columns)
     series = {name: topic.series() for name, topic in topics.items()}
     return packed(Recording(series, {file.name: file_digest(file) for file in files}))
 
@@ -167,7 +169,7 @@ class _BoundedReader(io.BufferedReader):
 
 def _mcap(file: Path) -> Iterator[_Stored]:
     types, topics = {0: ("", "")}, {}
-    count, claimed = 0, None
+    found, claimed = 0, None
     with _BoundedReader(file) as opened:
         # No record is larger than its file.
         reader = StreamReader(opened, validate_crcs=True, record_size_limit=opened.size)
@@ -180,14 +182,14 @@ def _mcap(file: Path) -> Iterator[_Stored]:
                     topics[record.id] = _Stored(record.topic, kind, record.message_encoding, text)
                     yield topics[record.id]
                 case mcap.records.Message():
-                    count += 1
+                    found += 1
                     topic = topics[record.channel_id]
                     yield topic._replace(time=record.log_time, data=record.data)
                 case mcap.records.Statistics():
                     claimed = record.message_count
         # The library skips records of a damaged type: their messages would be missing silently.
-        if claimed not in (None, count):
-            raise ValueError(f"its statistics have {claimed} messages, its records {count}")
+        if claimed not in (None, found):
+            raise ValueError(f"its statistics have {claimed} messages, its records {found}")
         if opened.read(1):
             raise ValueError("bytes follow its end")
 
@@ -233,14 +235,14 @@ def _ros1(file: Path) -> Iterator[_Stored]:
             for c in reader.connections
         }
         yield from topics.values()
-        count = 0
+        found = 0
         for connection, time, data in reader.messages():
-            count += 1
+            found += 1
             yield topics[connection.id]._replace(time=time, data=data)
         # The library reads what the index has; the chunks have counts of their own.
         claimed = sum(sum(chunk.connection_counts.values()) for chunk in reader.chunk_infos)
-        if claimed != count or len(reader.chunks) != len(reader.chunk_infos):
-            raise ValueError(f"its chunks have {claimed} messages, its index {count}")
+        if claimed != found or len(reader.chunks) != len(reader.chunk_infos):
+            raise ValueError(f"its chunks have {claimed} messages, its index {found}")
 
 
 _FORMATS: Mapping[bytes, tuple[Callable[[Path], Iterator[_Stored]], str]] = MappingProxyType(
@@ -281,7 +283,8 @@ class _Topic:
 
     Attributes:
         types: Message types, one in nearly every bag.
-        times: Time stamp (0 without one) and log time of each decoded message, ns.
+        times: Time stamp (0 without one) and log time of each decoded message, ns, and its place
+            in the bag.
         layouts: Indices and rows of these by the names in them, nearly always the same.
         refused: Numbers of messages left out, by reason.
         listed: Columns to decode of the messages after the first.
@@ -289,12 +292,12 @@ class _Topic:
 
     types: dict[str, None] = field(default_factory=dict)
     count: int = 0
-    times: list[tuple[int, int]] = field(default_factory=list)
+    times: list[tuple[int, int, int]] = field(default_factory=list)
     layouts: dict[tuple[str, ...], list[tuple[int, "FloatArray"]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
     listed: tuple[str, ...] = ()
 
-    def add(self, item: _Stored, columns: Collection[str] | None) -> None:
+    def add(self, item: _Stored, place: int, columns: Collection[str] | None) -> None:
         """Adds a message, or an announcement; ``columns`` of it, all if empty, or None."""
         package, _, name = item.type.rpartition("/")
         kind = item.type if package.endswith("/msg") else f"{package}/msg/{name}"  # old bags
@@ -320,7 +323,7 @@ class _Topic:
         if is_first:
             self.listed = tuple(name for name in columns if name in set(names))
         self.layouts.setdefault(names, []).append((len(self.times), rows))
-        self.times.append((stamp, item.time))
+        self.times.append((stamp, item.time, place))
 
     def series(self) -> Series:
         """Returns the messages as arrays; a column may be in messages of several layouts."""
@@ -336,8 +339,8 @@ class _Topic:
             order = np.argsort(index)
             values = np.concatenate([part.values for part in some])
             columns[name] = Column(index[order], values[order])
-        stamps, logged = np.array(self.times, dtype=np.int64).reshape(-1, 2).T
+        times = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
         kind = " and ".join(self.types)
         is_table = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
         names = tuple(parts)
-        return Series(kind, self.count, stamps, logged, names, columns, self.refused, is_table)
+        return Series(kind, self.count, *times, names, columns, self.refused, is_table)

@@ -1,7 +1,7 @@
 """Import of a recording: trajectory and quality from a bag or table, a mapping and a robot."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
+from selfmodel.errors import InputError
 from selfmodel.logs.recordings import resample
 from selfmodel.logs.recordings.bags import read_bag
 from selfmodel.logs.recordings.mapping import TIMES, Trial
@@ -17,6 +18,7 @@ from selfmodel.logs.recordings.mapping_file import RecordingMapping, check_recor
 from selfmodel.logs.recordings.quality import Quality, notes, quality
 from selfmodel.logs.recordings.recording import TABLE, IntArray, Recording
 from selfmodel.logs.recordings.resample import NOTHING, Clocked, Method, Track, at_steps
+from selfmodel.logs.recordings.runs import Run, runs_of
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
@@ -75,18 +77,30 @@ class ImportedTrial:
         }
 
 
-def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> ImportedTrial:
+def import_recording(
+    path: Path, mapping: RecordingMapping, robot: Robot, run: int | None = None
+) -> ImportedTrial:
     """Returns the trial in a bag or a table of the robot that a mapping names.
 
+    Args:
+        path: The recording.
+        mapping: Mapping of its topics or columns.
+        robot: Robot that the mapping names.
+        run: Number of the run, from 1, of a recording whose clock restarts.
+
     Raises:
-        InputError: The recording is damaged or cannot be read, or the mapping does not fit it or
-            the robot.
+        InputError: The recording is damaged or cannot be read, the mapping does not fit it or the
+            robot, or the clock restarts and there is no such run.
     """
     check_robot(mapping, robot.anatomy)
     recording = _read(path, mapping)
     check_recording(mapping, recording)
     clock = "column" if mapping.trial.time else mapping.trial.clock
     clocks = _clocks(mapping, recording, clock)
+    runs = runs_of(recording, clocks)
+    if len(runs) > 1 or run is not None:
+        recording = _chosen(path, runs, run)
+        clocks = _clocks(mapping, recording, clock)
     tracks = _tracks(mapping, recording, clocks)
     origin, steps = _steps(mapping, tracks, robot.control_timestep)
     try:
@@ -108,6 +122,8 @@ def import_recording(path: Path, mapping: RecordingMapping, robot: Robot) -> Imp
         for topic, names in roles.items()
     }
     warnings = notes(mapping.trial, trajectory, qualities, robot)
+    if len(runs) > 1:
+        warnings = (f"the clock restarts: this is run {run} of {_lengths(runs)}", *warnings)
     return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, warnings)
 
 
@@ -164,6 +180,24 @@ def _read(path: Path, mapping: RecordingMapping) -> Recording:
     if time.column not in names:
         raise mapping.unknown(("time", "column"), "column of the table", time.column, names)
     return table
+
+
+def _chosen(path: Path, runs: Sequence[Run], run: int | None) -> Recording:
+    """The part of a recording that the user has chosen."""
+    if run is not None and 1 <= run <= len(runs):
+        return runs[run - 1].recording
+    if len(runs) == 1:
+        raise InputError(f"{path}: its clock does not restart: leave out --run, got --run {run}")
+    given = "" if run is None else f", got --run {run}"
+    raise InputError(
+        f"{path}: its clock restarts, so there are {_lengths(runs)}: choose one, such as "
+        f"--run 1{given}"
+    )
+
+
+def _lengths(runs: Sequence[Run]) -> str:
+    seconds = ", ".join(f"{run.seconds:.3f}" for run in runs)
+    return f"{len(runs)} runs of {seconds} s"
 
 
 def _clocks(mapping: RecordingMapping, recording: Recording, clock: str) -> dict[str, Clocked]:

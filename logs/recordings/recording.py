@@ -42,6 +42,7 @@ class Series:
         count: Number of messages or rows.
         stamps: Time stamps of the decoded messages, ``(n,)`` ns; 0 without a stamp.
         logged: Log times, ``(n,)`` ns; the time column of a table.
+        places: Places of these messages among all of the recording, ``(n,)``, increasing.
         names: Names of all columns.
         columns: Columns by name, those that were read; each message may have other names.
         refused: Numbers of messages left out, by reason.
@@ -52,6 +53,7 @@ class Series:
     count: int
     stamps: IntArray
     logged: IntArray
+    places: IntArray
     names: tuple[str, ...]
     columns: Mapping[str, Column]
     refused: Mapping[str, int]

@@ -103,6 +103,7 @@ def read_in_child(request: Message) -> Message:
         count=count,
         stamps=np.zeros_like(times),
         logged=times,
+        places=np.arange(len(times)),
         names=tuple(names),
         columns={
             name: Column(np.arange(len(rows)), column[rows, np.newaxis])

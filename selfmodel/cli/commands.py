@@ -280,6 +280,7 @@ class ImportRecording(Command):
     recording: Path
     out: Path | None = None
     mapping: Path | None = None
+    run: int | None = None
     suggest: bool = False
     robot: str | None = None
 

@@ -19,9 +19,9 @@ def import_(options: ImportRecording) -> None:
     """Import a recording of a robot as a trial log: a bag of ROS, without ROS, or a table."""
     source, out, name = options.recording, options.out, options.robot
     if options.suggest:
-        if name is None or out or options.mapping or options.as_json:
+        if name is None or out or options.mapping or options.run or options.as_json:
             raise InputError(
-                "--suggest needs --robot ROBOT, and excludes --out, --mapping and --json"
+                "--suggest needs --robot ROBOT, and excludes --out, --mapping, --run and --json"
             )
         robot, is_file = arguments.recorded_robot(name, None), arguments.is_model(name)
         text = suggest.suggest(source, robot, name, with_timestep=is_file)
@@ -43,7 +43,7 @@ def import_(options: ImportRecording) -> None:
             controller = arguments.read_controller(folder / mapping.trial.controller, robot)
         except InputError as error:
             raise mapping.error(("controller",), str(error)) from error
-    recording = import_recording(source, mapping, robot)
+    recording = import_recording(source, mapping, robot, options.run)
     write_recording(out, robot, recording, mapping, controller)
     if options.as_json:
         facts = {

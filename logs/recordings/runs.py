@@ -1,0 +1,92 @@
+"""Runs of a recording: its parts between restarts of the clock, each with times that increase."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from selfmodel.logs.recordings.recording import Column, IntArray, Recording, Series
+from selfmodel.logs.recordings.resample import Clocked
+
+_SUCCESSION = 10
+"""Samples in order, all before the latest earlier one, with which a run begins: fewer are late."""
+
+_MIN_RETURN = 10**9
+"""Time by which a clock goes back that restarts, ns, or half a run if that is less."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Part of a recording, and its length, s."""
+
+    recording: Recording
+    seconds: float
+
+
+def runs_of(recording: Recording, clocks: Mapping[str, Clocked]) -> list[Run]:
+    """Returns the runs of a recording, in order, by the clocks of the topics that are used.
+
+    A topic with too few messages to show a restart has it where the first of the others has it.
+    """
+    found = {topic: _restarts(recording.series[topic], clock) for topic, clock in clocks.items()}
+    most = max(map(len, found.values()))
+    complete = [borders for borders in found.values() if len(borders) == most]
+    first = np.min(complete, axis=0)
+    parts: list[dict[str, Series]] = [{} for _ in range(most + 1)]
+    lengths = np.zeros(most + 1)
+    for topic, clock in clocks.items():
+        series = recording.series[topic]
+        borders = found[topic] if len(found[topic]) == most else first
+        edges = [0, *np.searchsorted(series.places, borders).tolist(), len(series.places)]
+        for number, (start, end) in enumerate(pairwise(edges)):
+            parts[number][topic] = _part(series, start, end)
+            times = clock.times[start:end][clock.usable[start:end]]
+            lengths[number] = max(lengths[number], np.ptp(times) / 1e9 if len(times) else 0.0)
+    return [
+        Run(replace(recording, series={**recording.series, **series}), float(seconds))
+        for series, seconds in zip(parts, lengths, strict=True)
+    ]
+
+
+def _restarts(series: Series, clock: Clocked) -> IntArray:
+    """Places in the recording of the messages of a topic with which its clock begins again."""
+    usable = np.flatnonzero(clock.usable)
+    return series.places[usable[[*_restarts_of(clock.times[usable])]]]
+
+
+def _restarts_of(times: IntArray) -> Iterator[int]:
+    if len(times) <= _SUCCESSION:
+        return
+    forward = np.diff(times) >= 0
+    in_order = sliding_window_view(forward, _SUCCESSION - 1).all(axis=1)
+    start = 0
+    for place in np.flatnonzero(~forward[: len(in_order) - 1] & in_order[1:]) + 1:
+        # Without the sample before it, which may be a single wrong one.
+        before = times[start : place - 1]
+        if not len(before):
+            continue
+        latest = before.max()
+        back = min(_MIN_RETURN, (latest - before.min()) // 2)
+        returns = times[place] < latest - back and times[place + _SUCCESSION - 1] < latest
+        # Parts in the wrong order, of which the second ends as the first begins, are sorted.
+        if returns and not -_MIN_RETURN < times[place:].max() - before.min() < 0:
+            yield int(place)
+            start = place
+
+
+def _part(series: Series, start: int, end: int) -> Series:
+    """Messages of a topic from one to another, not included."""
+    columns = {}
+    for name, column in series.columns.items():
+        first, last = np.searchsorted(column.index, [start, end])
+        columns[name] = Column(column.index[first:last] - start, column.values[first:last])
+    return replace(
+        series,
+        count=end - start,
+        stamps=series.stamps[start:end],
+        logged=series.logged[start:end],
+        places=series.places[start:end],
+        columns=columns,
+    )
