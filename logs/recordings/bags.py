@@ -5,9 +5,10 @@ a ROS 1 bag. Checksums and counts of messages are verified where a file has some
 reads the files, whose content may be hostile.
 """
 
+import hashlib
 import io
 import re
-import shlex
+import shutil
 import sqlite3
 import tempfile
 from collections import Counter
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import mcap.records
 import numpy as np
 import zstandard
+from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
 from mcap.stream_reader import StreamReader
 from rosbags import rosbag1
 from ruamel.yaml import YAML
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     from selfmodel.arrays import FloatArray
 
 _EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
+_MCAP_MAGIC = b"\x89MCAP0\r\n"
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 
 
@@ -70,14 +73,14 @@ def read_in_child(request: Message) -> Message:
     path, wanted = Path(request.header["path"]), request.header["topics"]
     topics: dict[str, _Topic] = {}
     files = bag_files(path)
-    place = count()
+    place, found = count(), _Found()
     for file in files:
         with _explained(file):
-            for item in _stored(file):
+            for item in _stored(file, found):
                 columns = () if wanted is None else wanted.get(item.topic)
                 topics.setdefault(item.topic, _Topic()).add(item, next(place), columns)
     series = {name: topic.series() for name, topic in topics.items()}
-    return packed(Recording(series, {file.name: file_digest(file) for file in files}))
+    return packed(Recording(series, found.digests, tuple(found.notes)))
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -128,21 +131,30 @@ class _Stored(NamedTuple):
     data: bytes | None = None
 
 
-def _stored(file: Path) -> Iterator[_Stored]:
+@dataclass(frozen=True)
+class _Found:
+    """SHA-256 of the files of a bag by name, and warnings about them."""
+
+    digests: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
     """Yields topics and messages of a file in any format, compressed or not."""
     with file.open("rb") as opened:
         head = opened.read(16)
-        opened.seek(0)
-        if head.startswith(messages.ZSTD_MAGIC):
-            with tempfile.TemporaryDirectory() as folder:
-                plain = Path(folder, file.stem)
-                with plain.open("wb") as target:
-                    zstandard.ZstdDecompressor().copy_stream(opened, target)
-                yield from _stored(plain)
-            return
+    if head.startswith(messages.ZSTD_MAGIC):
+        with tempfile.TemporaryDirectory() as folder, _HashedReader(file) as source:
+            plain = Path(folder, file.stem)
+            with plain.open("wb") as target:
+                zstandard.ZstdDecompressor().copy_stream(source, target)
+            yield from _stored(plain, found)
+            del found.digests[plain.name]
+            found.digests[file.name] = source.hexdigest()
+        return
     for magic, (read, _) in _FORMATS.items():
         if head.startswith(magic):
-            for item in read(file):
+            for item in read(file, found):
                 if not (isinstance(item.time, int) and 0 <= item.time < MAX_TIME):
                     raise ValueError(f"a message has the log time {item.time!r} ns")
                 yield item
@@ -155,54 +167,94 @@ def _text(encoding: str, definition: bytes) -> str:
     return definition.decode(errors="replace") if encoding in ("ros2msg", "ros1msg") else ""
 
 
-class _BoundedReader(io.BufferedReader):
-    """File whose reads are bounded by its size: a damaged length is more than any memory."""
+class _HashedReader(io.BufferedReader):
+    """File that is read once, from start to end, and hashed on the way.
+
+    Its reads are bounded by its size: a damaged length is more than any memory.
+    """
 
     def __init__(self, file: Path) -> None:
         super().__init__(io.FileIO(file))
         self.size = file.stat().st_size
+        self._hash = hashlib.sha256()
 
     def read(self, size: int | None = -1, /) -> bytes:
         """Reads that many bytes, or the rest."""
-        return super().read(-1 if size is None or size > self.size else size)
+        data = super().read(-1 if size is None or size > self.size else size)
+        self._hash.update(data)
+        return data
+
+    def hexdigest(self) -> str:
+        """Returns the SHA-256 of the file, after its rest."""
+        while self.read(2**20):
+            pass
+        return self._hash.hexdigest()
 
 
-def _mcap(file: Path) -> Iterator[_Stored]:
+def _mcap(file: Path, found: _Found) -> Iterator[_Stored]:
     types, topics = {0: ("", "")}, {}
-    found, claimed = 0, None
-    with _BoundedReader(file) as opened:
+    number, claimed = 0, None
+    with _HashedReader(file) as opened:
         # No record is larger than its file.
         reader = StreamReader(opened, validate_crcs=True, record_size_limit=opened.size)
-        for record in reader.records:
-            match record:
-                case mcap.records.Schema():
-                    types[record.id] = record.name, _text(record.encoding, record.data)
-                case mcap.records.Channel():
-                    kind, text = types.get(record.schema_id, ("", ""))
-                    topics[record.id] = _Stored(record.topic, kind, record.message_encoding, text)
-                    yield topics[record.id]
-                case mcap.records.Message():
-                    found += 1
-                    topic = topics[record.channel_id]
-                    yield topic._replace(time=record.log_time, data=record.data)
-                case mcap.records.Statistics():
-                    claimed = record.message_count
-        # The library skips records of a damaged type: their messages would be missing silently.
-        if claimed not in (None, found):
-            raise ValueError(f"its statistics have {claimed} messages, its records {found}")
-        if opened.read(1):
-            raise ValueError("bytes follow its end")
-
-
-def _sqlite(file: Path) -> Iterator[_Stored]:
-    for suffix in ("-wal", "-journal"):
-        beside = file.with_name(file.name + suffix)
-        if beside.is_file() and beside.stat().st_size:
-            raise InputError(
-                f"{file}: its recorder did not close it, and {beside.name} has data that are not "
-                f"in it yet: merge both with `sqlite3 {shlex.quote(str(file))} "
-                f"'PRAGMA wal_checkpoint(TRUNCATE)'`"
+        try:
+            for record in reader.records:
+                match record:
+                    case mcap.records.Schema():
+                        types[record.id] = record.name, _text(record.encoding, record.data)
+                    case mcap.records.Channel():
+                        kind, text = types.get(record.schema_id, ("", ""))
+                        encoding = record.message_encoding
+                        topics[record.id] = _Stored(record.topic, kind, encoding, text)
+                        yield topics[record.id]
+                    case mcap.records.Message():
+                        number += 1
+                        topic = topics[record.channel_id]
+                        yield topic._replace(time=record.log_time, data=record.data)
+                    case mcap.records.Statistics():
+                        claimed = record.message_count
+            if opened.read(1):
+                raise ValueError("bytes follow its end")
+        except (EndOfFile, RecordLengthLimitExceeded) as failure:
+            if _is_closed(file) or (isinstance(failure, EndOfFile) and opened.read(1)):
+                raise
+            found.notes.append(
+                f"{file.name} has no end, as one that is still being recorded, or whose recorder "
+                f"was stopped: {number} messages are read, up to the last whole one"
             )
+        # The library skips records of a damaged type: their messages would be missing silently.
+        if claimed not in (None, number):
+            raise ValueError(f"its statistics have {claimed} messages, its records {number}")
+        found.digests[file.name] = opened.hexdigest()
+
+
+def _is_closed(file: Path) -> bool:
+    """Whether a file of MCAP ends as it begins."""
+    with file.open("rb") as opened:
+        opened.seek(-len(_MCAP_MAGIC), io.SEEK_END)
+        return opened.read() == _MCAP_MAGIC
+
+
+def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
+    beside = [file.with_name(file.name + suffix) for suffix in ("-wal", "-journal")]
+    files = [file, *(path for path in beside if path.is_file() and path.stat().st_size)]
+    # SQLite reads from many places.
+    found.digests.update({path.name: file_digest(path) for path in files})
+    if len(files) == 1:
+        yield from _rows(file)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy, *_ = [Path(shutil.copyfile(path, Path(folder, path.name))) for path in files]
+        with closing(sqlite3.connect(copy)) as database:
+            database.execute("PRAGMA journal_mode=DELETE").fetchone()  # merges the journal
+        yield from _rows(copy)
+    found.notes.append(
+        f"{file.name} was not closed by its recorder: it was read together with {files[1].name}, "
+        f"up to the last transaction that is complete"
+    )
+
+
+def _rows(file: Path) -> Iterator[_Stored]:
     # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
@@ -228,29 +280,32 @@ def _sqlite(file: Path) -> Iterator[_Stored]:
             yield topics[number]._replace(time=time, data=bytes(memoryview(data)))
 
 
-def _ros1(file: Path) -> Iterator[_Stored]:
+def _ros1(file: Path, found: _Found) -> Iterator[_Stored]:
+    found.digests[file.name] = file_digest(file)  # the library reads from many places
     with rosbag1.Reader(file) as reader:
         topics = {
             c.id: _Stored(c.topic, c.msgtype, messages.ROS1, c.msgdef.data)
             for c in reader.connections
         }
         yield from topics.values()
-        found = 0
+        number = 0
         for connection, time, data in reader.messages():
-            found += 1
+            number += 1
             yield topics[connection.id]._replace(time=time, data=data)
         # The library reads what the index has; the chunks have counts of their own.
         claimed = sum(sum(chunk.connection_counts.values()) for chunk in reader.chunk_infos)
-        if claimed != found or len(reader.chunks) != len(reader.chunk_infos):
-            raise ValueError(f"its chunks have {claimed} messages, its index {found}")
+        if claimed != number or len(reader.chunks) != len(reader.chunk_infos):
+            raise ValueError(f"its chunks have {claimed} messages, its index {number}")
 
 
-_FORMATS: Mapping[bytes, tuple[Callable[[Path], Iterator[_Stored]], str]] = MappingProxyType(
-    {
-        b"\x89MCAP0\r\n": (_mcap, "mcap recover"),
-        b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
-        b"#ROSBAG V": (_ros1, "rosbag reindex"),
-    }
+_FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[_Stored]], str]] = (
+    MappingProxyType(
+        {
+            _MCAP_MAGIC: (_mcap, "mcap recover"),
+            b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
+            b"#ROSBAG V": (_ros1, "rosbag reindex"),
+        }
+    )
 )
 """Readers by the first bytes of a file, and tools that recover its intact part."""
 

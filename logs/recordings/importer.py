@@ -1,7 +1,8 @@
 """Import of a recording: trajectory and quality from a bag or table, a mapping and a robot."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,10 +122,11 @@ def import_recording(
         )
         for topic, names in roles.items()
     }
-    warnings = notes(mapping.trial, trajectory, qualities, robot)
+    warnings = [*recording.notes, *_no_measurements(mapping, recording)]
     if len(runs) > 1:
-        warnings = (f"the clock restarts: this is run {run} of {_lengths(runs)}", *warnings)
-    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, warnings)
+        warnings.append(f"the clock restarts: this is run {run} of {_lengths(runs)}")
+    warnings += notes(mapping.trial, trajectory, qualities, robot)
+    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, tuple(warnings))
 
 
 def write_recording(
@@ -234,6 +236,27 @@ def _tracks(
             rounding = _ROUNDING if _keeps_samples(mapping.trial, body) else 0.0
             tracks[f"{body}_orientation", ""] = _normalised(orientation, rounding)
     return tracks
+
+
+def _no_measurements(mapping: RecordingMapping, recording: Recording) -> Iterator[str]:
+    """Notes on numbers that cannot be measurements, and are as missing as NaN."""
+    used = dict.fromkeys(
+        (place.topic, name, place.numbers)
+        for place in mapping.places.values()
+        for name in place.columns
+    )
+    counts: dict[str, Counter[str]] = {}
+    for topic, name, numbers in used:
+        if column := recording.series[topic].columns.get(name):
+            large = np.abs(column.values[:, slice(*numbers)]) > resample.MAX_MEASUREMENT
+            counts.setdefault(topic, Counter())[name] += int(large.sum())
+    for topic, found in counts.items():
+        parts = [f"{count} of {name or topic}" for name, count in found.items() if count]
+        if parts:
+            yield (
+                f"{topic}: numbers left out, as they are infinite or above "
+                f"{resample.MAX_MEASUREMENT:g}: {', '.join(parts)}"
+            )
 
 
 _ROUNDING = 1e-14

@@ -67,10 +67,12 @@ class Recording:
     Attributes:
         series: Series by topic; ``TABLE`` is the only topic of a table.
         digests: SHA-256 of each file by its name: most recorders write no checksums.
+        notes: Warnings about the files, one sentence each.
     """
 
     series: Mapping[str, Series]
     digests: Mapping[str, str]
+    notes: tuple[str, ...] = ()
 
 
 def packed(recording: Recording) -> Message:

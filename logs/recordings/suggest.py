@@ -48,6 +48,7 @@ class _Offer:
         names: Names by quantity and label, which may be a joint's.
         touches: Lines of the table of a touch sensor, by names that may be of one.
         known: All names of a table.
+        notes: Warnings about the recording.
     """
 
     what: str
@@ -55,6 +56,7 @@ class _Offer:
     names: Mapping[str, Mapping[str, str]]
     touches: Mapping[str, Sequence[str]]
     known: Sequence[str] = field(default=())
+    notes: Sequence[str] = field(default=())
 
 
 def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
@@ -70,6 +72,7 @@ def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
     step = repr(robot.control_timestep)
     lines = [
         "# A suggestion. CHECK marks a guess; CHANGE must be filled in before it can be used.",
+        *(f"# Note: {escaped(note)}." for note in offer.notes),
         f"robot = {quoted(name)}",
         *[f"control_timestep = {step}  # s; CHECK: how often the robot is commanded"]
         * with_timestep,
@@ -216,6 +219,7 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
         of_imu = of_imu or [_topic([topic]), *_vectors(vectors)] if vectors else of_imu
     return _Offer(
         what="bag",
+        notes=bag.notes,
         heads={
             "": ['clock = "header"  # or "log", if the time stamps are of another clock'],
             "joints": [_topic(joints), unit],

@@ -16,6 +16,7 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.errors import InputError
+from selfmodel.logs.recordings import bags
 from selfmodel.logs.recordings.bags import read_bag
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.robot.robot import Robot
@@ -169,15 +170,73 @@ def test_a_bag_that_is_not_there_is_named(tmp_path: Path):
         read_bag(bag)
 
 
-def test_what_a_recorder_left_beside_its_database_is_not_passed_over(tmp_path: Path):
+@pytest.mark.parametrize("mode", ["WAL", "DELETE"])
+def test_what_a_recorder_left_beside_its_database_is_read_with_it(mode: str, tmp_path: Path):
+    """A process that is killed leaves its last transactions, or half of one, in another file."""
     database = storage(write_bag(tmp_path / "bag", recorded(0.1), "sqlite"))
     with closing(sqlite3.connect(database)) as recorder:
-        recorder.execute("PRAGMA journal_mode=WAL")
+        recorder.execute(f"PRAGMA journal_mode={mode}")
         recorder.execute("PRAGMA wal_autocheckpoint=0")
+        recorder.execute("PRAGMA cache_size=1")
         recorder.execute("DELETE FROM messages WHERE id > 5")
-        recorder.commit()
-        with pytest.raises(InputError, match=r"-wal .*wal_checkpoint"):
-            read_bag(database, {})
+        if mode == "WAL":
+            recorder.commit()
+        killed = tmp_path / "killed"
+        killed.mkdir()
+        for path in database.parent.glob("*.db3*"):
+            Path(shutil.copy(path, killed)).chmod(0o444)
+    content = {path.name: path.read_bytes() for path in killed.iterdir()}
+    assert len([name for name in content if not name.endswith("-shm")]) == 2
+
+    found = read_bag(killed / database.name)
+
+    messages = sum(series.count for series in found.series.values())
+    assert messages == (5 if mode == "WAL" else len(recorded(0.1)))
+    assert [note.partition(" was not closed")[0] for note in found.notes] == [database.name]
+    assert found.digests.keys() == content.keys() - {f"{database.name}-shm"}
+    assert {path.name: path.read_bytes() for path in killed.iterdir()} == content  # unchanged
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("left", [0.6, 0.9])
+def test_a_file_that_is_still_growing_is_read_up_to_its_last_whole_message(
+    *, chunked: bool, left: float, biped: Robot, tmp_path: Path
+):
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=2**12, use_chunking=chunked)
+        writer.start("ros2")
+        channels = {}
+        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
+            kind = message.__msgtype__
+            if topic not in channels:
+                schema = writer.register_schema(kind, "ros2msg", b"")
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], time, bytes(ROS.serialize_cdr(message, kind)), time)
+        messages = file.tell()
+        writer.finish()
+    whole = imported(path, biped).trajectory
+    data = path.read_bytes()[: int(left * messages)]
+    path.write_bytes(data)
+
+    found = imported(path, biped)
+
+    steps = found.trajectory.steps
+    assert (left - 0.15) * whole.steps < steps < whole.steps
+    for signal, values in found.trajectory.signals.items():
+        np.testing.assert_array_equal(values, whole[signal][:steps])
+    assert found.notes[0].startswith("bag.mcap has no end, as one that is still being recorded")
+    assert found.digests == {"bag.mcap": hashlib.sha256(data).hexdigest()}
+    assert "# Note: bag.mcap has no end" in suggest(path, biped, "b.xml", with_timestep=True)
+
+
+@pytest.mark.parametrize("form", ["mcap", "mcap-file"])
+def test_a_file_of_mcap_is_hashed_while_it_is_read(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path = storage(write_bag(tmp_path / "bag", recorded(0.1), form))
+    monkeypatch.delattr(bags, "file_digest")  # which would read it again, when it may have grown
+    assert read_bag(path).digests == {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
 ENDLESS = (
@@ -257,7 +316,6 @@ def a_chunk_twice(data: bytearray) -> None:
         ("plain", a_message_fewer),
         ("plain", another_channel),
         ("mcap", bytes_after_the_end),
-        ("mcap", cut),
         ("ros1", cut),
         ("ros1", no_index),
         ("ros1", a_shorter_index),
