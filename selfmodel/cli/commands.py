@@ -55,6 +55,7 @@ class Simulated(Notation):
 class FromLogs(Command):
     """A diagnosis of logs."""
 
+    healthy: list[Path] | None = None
     self_model: str | None = None
     comparator: str = "auto"
     kinds: str = DEFAULT_KIND_NAMES
@@ -175,7 +176,8 @@ class Diagnose(FromLogs):
     """Rank hypotheses by how well they predict logged trials, without a robot.
 
     Give the logs in the order in which the trials were run. The self-model is fitted to the
-    trials from before the failure, and the hypotheses predict all others.
+    trials of the healthy robot: those of --healthy, or else of the stage before. The hypotheses
+    predict all others.
     """
 
     files: list[Path]

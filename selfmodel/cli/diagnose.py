@@ -44,7 +44,7 @@ def diagnose(options: Diagnose) -> None:
         logs=tuple(paths),
         played_back=tuple(log.trial.path for log in found.explained if _is_played_back(log)),
         intact=tuple(trial.path for trial in inputs.healthy),
-        files={str(path): file_digest(path) for path in options.files},
+        files={str(path): file_digest(path) for path in [*(options.healthy or ()), *options.files]},
         calibration=inputs.calibration.to_dict() if inputs.calibration else None,
         **output_of(diagnosis),
         evidence=to_json(evidence),
@@ -83,9 +83,11 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
     """Returns the diagnosis of logs; prints notes and progress on standard error."""
     kinds = plugins.kinds(options.kinds)
     comparator = arguments.comparator_choice(options.comparator)
-    logs = arguments.read_logs(files)
+    logs = arguments.read_logs([*(options.healthy or ()), *files])
     robot = arguments.robot_of_logs(logs, options.self_model)
-    failed, healthy = by_stage([log.trial for log in logs])
+    trials = tuple(log.trial for log in logs)
+    split = len(options.healthy or ())
+    failed, healthy = (trials[split:], trials[:split]) if split else by_stage(trials)
     explained = [log for log in logs if log.trial in failed]
     settings = explained[0].settings
     if options.generations is not None:

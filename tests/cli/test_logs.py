@@ -247,6 +247,18 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     assert found["seconds"] > 0
 
 
+def test_a_log_given_as_healthy_is_so_whatever_its_stage(
+    recovered_as_the_paper_did: tuple[Path, dict],
+):
+    folder, told = recovered_as_the_paper_did
+    before, failed, later = (trial["log"] for trial in told["trials"][:3])
+    done = selfmodel("diagnose", before, failed, "--healthy", later, *PAPERS, "--json", cwd=folder)
+
+    found = json.loads(done.stdout)
+    assert (found["logs"], found["intact"]) == ([before, failed], [later])
+    assert found["files"].keys() == {before, failed, later}
+
+
 def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     recovered_as_the_paper_did: tuple[Path, dict], tmp_path: Path
 ):

@@ -120,8 +120,10 @@ def test_a_file_that_is_no_mapping_is_named(tmp_path: Path):
 
 def test_the_mappings_in_the_guide_are_read():
     guide = (Path(__file__).parents[3] / "docs/how-to/import-a-recording.md").read_text()
-    bag, table = (part.partition("```")[0] for part in guide.split("```toml\n")[1:3])
+    bag, unitree, table = (part.partition("```")[0] for part in guide.split("```toml\n")[1:4])
     mapping = parse_mapping(bag, "guide").trial
     assert mapping.joints.links["front_left_knee"] == Link("FL_knee", -1, 0.1)
     assert mapping.touch["front_left_touch"].threshold == 5
+    places = parse_mapping(unitree, "guide").places
+    assert places["joint_velocities", "FL_hip_joint"].columns == ("motor_state[3].dq",)
     assert parse_mapping(table, "guide").trial.time.column == "time"
