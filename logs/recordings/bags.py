@@ -267,8 +267,9 @@ def _rows(file: Path) -> Iterator[_Stored]:
         if verdict != "ok":
             raise ValueError(verdict)
         texts = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        known = database.execute(texts) if "message_definitions" in tables else ()  # since Iron
-        defined = {str(kind): _text(e, str(text).encode()) for kind, e, text in known}
+        is_defined = "message_definitions" in tables  # since Iron
+        definitions = database.execute(texts).fetchall() if is_defined else []
+        defined = {str(kind): _text(e, str(text).encode()) for kind, e, text in definitions}
         texts = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         topics = {
             number: _Stored(str(n), str(t), str(e), defined.get(str(t), ""))

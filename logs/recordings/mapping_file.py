@@ -95,10 +95,10 @@ def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
         return
     sections: dict[Keys, Any] = {(role,): tables.get(role, {}) for role in _OF_BAG}
     sections |= {("touch", name): section for name, section in sections.pop(("touch",)).items()}
-    unfit = [
-        (*path, key) for path, held in sections.items() for key in _OF_BAG[path[0]] if key in held
-    ]
-    for path in [("clock",)] * ("clock" in tables) + unfit:
+    unfit: list[Keys] = [("clock",)] if "clock" in tables else []
+    for path, held in sections.items():
+        unfit += [(*path, key) for key in _OF_BAG[path[0]] if key in held]
+    for path in unfit:
         raise mapping.error(path, f"{path[-1]} is a key of the mapping of a bag: remove it")
     base = trial.base
     if base is not None and base.position is None and base.orientation is None:

@@ -78,7 +78,7 @@ def decode(
     if encoding == CDR and data.startswith(ZSTD_MAGIC):
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
             data = reader.readall()
-    store = _store(encoding, *((kind, definition) if kind not in DECODERS else ()))
+    store = _store(encoding) if kind in DECODERS else _store(encoding, kind, definition)
     message: Any = (
         store.deserialize_ros1(data, kind)
         if encoding == ROS1

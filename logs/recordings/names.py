@@ -205,7 +205,9 @@ def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
         for quantity, known in _VECTORS.items():
             width = 4 if quantity == "orientation" else 3
             order = "0123"[:width] if numbered else "wxyz"[-width:]
-            fitting = (known - {"q", "w"} if quantity in _NUMBERED else ()) if numbered else known
+            fitting = known - {"q", "w"} if numbered else known
+            if numbered and quantity not in _NUMBERED:
+                continue
             if words.intersection(fitting) and set(axes) == set(order):
                 body = "imu" if words & _OTHERS["imu"] else "base"
                 found[body].setdefault(quantity, tuple(axes[axis] for axis in order))

@@ -256,18 +256,17 @@ def _lists(
     """
     found: dict[str, tuple[str, dict[str, str]]] = {}
     for topic, series in tables:
-        is_unitree = series.type.startswith("unitree")
+        is_unitree = series.type.startswith(("unitree_go/", "unitree_legged_msgs/"))
         for (name, field_name), columns in elements(series.names).items():
             quantity = quantity_of(field_name or name)
             if is_command(f"{topic}.{name}"):
                 quantity = "command" if quantity == "position" else ""
             elif is_unitree and is_touch(name):
                 quantity = "touch"
-            anatomy = robot.anatomy
-            parts = anatomy.motors if quantity == "command" else anatomy.hinges
-            labels = [str(place) for place in range(len(parts))]
-            if is_unitree:
-                labels = [f"{leg}_foot" for leg in UNITREE_LEGS] if quantity == "touch" else UNITREE
+            parts = robot.anatomy.motors if quantity == "command" else robot.anatomy.hinges
+            labels = UNITREE if is_unitree else tuple(str(place) for place in range(len(parts)))
+            if quantity == "touch":
+                labels = tuple(f"{leg}_foot" for leg in UNITREE_LEGS)
             if quantity and len(columns) >= len(labels):
                 found.setdefault(quantity, (topic, dict(zip(labels, columns, strict=False))))
     return found
