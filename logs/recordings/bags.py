@@ -148,8 +148,9 @@ def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
             plain = Path(folder, file.stem)
             with plain.open("wb") as target:
                 zstandard.ZstdDecompressor().copy_stream(source, target)
-            yield from _stored(plain, found)
-            del found.digests[plain.name]
+            inner = _Found()
+            yield from _stored(plain, inner)
+            found.notes.extend(inner.notes)
             found.digests[file.name] = source.hexdigest()
         return
     for magic, (read, _) in _FORMATS.items():
@@ -168,10 +169,7 @@ def _text(encoding: str, definition: bytes) -> str:
 
 
 class _HashedReader(io.BufferedReader):
-    """File that is read once, from start to end, and hashed on the way.
-
-    Its reads are bounded by its size: a damaged length is more than any memory.
-    """
+    """File that is hashed as it is read; no read exceeds its size, as a damaged length does."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(io.FileIO(file))

@@ -1,8 +1,7 @@
 """Import of a recording: trajectory and quality from a bag or table, a mapping and a robot."""
 
 import json
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,15 +10,14 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import InputError
 from selfmodel.logs.recordings import resample
 from selfmodel.logs.recordings.bags import read_bag
 from selfmodel.logs.recordings.mapping import TIMES, Trial
 from selfmodel.logs.recordings.mapping_file import RecordingMapping, check_recording, check_robot
-from selfmodel.logs.recordings.quality import Quality, notes, quality
+from selfmodel.logs.recordings.quality import Quality, no_measurements, notes, quality
 from selfmodel.logs.recordings.recording import TABLE, IntArray, Recording
 from selfmodel.logs.recordings.resample import NOTHING, Clocked, Method, Track, at_steps
-from selfmodel.logs.recordings.runs import Run, runs_of
+from selfmodel.logs.recordings.runs import chosen_run
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
@@ -97,11 +95,8 @@ def import_recording(
     recording = _read(path, mapping)
     check_recording(mapping, recording)
     clock = "column" if mapping.trial.time else mapping.trial.clock
+    recording = chosen_run(path, recording, _clocks(mapping, recording, clock), run)
     clocks = _clocks(mapping, recording, clock)
-    runs = runs_of(recording, clocks)
-    if len(runs) > 1 or run is not None:
-        recording = _chosen(path, runs, run)
-        clocks = _clocks(mapping, recording, clock)
     tracks = _tracks(mapping, recording, clocks)
     origin, steps = _steps(mapping, tracks, robot.control_timestep)
     try:
@@ -116,17 +111,17 @@ def import_recording(
     for place in mapping.places.values():
         if place.role != ("sensors",):
             roles.setdefault(place.topic, {})[".".join(place.role)] = None
+    step, series = robot.control_timestep, recording.series
     qualities = {
-        topic: quality(
-            recording.series[topic], clocks[topic], origin, robot.control_timestep, tuple(names)
-        )
+        topic: quality(series[topic], clocks[topic], origin, step, tuple(names))
         for topic, names in roles.items()
     }
-    warnings = [*recording.notes, *_no_measurements(mapping, recording)]
-    if len(runs) > 1:
-        warnings.append(f"the clock restarts: this is run {run} of {_lengths(runs)}")
-    warnings += notes(mapping.trial, trajectory, qualities, robot)
-    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, tuple(warnings))
+    warnings = (
+        *recording.notes,
+        *no_measurements(recording, mapping.places.values()),
+        *notes(mapping.trial, trajectory, qualities, robot),
+    )
+    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, warnings)
 
 
 def write_recording(
@@ -184,24 +179,6 @@ def _read(path: Path, mapping: RecordingMapping) -> Recording:
     return table
 
 
-def _chosen(path: Path, runs: Sequence[Run], run: int | None) -> Recording:
-    """The part of a recording that the user has chosen."""
-    if run is not None and 1 <= run <= len(runs):
-        return runs[run - 1].recording
-    if len(runs) == 1:
-        raise InputError(f"{path}: its clock does not restart: leave out --run, got --run {run}")
-    given = "" if run is None else f", got --run {run}"
-    raise InputError(
-        f"{path}: its clock restarts, so there are {_lengths(runs)}: choose one, such as "
-        f"--run 1{given}"
-    )
-
-
-def _lengths(runs: Sequence[Run]) -> str:
-    seconds = ", ".join(f"{run.seconds:.3f}" for run in runs)
-    return f"{len(runs)} runs of {seconds} s"
-
-
 def _clocks(mapping: RecordingMapping, recording: Recording, clock: str) -> dict[str, Clocked]:
     clocks = {}
     for place in mapping.places.values():
@@ -236,27 +213,6 @@ def _tracks(
             rounding = _ROUNDING if _keeps_samples(mapping.trial, body) else 0.0
             tracks[f"{body}_orientation", ""] = _normalised(orientation, rounding)
     return tracks
-
-
-def _no_measurements(mapping: RecordingMapping, recording: Recording) -> Iterator[str]:
-    """Notes on numbers that cannot be measurements, and are as missing as NaN."""
-    used = dict.fromkeys(
-        (place.topic, name, place.numbers)
-        for place in mapping.places.values()
-        for name in place.columns
-    )
-    counts: dict[str, Counter[str]] = {}
-    for topic, name, numbers in used:
-        if column := recording.series[topic].columns.get(name):
-            large = np.abs(column.values[:, slice(*numbers)]) > resample.MAX_MEASUREMENT
-            counts.setdefault(topic, Counter())[name] += int(large.sum())
-    for topic, found in counts.items():
-        parts = [f"{count} of {name or topic}" for name, count in found.items() if count]
-        if parts:
-            yield (
-                f"{topic}: numbers left out, as they are infinite or above "
-                f"{resample.MAX_MEASUREMENT:g}: {', '.join(parts)}"
-            )
 
 
 _ROUNDING = 1e-14

@@ -113,7 +113,7 @@ def _sets(words: Mapping[str, str]) -> Mapping[str, frozenset[str]]:
 _QUANTITIES = _sets(
     {
         "command": "command commands cmd target targets desired des setpoint goal "
-        "reference ref action actions ctrl control qdes qref posdes posref",
+        "reference ref action actions ctrl control",
         "velocity": "velocity velocities vel qd dq qvel qdot",
         "effort": "effort efforts torque torques tau",
         "sensor": "sensor sensors reading readings",
@@ -144,7 +144,7 @@ _OTHERS = _sets(
     }
 )
 _COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW]|(?<!\d)\d)[\])]?$")
-_PART_OF_COMMAND = ("command", "cmd", "target", "desired", "setpoint", "reference")
+_COMMANDS = re.compile(r"command|cmd|target|desired|setpoint|goal|reference|(q|pos|\b)(des|ref)\b")
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,8 @@ def classified(names: Sequence[str]) -> Classified:
         if set(words) & _OTHERS["time"] and set(words) <= _OTHERS["time"] | _OTHERS["unit"]:
             found.times.append(name)
             continue
-        if quantity := "command" if is_command(name) else quantity_of(name):
+        commanded = is_command(name) or not _QUANTITIES["command"].isdisjoint(words)
+        if quantity := "command" if commanded else quantity_of(name):
             fillers = _OTHERS["filler"].union(*_QUANTITIES.values())
             label = "_".join(word for word in words if word not in fillers)
             found.parts.setdefault(quantity, {}).setdefault(label, name)
@@ -217,9 +218,7 @@ def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
 
 def is_command(name: str) -> bool:
     """Returns whether a name has a word of commands, such as ``/lowcmd`` and ``q_des``."""
-    words = words_of(name)
-    parts = any(part in word for part in _PART_OF_COMMAND for word in words)
-    return parts or not _QUANTITIES["command"].isdisjoint(words)
+    return _COMMANDS.search(" ".join(words_of(name))) is not None
 
 
 def is_touch(name: str) -> bool:
@@ -229,7 +228,7 @@ def is_touch(name: str) -> bool:
 
 
 def quantity_of(name: str) -> str:
-    """Returns what a name measures or commands, such as ``velocity``; "" if it does not say."""
-    words = words_of(name)
-    measured = list(_QUANTITIES.items())[1:]
-    return next((quantity for quantity, known in measured if known.intersection(words)), "")
+    """Returns what is measured or commanded, such as ``velocity``; "" if a name does not say."""
+    words = set(words_of(name))
+    quantities = list(_QUANTITIES.items())[1:]
+    return next((quantity for quantity, known in quantities if known & words), "")

@@ -1,14 +1,15 @@
 """Recording quality of a topic, and warnings about an imported trial."""
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from selfmodel.logs.recordings.mapping import NONE, Trial
-from selfmodel.logs.recordings.recording import Series
-from selfmodel.logs.recordings.resample import Clocked, reach
+from selfmodel.logs.recordings.mapping import NONE, Place, Trial
+from selfmodel.logs.recordings.recording import Recording, Series
+from selfmodel.logs.recordings.resample import MAX_MEASUREMENT, Clocked, reach
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
 
@@ -98,6 +99,22 @@ def quality(
         reordered=int(np.sum(usable < np.maximum.accumulate(usable))) if len(usable) else 0,
         refused=dict(series.refused),
     )
+
+
+def no_measurements(recording: Recording, places: Iterable[Place]) -> Iterator[str]:
+    """Yields warnings about numbers that cannot be measurements, and are as missing as NaN."""
+    used = dict.fromkeys(
+        (place.topic, name, place.numbers) for place in places for name in place.columns
+    )
+    counts: dict[str, Counter[str]] = {}
+    for topic, name, numbers in used:
+        if column := recording.series[topic].columns.get(name):
+            large = np.abs(column.values[:, slice(*numbers)]) > MAX_MEASUREMENT
+            counts.setdefault(topic, Counter())[name or topic] += int(large.sum())
+    for topic, found in counts.items():
+        if parts := [f"{count} of {name}" for name, count in found.items() if count]:
+            limit = f"infinite or above {MAX_MEASUREMENT:g}"
+            yield f"{topic}: numbers left out, as they are {limit}: {', '.join(parts)}"
 
 
 def notes(

@@ -1,12 +1,14 @@
 """Runs of a recording: its parts between restarts of the clock, each with times that increase."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from selfmodel.errors import InputError
 from selfmodel.logs.recordings.recording import Column, IntArray, Recording, Series
 from selfmodel.logs.recordings.resample import Clocked
 
@@ -17,25 +19,29 @@ _MIN_RETURN = 10**9
 """Time by which a clock goes back that restarts, ns, or half a run if that is less."""
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Part of a recording, and its length, s."""
-
-    recording: Recording
-    seconds: float
-
-
-def runs_of(recording: Recording, clocks: Mapping[str, Clocked]) -> list[Run]:
-    """Returns the runs of a recording, in order, by the clocks of the topics that are used.
+def chosen_run(
+    path: Path, recording: Recording, clocks: Mapping[str, Clocked], run: int | None
+) -> Recording:
+    """Returns one run of a recording, by the clocks of the topics that are used.
 
     A topic with too few messages to show a restart has it where the first of the others has it.
+
+    Args:
+        path: Path of the recording, for errors.
+        recording: The recording; it is returned if its clock does not restart.
+        clocks: Times of the messages by topic.
+        run: Number of the run, from 1.
+
+    Raises:
+        InputError: There are several runs and none is chosen, or there is no run of that number.
     """
     found = {topic: _restarts(recording.series[topic], clock) for topic, clock in clocks.items()}
     most = max(map(len, found.values()))
-    complete = [borders for borders in found.values() if len(borders) == most]
-    first = np.min(complete, axis=0)
+    if not most and run in (None, 1):
+        return recording
+    first = np.min([borders for borders in found.values() if len(borders) == most], axis=0)
     parts: list[dict[str, Series]] = [{} for _ in range(most + 1)]
-    lengths = np.zeros(most + 1)
+    seconds = np.zeros(most + 1)
     for topic, clock in clocks.items():
         series = recording.series[topic]
         borders = found[topic] if len(found[topic]) == most else first
@@ -43,11 +49,18 @@ def runs_of(recording: Recording, clocks: Mapping[str, Clocked]) -> list[Run]:
         for number, (start, end) in enumerate(pairwise(edges)):
             parts[number][topic] = _part(series, start, end)
             times = clock.times[start:end][clock.usable[start:end]]
-            lengths[number] = max(lengths[number], np.ptp(times) / 1e9 if len(times) else 0.0)
-    return [
-        Run(replace(recording, series={**recording.series, **series}), float(seconds))
-        for series, seconds in zip(parts, lengths, strict=True)
-    ]
+            seconds[number] = max(seconds[number], np.ptp(times) / 1e9 if len(times) else 0.0)
+    lengths = f"{len(parts)} runs of {', '.join(f'{length:.3f}' for length in seconds)} s"
+    if run is not None and run <= len(parts):
+        note = f"the clock restarts: this is run {run} of {lengths}"
+        series_of_run = {**recording.series, **parts[run - 1]}
+        return replace(recording, series=series_of_run, notes=(*recording.notes, note))
+    given = "" if run is None else f", got --run {run}"
+    if not most:
+        raise InputError(f"{path}: its clock does not restart: leave out --run{given}")
+    raise InputError(
+        f"{path}: its clock restarts, so there are {lengths}: choose one, such as --run 1{given}"
+    )
 
 
 def _restarts(series: Series, clock: Clocked) -> IntArray:
