@@ -395,6 +395,6 @@ class _Topic:
             columns[name] = Column(index[order], values[order])
         times = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
         kind = " and ".join(self.types)
-        is_table = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
+        by_place = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
         names = tuple(parts)
-        return Series(kind, self.count, *times, names, columns, self.refused, is_table)
+        return Series(kind, self.count, *times, names, columns, self.refused, by_place)

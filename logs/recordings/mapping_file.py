@@ -193,10 +193,10 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
             continue
         for name in place.columns:
             if name and name not in columns:
-                is_joint = place.role[0] in ("joints", "commands") and not series.is_table
+                is_joint = place.role[0] in ("joints", "commands") and not series.by_place
                 kind = "joint" if is_joint else "number"
                 what = "column of the table" if place.topic == TABLE else f"{kind} on {place.topic}"
-                near = get_close_matches(name, columns, 12, 0) if series.is_table else columns
+                near = get_close_matches(name, columns, 12, 0) if series.by_place else columns
                 error = str(unknown_name(what, name, near))
                 lost = f"; {NONE!r} is for a hinge without an encoder"
                 raise mapping.error(place.path, error + (lost if place.role == ("joints",) else ""))
@@ -212,7 +212,7 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
             raise mapping.error(role, sentence)
         return
     path, kinds = (*role, "topic"), TYPES[role[0]]
-    fitting = [name for name, one in recording.series.items() if one.type in kinds or one.is_table]
+    fitting = [name for name, one in recording.series.items() if one.type in kinds or one.by_place]
     if series is None:
         known = fitting or sorted(recording.series)
         raise mapping.unknown(path, "topic of the recording", topic, known)
@@ -227,7 +227,7 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
             f"name one that fits, of "
             f"{', '.join(fitting) or 'which the bag has none'}",
         )
-    if series.is_table and place.columns == ("",):
+    if series.by_place and place.columns == ("",):
         raise mapping.error(
             role,
             f"{topic} is of {series.type}, which has no role of its own: name its numbers under "
@@ -236,7 +236,7 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
     path, key = place.path, place.path[len(role)]
     if (base := mapping.trial.base) and role == ("base",) and base.velocity_frame == "world":
         path, key = ("base", "velocity_frame"), "velocity_frame"
-    if key in _COLUMN_KEYS and not series.is_table:
+    if key in _COLUMN_KEYS and not series.by_place:
         raise mapping.error(
             path,
             f"{key} is for a table, or a topic of a type without a role, got {topic} of "

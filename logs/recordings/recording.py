@@ -46,7 +46,8 @@ class Series:
         names: Names of all columns.
         columns: Columns by name, those that were read; each message may have other names.
         refused: Numbers of messages left out, by reason.
-        is_table: Whether the columns are the numbers of a type without a role.
+        by_place: Whether the columns are numbers of a type without a role, which are named by their
+            place in a message.
     """
 
     type: str
@@ -57,7 +58,7 @@ class Series:
     names: tuple[str, ...]
     columns: Mapping[str, Column]
     refused: Mapping[str, int]
-    is_table: bool = False
+    by_place: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -200,7 +200,7 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
         listed_names = ", ".join(map(quoted, commanded))
         order = [f"order = [{listed_names}]  # CHECK: the bag has no names"]
     names["command"] = {name: name for name in commanded}
-    tables = sorted((t for t in series if series[t].is_table), key=lambda t: -series[t].count)
+    tables = sorted((t for t in series if series[t].by_place), key=lambda t: -series[t].count)
     lists = _lists([(topic, series[topic]) for topic in tables], robot)
     if "position" in lists and not any(_fit(series[topic], hinges) for topic in joints[:1]):
         topic, names["position"] = lists["position"]

@@ -1,5 +1,6 @@
 """A clock that restarts makes several runs, of which one is imported, and never a mixture."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ def test_a_table_of_two_runs_is_refused_until_one_is_chosen(biped: Robot, tmp_pa
         found = imported(path, biped, OF_TABLE, run)
         for signal, values in alone.signals.items():
             np.testing.assert_array_equal(found.trajectory[signal], values)
+        assert json.loads(found.facts()["topics"])["table"]["messages"] == len(rows["time"])
         assert (
             found.notes[0] == f"the clock restarts: this is run {run} of 2 runs of 0.395, 0.295 s"
         )
