@@ -26,6 +26,7 @@ import zstandard
 from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
 from mcap.stream_reader import StreamReader
 from rosbags import rosbag1
+from rosbags.serde import SerdeError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -163,11 +164,6 @@ def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
     raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
 
 
-def _text(encoding: str, definition: bytes) -> str:
-    """Definition of a message type, if it is in ROS's own language."""
-    return definition.decode(errors="replace") if encoding in ("ros2msg", "ros1msg") else ""
-
-
 class _HashedReader(io.BufferedReader):
     """File that is hashed as it is read; no read exceeds its size, as a damaged length does."""
 
@@ -199,7 +195,7 @@ def _mcap(file: Path, found: _Found) -> Iterator[_Stored]:
             for record in reader.records:
                 match record:
                     case mcap.records.Schema():
-                        types[record.id] = record.name, _text(record.encoding, record.data)
+                        types[record.id] = record.name, messages.text(record.encoding, record.data)
                     case mcap.records.Channel():
                         kind, text = types.get(record.schema_id, ("", ""))
                         encoding = record.message_encoding
@@ -267,7 +263,7 @@ def _rows(file: Path) -> Iterator[_Stored]:
         texts = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
         is_defined = "message_definitions" in tables  # since Iron
         definitions = database.execute(texts).fetchall() if is_defined else []
-        defined = {str(kind): _text(e, str(text).encode()) for kind, e, text in definitions}
+        defined = {str(kind): messages.text(e, str(text).encode()) for kind, e, text in definitions}
         texts = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         topics = {
             number: _Stored(str(n), str(t), str(e), defined.get(str(t), ""))
@@ -360,24 +356,27 @@ class _Topic:
         if item.data is None:
             return
         self.count += 1
-        if columns is None or not known or not package:
-            return
-        is_first = not self.layouts
-        if kind not in messages.DECODERS and not (is_first or self.listed):
+        by_place = kind not in messages.DECODERS
+        is_done = by_place and self.layouts and not self.listed
+        if columns is None or not known or not package or is_done:
             return
         try:
             stamp, (names, rows) = messages.decode(
                 item.data, kind, item.encoding, item.definition, self.listed
             )
-        except messages.UndefinedError:
+        except (messages.UndefinedError, SerdeError) as failure:
+            # Only a suggestion decodes what nobody has asked for.
+            if isinstance(failure, SerdeError) and (columns or not by_place):
+                raise
             return
         except messages.RefusedError as refused:
             self.refused[str(refused)] += 1
             return
-        if is_first:
+        if not self.layouts:
             self.listed = tuple(name for name in columns if name in set(names))
-        self.layouts.setdefault(names, []).append((len(self.times), rows))
-        self.times.append((stamp, item.time, place))
+        if names or not by_place:
+            self.layouts.setdefault(names, []).append((len(self.times), rows))
+            self.times.append((stamp, item.time, place))
 
     def series(self) -> Series:
         """Returns the messages as arrays; a column may be in messages of several layouts."""

@@ -88,8 +88,7 @@ def import_recording(
         run: Number of the run, from 1, of a recording whose clock restarts.
 
     Raises:
-        InputError: The recording is damaged or cannot be read, the mapping does not fit it or the
-            robot, or the clock restarts and there is no such run.
+        InputError: The recording cannot be read, does not fit the mapping, or has no such run.
     """
     check_robot(mapping, robot.anatomy)
     recording = _read(path, mapping)

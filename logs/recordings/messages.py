@@ -67,8 +67,8 @@ def decode(
         data: Encoded message.
         kind: Its type.
         encoding: ``CDR`` or ``ROS1``.
-        definition: Text of a type that is not in ``DECODERS`` and of those in it; "" where ROS or
-            ``DEFINITIONS`` has it.
+        definition: Text of a type that is not in ``DECODERS`` and of those in it; "" for that of
+            ROS or of ``DEFINITIONS``.
         columns: Names of the numbers to return of such a type, of those that it has; or all.
 
     Raises:
@@ -79,6 +79,8 @@ def decode(
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
             data = reader.readall()
     store = _store(encoding) if kind in DECODERS else _store(encoding, kind, definition)
+    if store is None:
+        raise UndefinedError(kind)
     message: Any = (
         store.deserialize_ros1(data, kind)
         if encoding == ROS1
@@ -96,17 +98,27 @@ def decode(
 
 
 @cache
-def _store(encoding: str, kind: str = "", definition: str = "") -> "Typestore":
-    """Message types of ROS, which are the same for ``DECODERS`` in all distributions, and more."""
+def _store(encoding: str, kind: str = "", definition: str = "") -> "Typestore | None":
+    """Message types of ROS, which are the same for ``DECODERS`` in all distributions, and a kind.
+
+    There are none of a kind that has no definition.
+    """
     store = get_typestore(Stores.ROS1_NOETIC if encoding == ROS1 else Stores.ROS2_HUMBLE)
-    if not kind or kind in store.fielddefs:
+    if not kind or (kind in store.fielddefs and not definition):
         return store
     try:
-        found = get_types_from_msg(definition or DEFINITIONS[kind], kind)
-        store.register({name: of for name, of in found.items() if name not in store.fielddefs})
-    except (KeyError, TypesysError) as failure:
-        raise UndefinedError(kind) from failure
+        defined = get_types_from_msg(definition or DEFINITIONS[kind], kind)
+        for name in defined:
+            store.fielddefs.pop(name, None)  # of another distribution
+        store.register(defined)
+    except (KeyError, TypesysError):
+        return None
     return store
+
+
+def text(encoding: str, definition: bytes) -> str:
+    """Returns the definition of a message type, if it is in ROS's own language."""
+    return definition.decode(errors="replace") if encoding in ("ros2msg", "ros1msg") else ""
 
 
 def _numbers(value: Any, name: str = "") -> Iterator[tuple[str, float]]:  # noqa: ANN401

@@ -195,6 +195,33 @@ def test_a_mistake_has_its_line(right: str, wrong: str, named: str, of_lab: Path
     assert len(str(caught.value)) < 1000
 
 
+def test_a_type_of_the_bag_goes_before_that_of_ros(biped: Robot, tmp_path: Path):
+    """Types differ between distributions; and a suggestion reads topics that nobody needs."""
+    path = tmp_path / "bag.mcap"
+    newer = "geometry_msgs/msg/Twist", "float64[2] linear\nuint8 more\n"
+    other = "geometry_msgs/msg/Accel", ""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        for topic, (kind, definition) in (("/newer", newer), ("/other", other)):
+            schema = writer.register_schema(kind, "ros2msg", definition.encode())
+            channel = writer.register_channel(topic, "cdr", schema)
+            data = b"\0\1\0\0" + np.array([1.0, 2.0]).tobytes() + b"\7"
+            writer.add_message(channel, T0, data, T0)
+        writer.finish()
+
+    found = read_bag(path).series
+
+    columns = found["/newer"].columns
+    assert {name: column.values.item() for name, column in columns.items()} == {
+        "linear[0]": 1.0,
+        "linear[1]": 2.0,
+        "more": 7.0,
+    }
+    assert (found["/other"].names, found["/other"].count) == ((), 1)
+    assert 'topic = "?"' in suggest(path, biped, "b.xml", with_timestep=True)
+
+
 def test_only_the_numbers_that_a_mapping_names_are_kept(of_lab: Path):
     places = parse_mapping(MAPPING, "m").places.values()
     series = read_bag(of_lab, {"/state": {name for one in places for name in one.columns}})
