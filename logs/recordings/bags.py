@@ -392,8 +392,15 @@ class _Topic:
             order = np.argsort(index)
             values = np.concatenate([part.values for part in some])
             columns[name] = Column(index[order], values[order])
-        times = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
-        kind = " and ".join(self.types)
-        by_place = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
-        names = tuple(parts)
-        return Series(kind, self.count, *times, names, columns, self.refused, by_place)
+        stamps, logged, places = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
+        return Series(
+            type=" and ".join(self.types),
+            count=self.count,
+            stamps=stamps,
+            logged=logged,
+            places=places,
+            names=tuple(parts),
+            columns=columns,
+            refused=self.refused,
+            by_place=bool(columns) and not self.types.keys() & messages.DECODERS.keys(),
+        )

@@ -245,10 +245,8 @@ class Trial(Section, kw_only=True):
                 link = joints.links.get(hinge, Link(NONE))
                 scale = joints.conversion(link)[0] if key == "velocities" else link.sign
                 if name != NONE:
-                    place = Place(
-                        ("joints", key, hinge), joints.topic or TABLE, (name,), scale=scale
-                    )
-                    yield (f"joint_{key}", hinge), place
+                    path, topic = ("joints", key, hinge), joints.topic or TABLE
+                    yield (f"joint_{key}", hinge), Place(path, topic, (name,), scale=scale)
         for motor, link in commands.links.items():
             column = str(commands.order.index(link.name)) if commands.order else link.name
             place = partial(Place, ("commands", "names", motor), commands.topic or TABLE, (column,))

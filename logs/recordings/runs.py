@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from selfmodel.arrays import BoolArray
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.recording import Column, IntArray, Recording, Series
 from selfmodel.logs.recordings.resample import Clocked
@@ -73,9 +74,10 @@ def _restarts_of(times: IntArray) -> Iterator[int]:
     if len(times) <= _SUCCESSION:
         return
     forward = np.diff(times) >= 0
-    in_order = sliding_window_view(forward, _SUCCESSION - 1).all(axis=1)
+    in_order: BoolArray = np.all(sliding_window_view(forward, _SUCCESSION - 1), axis=1)
     start = 0
-    for place in np.flatnonzero(~forward[: len(in_order) - 1] & in_order[1:]) + 1:
+    candidates = np.flatnonzero(~forward[: len(in_order) - 1] & in_order[1:]) + 1
+    for place in candidates.tolist():
         # Without the sample before it, which may be a single wrong one.
         before = times[start : place - 1]
         if not len(before):
@@ -85,7 +87,7 @@ def _restarts_of(times: IntArray) -> Iterator[int]:
         returns = times[place] < latest - back and times[place + _SUCCESSION - 1] < latest
         # Parts in the wrong order, of which the second ends as the first begins, are sorted.
         if returns and not -_MIN_RETURN < times[place:].max() - before.min() < 0:
-            yield int(place)
+            yield place
             start = place
 
 
