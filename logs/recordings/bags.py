@@ -393,14 +393,8 @@ class _Topic:
             values = np.concatenate([part.values for part in some])
             columns[name] = Column(index[order], values[order])
         stamps, logged, places = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
+        kind, names, count = " and ".join(self.types), tuple(parts), self.count
+        by_place = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
         return Series(
-            type=" and ".join(self.types),
-            count=self.count,
-            stamps=stamps,
-            logged=logged,
-            places=places,
-            names=tuple(parts),
-            columns=columns,
-            refused=self.refused,
-            by_place=bool(columns) and not self.types.keys() & messages.DECODERS.keys(),
+            kind, count, stamps, logged, places, names, columns, self.refused, by_place=by_place
         )

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from selfmodel.arrays import BoolArray
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings.recording import Column, IntArray, Recording, Series
 from selfmodel.logs.recordings.resample import Clocked
@@ -74,7 +73,7 @@ def _restarts_of(times: IntArray) -> Iterator[int]:
     if len(times) <= _SUCCESSION:
         return
     forward = np.diff(times) >= 0
-    in_order: BoolArray = np.all(sliding_window_view(forward, _SUCCESSION - 1), axis=1)
+    in_order = np.asarray(np.all(sliding_window_view(forward, _SUCCESSION - 1), axis=1))
     start = 0
     candidates = np.flatnonzero(~forward[: len(in_order) - 1] & in_order[1:]) + 1
     for place in candidates.tolist():
