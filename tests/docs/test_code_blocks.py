@@ -30,7 +30,9 @@ def expanded(words: list[str]) -> list[str]:
 
 
 def shortened(words: list[str]) -> list[str]:
-    """The arguments of a command, with a small search where the page has the usual one."""
+    """The arguments of a command, with a small search or one process where the page has more."""
+    if words[0] in ("ablate", "suite") and "--out" in words and "--workers" not in words:
+        return [*words, "--workers", "1"]
     searches = words[0] in ("diagnose", "report", "recover") and "--help" not in words
     return [*words, *SMALL] if searches and "--population" not in words else words
 

@@ -62,13 +62,14 @@ def test_a_reader_can_run(step: str | Block, folder: Path, monkeypatch: pytest.M
 
 def test_every_command_is_this_projects_and_what_make_runs_is_run_by_ci():
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    made = {target for words in re.findall(r"\bmake ([^;\n]+)", ci) for target in words.split()}
     found = [step for step in steps() if isinstance(step, str)]
 
     assert found
     for command in found:
         assert command.startswith(("selfmodel ", "make ")), command
         if command.startswith("make "):
-            assert re.search(rf"\b{re.escape(command)}(?![\w-])", ci), command
+            assert made.issuperset(command.split()[1:]), command
     assert f"$(BIN)/{DEMO}" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
