@@ -43,10 +43,10 @@ picture: $(READY) ## draw the picture of the README from the newest run of `make
 test: $(TOOLS) ## run the fast tests: every promise, in two to three minutes on two cores
 	$(BIN)/pytest --numprocesses auto --dist loadfile --durations 10
 
-test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about five minutes on two cores
+test-slow: $(TOOLS) ## run the tests that `make test` leaves out; in about six minutes on two cores
 	$(BIN)/pytest -m "$(SLOW)" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
-test-all: $(TOOLS) ## run every test, with every case; in about eight minutes on two cores
+test-all: $(TOOLS) ## run every test, with every case; in about nine minutes on two cores
 	$(BIN)/pytest -m "" --numprocesses auto --dist loadfile --no-loadscope-reorder --durations 30
 
 docs: $(TOOLS) ## build the documentation site in docs/_build; warnings are errors
