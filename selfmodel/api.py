@@ -473,7 +473,7 @@ def set_up_diagnosis(
         settings,
         kinds,
         healthy_trials=healthy,
-        calibrate=(lambda every: arguments.fitted(robot, every, count).robot) if fit else None,
+        calibrate=partial(arguments.fitted, robot, threads=count) if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
     return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn)

@@ -52,8 +52,8 @@ class DiagnosticSearch:
         kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
         healthy_trials: Trials of the healthy robot, which measure the loss of a correct model;
             without any, no verdict is ``unexplained``.
-        calibrate: Returns the self-model that is fitted to some trials, by which an accusation is
-            checked (``adequacy``); None for a self-model that is given as it is.
+        calibrate: Fits the self-model to some trials, by which an accusation is checked
+            (``adequacy``); None for a self-model that is given as it is.
 
     Attributes:
         losses: Losses of hypotheses on the trials.

@@ -26,6 +26,7 @@ from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
@@ -37,8 +38,8 @@ Parts = Sequence[Trial | TrialPart]
 LossFunction = Callable[[Sequence[Hypothesis]], FloatArray]
 """Returns the losses of some hypotheses, ``(n, pieces)``; inf where a simulation diverged."""
 
-Calibrate = Callable[[Sequence[Trial]], Robot]
-"""Returns the self-model that is fitted to some trials of the healthy robot."""
+Calibrate = Callable[[Sequence[Trial]], Calibration]
+"""Fits the self-model to some trials of the healthy robot."""
 
 OPENING, MIN_OPENING = 1 / 3, 100
 """Part of a trial that is simulated, from its beginning, if the comparator has no surrogate, and
@@ -307,8 +308,7 @@ class Problem:
         healthy_trials: Trials of the healthy robot, or parts of them.
         names: Names of the trials of the whole diagnosis, by path.
         settings: Parameters of the search.
-        calibrate: Returns the self-model that is fitted to some trials; None for one that is given
-            as it is.
+        calibrate: Fits the self-model to some trials; None for one that is given as it is.
 
     Attributes:
         has_test: Whether hypotheses are compared by a paired test.
@@ -364,7 +364,7 @@ class Problem:
         if self.calibrate is None:
             raise ValueError("the self-model of this diagnosis is given as it is")
         every = [part.rows for part in (*self.healthy_trials, *self.trials)]
-        return self.table.of_robot(self.calibrate(every))
+        return self.table.of_robot(self.calibrate(every).robot)
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials to explain, ``(n, pieces)``."""

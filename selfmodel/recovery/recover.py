@@ -184,6 +184,7 @@ class RecoveryLoop:
             self.settings,
             self.kinds,
             healthy_trials=trials[:1],
+            calibrate=self.calibrate,
         )
 
     def _diagnose(self) -> None:

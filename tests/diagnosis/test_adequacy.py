@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,7 +103,7 @@ def problem_of(
         healthy_trials=healthy,
         names=trial_names([trial]),
         settings=Settings(),
-        calibrate=lambda _: refit or robot,
+        calibrate=lambda _: SimpleNamespace(robot=refit or robot),
     )
 
 
