@@ -187,9 +187,9 @@ def test_diagnoses_are_json_without_surprises(journal: FolderJournal, biped: Rob
 
 
 def test_rivals_of_a_third_party_s_kind_are_read_back(biped: Robot, tmp_path: Path):
-    load = FaultKind(name="load")
-    loaded = canonical([Fault(load, ENVIRONMENT)], biped.anatomy)
-    journal = create_journal(tmp_path / "run", biped.anatomy, [load], calibrated=True)
+    haul = FaultKind(name="haul")
+    loaded = canonical([Fault(haul, ENVIRONMENT)], biped.anatomy)
+    journal = create_journal(tmp_path / "run", biped.anatomy, [haul], calibrated=True)
     told = dataclasses.replace(diagnosis(biped), indistinguishable=(loaded,))
     journal.add(told)
 
