@@ -182,7 +182,11 @@ class SuiteRobot:
         self.returns = observed.returns
         # A simulation needs no stop command, whose step would add a reward.
         self._robot = EnvironmentRobot(
-            env, robot, stop=lambda: None, silent_neurons=variant.silent_neurons
+            env,
+            robot,
+            stop=lambda: None,
+            signals=SIGNALS,
+            silent_neurons=variant.silent_neurons,
         )
         self.clock = self._robot.clock
 

@@ -157,8 +157,9 @@ class EnvironmentRobot:
                 f"robot while the environment hangs; got {seconds!r} and "
                 f"{'no function' if self.stop is None else 'a function'}"
             )
-        spec = self.env.observation_spec() if self.observe is signals_by_name else {}
-        named = self.signals or [signal for signal in SIGNALS if signal in spec]
+        named = self.signals
+        if not named and self.observe is signals_by_name:
+            named = [signal for signal in SIGNALS if signal in self.env.observation_spec()]
         self.signals = {*named, "commands"} if named else SIGNALS
         self.silent_neurons = frozenset(self.silent_neurons)
         self._halt = self.stop or partial(_step_to, self.env, targets)
