@@ -270,7 +270,8 @@ def summary(row: Row) -> str:
     if row["answer"] is None:
         return f"{row['name']}: {truth}: error: {row['error'].strip()[-200:]}"
     best = row["answer"]["diagnosis"][0]
-    mark = "right" if judged(row).verdict_right else "WRONG"
+    found = judged(row)
+    mark = "right" if found.verdict_right else "no answer" if found.not_judged else "WRONG"
     return (
         f"{row['name']}: {truth}: {best['hypothesis']} ({best['distance']:.4g}), "
         f"{row['answer']['verdict']}, {mark}, {row['seconds']:.0f} s"
