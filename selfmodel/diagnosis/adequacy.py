@@ -24,7 +24,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
-from selfmodel.diagnosis.losses import Problem
+from selfmodel.diagnosis.losses import LossTable, Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPart, have_one_gait
@@ -61,41 +61,57 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
     has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
-    is_small = fit.intact_loss <= ratio * worst + significance.LOSS_FLOOR
+    loss = fit.intact_loss if accused else fit.loss
+    is_small = loss <= ratio * worst + significance.LOSS_FLOOR
     faster, left, reason = faster_joints(problem.trials, problem), share_left(accused, problem), ""
     if left > MAX_LEFT:
         if is_small or faster:
-            whatever = f"{accused} leaves {left:.0%}" if accused else "no hypothesis explains most"
-            listed = _speeds_of(list(faster)[:MAX_JOINTS], faster)
+            whatever = f"{accused} explains less" if accused else "no hypothesis explains more"
             reason = (
-                f"{whatever} of the loss beyond that of the healthy trials, which have other gaits"
-                f"{f': {listed}' if listed else ''}"
+                f"{whatever} than {1 - MAX_LEFT:.0%} of the loss beyond that of the healthy trials"
             )
     elif is_small:
-        joints = [*fit.joints, *(one.part for one in accused.faults if one.kind.is_of_joint)]
-        if uncovered := [joint for joint in joints if joint in faster]:
-            reason = f"the healthy trials do not cover it: {_speeds_of(uncovered, faster)}"
+        joints = {joint.name for joint in problem.space.anatomy.joints}
+        parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
+        refit = problem.recalibrated
+        if any(joint in faster for joint in parts):
+            faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}
+            reason = f"the healthy trials do not cover {' and '.join(faster)}"
         elif has_one_gait:
             reason = (
-                f"the healthy trials have one gait, so that the error of the self-model in another "
-                f"gait is unknown, and {accused} is within what it may be"
+                f"the healthy trials have one gait, which does not tell how large the error of the "
+                f"self-model is in another, and {accused} explains no more than it may"
             )
-        elif is_explained_without(accused, problem):
+        elif refit is None:
+            reason = f"the trials are too short for a fit that could explain them without {accused}"
+        elif is_explained_without(accused, refit, problem):
             reason = (
-                f"a self-model that is fitted to all trials predicts them about as well without "
-                f"{accused}: the healthy trials, which have other gaits, leave this open"
+                f"a self-model that is fitted to all trials predicts them as well without {accused}"
             )
-    return Doubt(reason, "record a trial of the healthy robot with this gait") if reason else None
+    return _doubt(reason, faster) if reason else None
+
+
+def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
+    if not faster:
+        return Doubt(reason, "record a trial of the healthy robot with this gait")
+    listed = "; ".join(
+        f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
+        for joint, (speed, covered) in list(faster.items())[:MAX_JOINTS]
+    )
+    return Doubt(
+        f"{reason}, and these trials are faster than the healthy ones ({listed})",
+        "record a trial of the healthy robot that is as fast",
+    )
 
 
 def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
     """Returns whether the trials with the gait of a healthy one suffice for an accusation.
 
-    They do if a fault predicts them significantly better than no fault; without a fault, if there
-    are no other trials.
+    They do if each fault is required to predict them; without a fault, if there are no other
+    trials.
     """
     drivers = [part.trial.plan.controller for part in problem.healthy_trials]
-    healthy = [part.rows for part in problem.healthy_trials]
+    healthy = [part.rows for part in problem.healthy_motions]
     known = [
         part
         for part in problem.trials
@@ -104,7 +120,8 @@ def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
     ]
     if not accused or not known:
         return len(known) == len(problem.trials)
-    return significance.is_better(*problem.table.losses([accused, INTACT], known))
+    losses, *others = problem.table.losses([accused, *problem.space.with_one_less(accused)], known)
+    return all(significance.is_better(losses, fewer) for fewer in others)
 
 
 def share_left(accused: Hypothesis, problem: Problem) -> float:
@@ -116,21 +133,13 @@ def share_left(accused: Hypothesis, problem: Problem) -> float:
     return float((loss - healthy) / (intact - healthy)) if loss > healthy else 0.0
 
 
-def _speeds_of(joints: Sequence[str], faster: Mapping[str, tuple[float, float]]) -> str:
-    """Returns the speeds of joints in the trials and in the healthy trials, as a clause."""
-    return "; ".join(
-        f"{joint} is commanded at up to {speed:.2g} rad/s, in the healthy trials {covered:.2g}"
-        for joint, (speed, covered) in ((joint, faster[joint]) for joint in joints)
-    )
-
-
-def is_explained_without(accused: Hypothesis, problem: Problem) -> bool:
+def is_explained_without(accused: Hypothesis, refit: LossTable, problem: Problem) -> bool:
     """Returns whether a self-model fitted to all trials predicts them as well without a fault.
 
     It predicts neither the trials significantly worse than the fault does, nor the healthy trials
     significantly worse than the self-model that is fitted to them alone.
     """
-    known, refit = problem.table, problem.recalibrated
+    known = problem.table
     return not any(
         significance.is_better(known.losses([fault], trials)[0], refit.losses([INTACT], trials)[0])
         for fault, trials in ((accused, problem.trials), (INTACT, problem.healthy_trials))
@@ -146,13 +155,14 @@ def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tu
     anatomy = problem.space.anatomy
     speeds, covered = (
         np.max([_speeds(part.rows.trajectory) for part in each], axis=0)
-        for each in (trials, problem.healthy_trials)
+        for each in (trials, problem.healthy_motions)
     )
     joints = {}
     for joint in anatomy.joints:
         motors = [anatomy.motors.index(motor) for motor in joint.servos]
-        if motors and (speeds[motors] > COVERAGE * covered[motors]).any():
-            joints[joint.name] = float(speeds[motors].max()), float(covered[motors].max())
+        beyond = [motor for motor in motors if speeds[motor] > COVERAGE * covered[motor]]
+        if beyond:
+            joints[joint.name] = float(speeds[beyond[0]]), float(covered[beyond[0]])
     return dict(sorted(joints.items(), key=lambda one: one[1][1] / one[1][0]))
 
 

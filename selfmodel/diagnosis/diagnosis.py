@@ -240,6 +240,7 @@ class Diagnosis:
             lines.append(f"  unsearched: {self.unsearched.hypothesis} ({self.unsearched.kind})")
         lines += [f"  {self.change}"] if self.change else []
         lines += [f"  reason: {self.reason}"] if self.reason else []
+        lines += [f"  reason: {self.doubt.reason}; {self.doubt.remedy}"] if self.doubt else []
         return "\n".join(lines) + ">"
 
     def to_dict(self) -> dict[str, Any]:

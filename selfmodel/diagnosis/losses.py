@@ -309,8 +309,10 @@ class Problem:
         names: Names of the trials of the whole diagnosis, by path.
         settings: Parameters of the search.
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
+        healthy_parts: Parts of trials before a change, in which the robot was healthy.
 
     Attributes:
+        healthy_motions: Healthy trials, and healthy parts of the trials to explain.
         has_test: Whether hypotheses are compared by a paired test.
     """
 
@@ -325,10 +327,12 @@ class Problem:
         names: Mapping[str, str],
         settings: Settings,
         calibrate: Calibrate | None = None,
+        healthy_parts: Parts = (),
     ) -> None:
         self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
         self.calibrate = calibrate
         self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
+        self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
         self.space = replace(space, observed=jams)
         self.has_test = table.is_piecewise([part.trial for part in self.trials])
@@ -342,7 +346,8 @@ class Problem:
     ) -> "Problem | None":
         """Returns the problem of a part of the trials; None if the surrogate has too few pieces.
 
-        ``healthy_trials`` are the reference if there are no trials of the healthy robot.
+        ``healthy_trials`` are the parts of the trials in which the robot was healthy; they are the
+        reference if there are no trials of the healthy robot.
         """
         table, coarse = self.surrogate[0], cut([whole(one).trial for one in self.surrogate[1]])
         if table.losses([INTACT], coarse).shape[1] < MIN_SURROGATE_PIECES:
@@ -356,15 +361,20 @@ class Problem:
             names=self.names,
             settings=self.settings,
             calibrate=self.calibrate,
+            healthy_parts=healthy_trials,
         )
 
     @cached_property
-    def recalibrated(self) -> LossTable:
-        """Losses with the self-model that is fitted to the healthy trials and these together."""
-        if self.calibrate is None:
-            raise ValueError("the self-model of this diagnosis is given as it is")
+    def recalibrated(self) -> LossTable | None:
+        """Losses with the self-model that is fitted to the healthy trials and these together.
+
+        None for a self-model that is given as it is, and if the trials are too short for a fit.
+        """
         every = [part.rows for part in (*self.healthy_trials, *self.trials)]
-        return self.table.of_robot(self.calibrate(every).robot)
+        try:
+            return self.calibrate and self.table.of_robot(self.calibrate(every).robot)
+        except InputError:
+            return None
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials to explain, ``(n, pieces)``."""

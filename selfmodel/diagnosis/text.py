@@ -120,7 +120,10 @@ def _verdict(diagnosis: Diagnosis) -> str:
 def _doubt(diagnosis: Diagnosis) -> str:
     """Returns why trials are not judged, and the remedy, as sentences."""
     doubt = diagnosis.doubt or Doubt("the diagnosis does not say why", "repeat it")
-    return f"{doubt.reason}. To have them judged, {doubt.remedy}."
+    return (
+        f"{doubt.reason}, so that a fault and an error of the self-model cannot be told apart. To "
+        f"have these trials judged, {doubt.remedy}."
+    )
 
 
 def _missing(diagnosis: Diagnosis) -> str:

@@ -104,9 +104,10 @@ def diagnosis_of(
         alike, unsearched = [one for one in equal if not _has_more(one, best)], None
     fit = _fit_of(best, problem)
     verdict = verdict_of(best, fit, alike, unsearched)
-    has_severities = problem.has_test and not best
-    accused = best if unsearched is None else unsearched.hypothesis
+    explained = INTACT if verdict == "unexplained" else best
+    accused = explained if unsearched is None else unsearched.hypothesis
     doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
+    has_severities = problem.has_test and not best and doubt is None
     severities = (
         detectable_severities(best, problem.space, problem.losses) if has_severities else []
     )

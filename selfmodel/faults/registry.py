@@ -44,8 +44,8 @@ DEFAULT_KINDS: tuple[FaultKind, ...] = KIND_SETS["default"]
 
 
 def suitable(kinds: Sequence[FaultKind], anatomy: Anatomy) -> tuple[FaultKind, ...]:
-    """Returns kinds to search; of the default kinds, if all are given, those that suit a robot."""
-    whole = set(kinds).issuperset(DEFAULT_KINDS)
+    """Returns kinds to search; if all of the environment are given, those that suit a robot."""
+    whole = set(kinds).issuperset(_ENVIRONMENT_KINDS)
     return tuple(kind for kind in kinds if kind.suits(anatomy) or not whole)
 
 

@@ -85,11 +85,11 @@ def candidates_to_separate(diagnosis: Diagnosis) -> tuple[Hypothesis, ...]:
     """Returns the best hypothesis and the hypotheses to separate from it, at most five in all.
 
     These are the indistinguishable hypotheses or, if there are none and the diagnosis is
-    ``unexplained``, the next in the ranking; then the hypotheses with an undetectable fault. If
-    there are none of these either, the next in the ranking follow.
+    ``unexplained`` or ``not judged``, the next in the ranking; then the hypotheses with an
+    undetectable fault. If there are none of these either, the next in the ranking follow.
     """
     followers = tuple(one.hypothesis for one in diagnosis.ranked[1:] if math.isfinite(one.distance))
-    unexplained = followers if diagnosis.verdict == "unexplained" else ()
+    unexplained = followers if diagnosis.verdict in ("unexplained", "not judged") else ()
     others = diagnosis.indistinguishable or unexplained
     to_separate = dict.fromkeys([*others, *diagnosis.undetectable]) or followers
     return (diagnosis.best, *to_separate)[:MAX_HYPOTHESES]

@@ -226,7 +226,8 @@ def _steps(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> Floa
     landings = np.count_nonzero((stands[..., 1:] == 1) & (stands[..., :-1] == 0), axis=-2)
     end = falls_of(robot, hypothesis, trajectory)
     before = np.arange(landings.shape[-1]) + window + 1 < end[..., np.newaxis]
-    return np.asarray(np.where(before, landings, 0.0).sum(axis=-1))
+    steps = np.where(before, landings, 0.0).sum(axis=-1)
+    return np.where(np.isfinite(touch).any(axis=(-2, -1)), steps, np.nan)
 
 
 def joint_work(robot: Robot, trajectory: Trajectory) -> FloatArray:

@@ -4,7 +4,14 @@ from typing import Any
 
 import pytest
 
-from selfmodel.diagnosis.diagnosis import Candidate, Change, DetectableSeverity, Diagnosis, Fit
+from selfmodel.diagnosis.diagnosis import (
+    Candidate,
+    Change,
+    DetectableSeverity,
+    Diagnosis,
+    Doubt,
+    Fit,
+)
 from selfmodel.diagnosis.direct_evidence import ConstantSensor, DirectEvidence
 from selfmodel.diagnosis.text import (
     detectable_sentences,
@@ -159,3 +166,10 @@ def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
         ),
         "In 02, constant readings: a (1), b (0.25).",
     ]
+
+
+def test_trials_that_are_not_judged_have_a_reason_and_a_remedy():
+    sentence = verdict_sentences(diagnosis(verdict="not judged", doubt=Doubt("WHY", "DO THIS")))
+
+    assert sentence.startswith("Not judged: WHY, so that")
+    assert sentence.endswith("To have these trials judged, DO THIS.")

@@ -50,7 +50,9 @@ def test_a_kind_that_cannot_strike_a_robot_is_passed_over_and_alone_refused():
         HypothesisSpace.of((KINDS["sensor"], KINDS["sensor-gain"]), anatomy)
 
 
-def test_the_default_kinds_are_those_of_the_robots_base_and_others_are_searched_if_named():
+def test_the_kinds_of_a_set_are_those_of_the_robots_base_and_others_are_searched_if_named(
+    quadruped: Robot,
+):
     of_ground_and_air = {"friction", "slope", "wind", "crosswind", "roughness", "grip"}
     for kinds in (KIND_SETS["default"], ALL_KINDS, (*KIND_SETS["default"], KINDS["damping"])):
         names = {kind.name for kind in HypothesisSpace.of(kinds, arm().anatomy).kinds}
@@ -58,6 +60,8 @@ def test_the_default_kinds_are_those_of_the_robots_base_and_others_are_searched_
         assert {"motor", "load"} <= names
     named = (KINDS["motor"], KINDS["wind"], KINDS["slope"])
     assert HypothesisSpace.of(named, arm().anatomy).kinds == named
+    walking = HypothesisSpace.of(KIND_SETS["environment"], quadruped.anatomy).kinds
+    assert {kind.name for kind in walking} == {"friction", "slope", "wind", "payload"}
 
 
 def test_a_kind_that_no_diagnosis_may_propose_is_refused(robot: Robot):

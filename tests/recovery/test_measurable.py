@@ -124,3 +124,14 @@ def test_a_foot_that_bounces_trembles_or_is_misread_takes_one_step(quadruped: Ro
     signals = {"sensors": sensors, "base_orientation": turn, "base_position": position}
     trajectory = Trajectory(names, np.arange(steps) * 0.01, signals)
     np.testing.assert_array_equal(STEPS.of(quadruped, INTACT, trajectory), [15, 7])
+
+
+def test_steps_are_unknown_where_no_touch_sensor_was_observed(quadruped: Robot):
+    touch = [one.kind == "touch" for one in quadruped.anatomy.sensors]
+    sensors = np.where(touch, np.nan, 0.1) * np.ones((50, 1))
+    signals = {"sensors": sensors} | {
+        signal: np.zeros((50, quadruped.anatomy.names.width(signal))) for signal in UPRIGHT.record
+    }
+    trajectory = Trajectory(quadruped.anatomy.names, 0.01 * np.arange(50), signals)
+
+    assert np.isnan(STEPS.of(quadruped, INTACT, trajectory)).all()

@@ -68,6 +68,7 @@ UNSEEN = "sensor:front_left_touch"
         ("ambiguous", 1, [UNSEEN], (*TEXTS[:2], UNSEEN)),
         ("explained", 0, [UNSEEN], (TEXTS[0], UNSEEN)),
         ("unexplained", 0, [UNSEEN], TEXTS),  # the next in the ranking first
+        ("not judged", 0, [UNSEEN], TEXTS),
     ],
 )
 def test_rivals_come_first_then_what_is_unseen_and_without_any_those_that_follow(
