@@ -8,6 +8,7 @@ reads the files, whose content may be hostile.
 import hashlib
 import io
 import re
+import shlex
 import shutil
 import sqlite3
 import tempfile
@@ -230,8 +231,14 @@ def _is_closed(file: Path) -> bool:
 
 
 def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
-    beside = [file.with_name(file.name + suffix) for suffix in ("-wal", "-journal")]
-    files = [file, *(path for path in beside if path.is_file() and path.stat().st_size)]
+    log, journal = (file.with_name(file.name + suffix) for suffix in ("-wal", "-journal"))
+    if _has_data(journal):  # SQLite deletes the file that a journal names as its super-journal
+        raise InputError(
+            f"{file}: its recorder did not close it, and {journal.name} has what its last "
+            f"transaction overwrote: roll it back with `sqlite3 {shlex.quote(str(file))} "
+            f"'PRAGMA quick_check'`, if the bag is from a source that you trust"
+        )
+    files = [file, log] if _has_data(log) else [file]
     # SQLite reads from many places.
     found.digests.update({path.name: file_digest(path) for path in files})
     if len(files) == 1:
@@ -240,12 +247,16 @@ def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
     with tempfile.TemporaryDirectory() as folder:
         copy, *_ = [Path(shutil.copyfile(path, Path(folder, path.name))) for path in files]
         with closing(sqlite3.connect(copy)) as database:
-            database.execute("PRAGMA journal_mode=DELETE").fetchone()  # merges the journal
+            database.execute("PRAGMA journal_mode=DELETE").fetchone()  # merges the log
         yield from _rows(copy)
     found.notes.append(
-        f"{file.name} was not closed by its recorder: it was read together with {files[1].name}, "
+        f"{file.name} was not closed by its recorder: it was read together with {log.name}, "
         f"up to the last transaction that is complete"
     )
+
+
+def _has_data(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0
 
 
 def _rows(file: Path) -> Iterator[_Stored]:

@@ -202,6 +202,8 @@ def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
             groups.setdefault((match["group"], axis.isdecimal()), {}).setdefault(axis, name)
     found: dict[str, dict[str, tuple[str, ...]]] = {"base": {}, "imu": {}}
     for (group, numbered), axes in groups.items():
+        if is_command(group) or is_touch(group):
+            continue
         words = set(words_of(group)) or {"p"}
         for quantity, known in _VECTORS.items():
             width = 4 if quantity == "orientation" else 3

@@ -170,9 +170,8 @@ def test_a_bag_that_is_not_there_is_named(tmp_path: Path):
         read_bag(bag)
 
 
-@pytest.mark.parametrize("mode", ["WAL", "DELETE"])
-def test_what_a_recorder_left_beside_its_database_is_read_with_it(mode: str, tmp_path: Path):
-    """A process that is killed leaves its last transactions, or half of one, in another file."""
+def killed_recorder(tmp_path: Path, mode: str) -> Path:
+    """Database of a process that was killed: half of a transaction, or all, is beside it."""
     database = storage(write_bag(tmp_path / "bag", recorded(0.1), "sqlite"))
     with closing(sqlite3.connect(database)) as recorder:
         recorder.execute(f"PRAGMA journal_mode={mode}")
@@ -185,16 +184,39 @@ def test_what_a_recorder_left_beside_its_database_is_read_with_it(mode: str, tmp
         killed.mkdir()
         for path in database.parent.glob("*.db3*"):
             Path(shutil.copy(path, killed)).chmod(0o444)
+    return killed / database.name
+
+
+def test_what_a_recorder_left_beside_its_database_is_read_with_it(tmp_path: Path):
+    database = killed_recorder(tmp_path, "WAL")
+    killed = database.parent
     content = {path.name: path.read_bytes() for path in killed.iterdir()}
-    assert len([name for name in content if not name.endswith("-shm")]) == 2
+    assert f"{database.name}-wal" in content
 
-    found = read_bag(killed / database.name)
+    found = read_bag(database)
 
-    messages = sum(series.count for series in found.series.values())
-    assert messages == (5 if mode == "WAL" else len(recorded(0.1)))
+    assert sum(series.count for series in found.series.values()) == 5
     assert [note.partition(" was not closed")[0] for note in found.notes] == [database.name]
     assert found.digests.keys() == content.keys() - {f"{database.name}-shm"}
     assert {path.name: path.read_bytes() for path in killed.iterdir()} == content  # unchanged
+
+
+def test_a_journal_that_names_another_file_deletes_nothing(tmp_path: Path):
+    """SQLite would roll it back, and delete the file that it names as its super-journal."""
+    database = killed_recorder(tmp_path, "DELETE")
+    victim = tmp_path / "victim"
+    victim.write_text("x")
+    name = bytes(victim)
+    journal = database.with_name(f"{database.name}-journal")
+    journal.chmod(0o644)
+    with journal.open("ab") as file:  # as sqlite3BtreeCommitPhaseOne writes it
+        file.write(struct.pack(">I", 2**30 // 4096 + 1) + name)
+        file.write(struct.pack(">II", len(name), sum(name)) + journal.read_bytes()[:8])
+
+    with pytest.raises(InputError, match=f"{journal.name} .*sqlite3 .*quick_check"):
+        read_bag(database)
+
+    assert victim.exists()
 
 
 @pytest.mark.parametrize("chunked", [True, False])

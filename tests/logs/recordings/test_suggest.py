@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs.recordings.mapping_file import parse_mapping
-from selfmodel.logs.recordings.names import likeness, matched
+from selfmodel.logs.recordings.names import classified, likeness, matched
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.robot.robot import Robot
 from tests.logs.recordings.bags import T0, joint_state, made, write_bag
@@ -148,6 +148,13 @@ def test_a_contact_is_none_without_a_word_for_it(biped: Robot, tmp_path: Path):
     text = suggestion(write_bag(tmp_path / "bag", items), biped)
     assert '[touch.right_touch]\ntopic = "/right_contact"' in text
     assert "# No topic is similar to left_touch" in text
+
+
+@pytest.mark.parametrize("group", ["desired_position", "lf_foot_pos"])
+def test_a_vector_of_a_command_or_a_foot_is_not_the_base(group: str):
+    own = [f"{group}_{axis}" for axis in "xyz"]
+    base = [f"base_pos_{axis}" for axis in "xyz"]
+    assert classified(own + base).vectors["base"] == {"position": tuple(base)}
 
 
 def test_numbered_columns_are_mapped_in_order_and_marked(biped: Robot, tmp_path: Path):
