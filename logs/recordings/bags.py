@@ -236,7 +236,7 @@ def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
         raise InputError(
             f"{file}: its recorder did not close it, and {journal.name} has what its last "
             f"transaction overwrote: roll it back with `sqlite3 {shlex.quote(str(file))} "
-            f"'PRAGMA quick_check'`, if the bag is from a source that you trust"
+            f"'PRAGMA user_version=0'`, if the bag is from a source that you trust"
         )
     files = [file, log] if _has_data(log) else [file]
     # SQLite reads from many places.

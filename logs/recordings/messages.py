@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zstandard
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ TYPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 MAX_ELEMENTS = 100
 """Length of the longest list in a message whose numbers are columns: an image has none."""
+
+_TIME = "builtin_interfaces/msg/Time"
+_NO_POSITION = 2e9
+"""Magnitude of Unitree's ``PosStopF``, 2.146e9, by which a motor is commanded no angle."""
 
 Rows = tuple[tuple[str, ...], "FloatArray"]
 """Names in a message, and a row of numbers for each, ``(names, width)``."""
@@ -73,7 +78,7 @@ def decode(
 
     Raises:
         RefusedError: The message contradicts itself.
-        UndefinedError: The type has no definition.
+        UndefinedError: The type has no definition that can be used.
     """
     if encoding == CDR and data.startswith(ZSTD_MAGIC):
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
@@ -86,14 +91,17 @@ def decode(
         if encoding == ROS1
         else store.deserialize_cdr(data, kind)
     )
-    stamp = 0
-    if hasattr(message, "header"):
-        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+    stamp, stamped = 0, getattr(getattr(message, "header", None), "stamp", None)
+    if getattr(stamped, "__msgtype__", "") == _TIME:  # a type of one's own may have any header
+        stamp = stamped.sec * 10**9 + stamped.nanosec
     if stamp < 0:
         raise RefusedError("with a stamp before 1970")
     if kind in DECODERS:
         return stamp, DECODERS[kind](message)
     numbers = {name: _number(message, name) for name in columns} or dict(_numbers(message))
+    if kind.startswith("unitree_"):
+        stopped = [n for n, q in numbers.items() if n.endswith(".q") and abs(q) >= _NO_POSITION]
+        numbers |= dict.fromkeys(stopped, math.inf)
     return stamp, (tuple(numbers), np.array([*numbers.values()], dtype=np.float64)[:, np.newaxis])
 
 
@@ -101,19 +109,30 @@ def decode(
 def _store(encoding: str, kind: str = "", definition: str = "") -> "Typestore | None":
     """Message types of ROS, which are the same for ``DECODERS`` in all distributions, and a kind.
 
-    There are none of a kind that has no definition.
+    There are none of a kind that has no definition, or one that cannot be used.
     """
     store = get_typestore(Stores.ROS1_NOETIC if encoding == ROS1 else Stores.ROS2_HUMBLE)
     if not kind or (kind in store.fielddefs and not definition):
         return store
     try:
         defined = get_types_from_msg(definition or DEFINITIONS[kind], kind)
+        if any(map(_is_endless, defined.values())):
+            return None
         for name in defined:
             store.fielddefs.pop(name, None)  # of another distribution
         store.register(defined)
-    except (KeyError, TypesysError):
+        store.get_msgdef(kind)  # of types that are defined, and do not contain themselves
+    except (KeyError, TypesysError, RecursionError, SyntaxError):
         return None
     return store
+
+
+def _is_endless(definition: Any) -> bool:  # noqa: ANN401  # a tree of rosbags
+    """Whether a type has a long array of messages, each of which may have no bytes."""
+    return any(
+        node == Nodetype.ARRAY and about[0][0] == Nodetype.NAME and about[1] > MAX_ELEMENTS
+        for _, (node, about) in definition[1]
+    )
 
 
 def text(encoding: str, definition: bytes) -> str:

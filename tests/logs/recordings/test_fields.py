@@ -222,6 +222,40 @@ def test_a_type_of_the_bag_goes_before_that_of_ros(biped: Robot, tmp_path: Path)
     assert 'topic = "?"' in suggest(path, biped, "b.xml", with_timestep=True)
 
 
+LINE = "=" * 80
+
+
+@pytest.mark.parametrize(
+    ("definition", "is_defined"),
+    [
+        ("uint8 header", True),
+        (f"lab_msgs/Header header\n{LINE}\nMSG: lab_msgs/Header\nuint8 x", True),
+        ("lab_msgs/Nowhere x", False),
+        ("lab_msgs/Odd x", False),
+        (f"E[100000000] q\n{LINE}\nMSG: lab_msgs/E\n", False),
+    ],
+)
+def test_an_odd_definition_damages_no_bag(*, definition: str, is_defined: bool, tmp_path: Path):
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("lab_msgs/msg/Odd", "ros2msg", definition.encode())
+        writer.add_message(writer.register_channel("/odd", "cdr", schema), T0, b"\0\1\0\0\7", T0)
+        writer.finish()
+
+    series = read_bag(path).series["/odd"]
+
+    assert [column.values.item() for column in series.columns.values()] == [7.0] * is_defined
+    assert series.stamps.tolist() == [0] * is_defined
+
+
+def test_a_motor_that_is_commanded_no_angle_has_none(tmp_path: Path):
+    bag = write_bag(tmp_path / "bag", [("/lowcmd", T0, low_command([1.0, 2.146e9]))])
+    columns = read_bag(bag).series["/lowcmd"].columns
+    assert [columns[f"motor_cmd[{k}].q"].values.item() for k in range(2)] == [1.0, np.inf]
+
+
 def test_only_the_numbers_that_a_mapping_names_are_kept(of_lab: Path):
     places = parse_mapping(MAPPING, "m").places.values()
     series = read_bag(of_lab, {"/state": {name for one in places for name in one.columns}})
