@@ -32,6 +32,8 @@ def main(wheel: Path) -> None:
     """Runs both checks; exits with what failed."""
     with ThreadPoolExecutor() as pool:
         found = list(pool.map(check, (wheel, wheel), (11, 12), (lowest(), [])))
+    if not any(map(interpreter, (11, 12))):
+        sys.exit("nothing was checked: install Python 3.11 or 3.12")
     failures = [text for text in found if text]
     if failures:
         sys.exit("\n".join(failures))

@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain, count
 from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -294,8 +294,11 @@ def _ros1(file: Path, found: _Found) -> Iterator[_Stored]:
             for c in reader.connections
         }
         yield from topics.values()
-        number = 0
-        for connection, time, data in reader.messages():
+        # The library merges topics by time, and so the runs of a clock that restarts.
+        entries = sorted(chain(*reader.indexes.values()), key=lambda e: (e.chunk_pos, e.offset))
+        first, number = reader.connections[:1], 0
+        reader.indexes.update({connection.id: entries for connection in first})
+        for connection, time, data in reader.messages(first):
             number += 1
             yield topics[connection.id]._replace(time=time, data=data)
         # The library reads what the index has; the chunks have counts of their own.

@@ -219,11 +219,11 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
     if not series.count:
         raise mapping.error(path, f"expected messages on {topic}, got none: name another one")
     if topic not in fitting:
-        is_known = series.type in DECODERS
+        lost = ", which the bag does not define, or whose messages have no numbers that can be read"
         raise mapping.error(
             path,
             f"expected a topic of {' or '.join(kinds)} for {'.'.join(role)}, got {topic} of "
-            f"{series.type or 'no type'}{'' if is_known else ', which the bag does not define'}: "
+            f"{series.type or 'no type'}{'' if series.type in DECODERS else lost}: "
             f"name one that fits, of "
             f"{', '.join(fitting) or 'which the bag has none'}",
         )

@@ -91,7 +91,8 @@ def decode(
         if encoding == ROS1
         else store.deserialize_cdr(data, kind)
     )
-    stamp, stamped = 0, getattr(getattr(message, "header", None), "stamp", None)
+    stamp = 0
+    stamped: Any = getattr(getattr(message, "header", None), "stamp", None)
     if getattr(stamped, "__msgtype__", "") == _TIME:  # a type of one's own may have any header
         stamp = stamped.sec * 10**9 + stamped.nanosec
     if stamp < 0:

@@ -87,7 +87,8 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
     robot = arguments.robot_of_logs(logs, options.self_model)
     trials = tuple(log.trial for log in logs)
     split = len(options.healthy or ())
-    failed, healthy = (trials[split:], trials[:split]) if split else by_stage(trials)
+    failed, before = by_stage(trials[split:])
+    healthy = trials[:split] + before
     explained = [log for log in logs if log.trial in failed]
     settings = explained[0].settings
     if options.generations is not None:

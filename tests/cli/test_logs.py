@@ -255,7 +255,7 @@ def test_a_log_given_as_healthy_is_so_whatever_its_stage(
     done = selfmodel("diagnose", before, failed, "--healthy", later, *PAPERS, "--json", cwd=folder)
 
     found = json.loads(done.stdout)
-    assert (found["logs"], found["intact"]) == ([before, failed], [later])
+    assert (found["logs"], found["intact"]) == ([failed], [later, before])
     assert found["files"].keys() == {before, failed, later}
 
 

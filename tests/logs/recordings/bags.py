@@ -1,6 +1,6 @@
 """Bags that the tests make: messages, written in every form that rosbag2 has."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +50,20 @@ ROS1_FORMS = {
 }
 
 
-def write_ros1(path: Path, items: Iterable[Item], form: str = "none") -> Path:
-    """Writes a ROS 1 bag in one of ``ROS1_FORMS``, in several chunks, and returns its path."""
+def write_ros1(
+    path: Path,
+    items: Iterable[Item],
+    form: str = "none",
+    key: Callable[[Item], int] = lambda item: item[1],
+) -> Path:
+    """Writes a ROS 1 bag in one of ``ROS1_FORMS``, sorted, in several chunks; returns its path."""
     writer = Ros1Writer(path)
     writer.chunk_threshold = 2**14
     if (compression := ROS1_FORMS[form]) is not None:
         writer.set_compression(compression)
     with writer:
         known = {}
-        for topic, time, message in sorted(items, key=lambda item: item[1]):
+        for topic, time, message in sorted(items, key=key):
             kind = message.__msgtype__
             if topic not in known:
                 known[topic] = writer.add_connection(topic, kind, typestore=ROS1)

@@ -183,7 +183,7 @@ def test_numbers_of_a_type_of_ones_own_are_named_by_their_place_in_a_message(
         (
             '"/state"',
             '"/undefined"',
-            "4: .*lab_msgs/msg/State, which the bag does not define.* /state",
+            "4: .*lab_msgs/msg/State, which the bag does not define, or whose .* numbers.* /state",
         ),
         ("[commands]\n", '[imu]\ntopic = "/state"\n[commands]\n', "11: .*under orientation or ang"),
     ],

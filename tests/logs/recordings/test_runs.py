@@ -1,6 +1,7 @@
 """A clock that restarts makes several runs, of which one is imported, and never a mixture."""
 
 import json
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -41,9 +42,9 @@ def test_a_table_of_two_runs_is_refused_until_one_is_chosen(biped: Robot, tmp_pa
         imported(tmp_path / "1.npz", biped, OF_TABLE, 2)
 
 
-@pytest.mark.parametrize("rare", [True, False])
+@pytest.mark.parametrize(("rare", "ros1"), [(True, False), (False, False), (False, True)])
 def test_every_topic_of_a_bag_has_its_own_part_of_a_run(
-    *, rare: bool, biped: Robot, tmp_path: Path
+    *, rare: bool, ros1: bool, biped: Robot, tmp_path: Path
 ):
     """The clock of a simulation restarts; a rare topic has too few messages to show it."""
     mapping, _, _ = MAPPING.partition("[base]")
@@ -67,6 +68,8 @@ def test_every_topic_of_a_bag_has_its_own_part_of_a_run(
     for number, items in enumerate(runs):
         (file,) = write_bag(tmp_path / f"{number}", items).glob("*.mcap")
         file.rename(bag / f"part_{number}.mcap")
+    if ros1:
+        bag = write_ros1(tmp_path / "a.bag", chain(*runs), key=lambda _: 0)
 
     with pytest.raises(InputError, match=r"2 runs of 0\.995, 1\.495 s"):
         imported(bag, biped, mapping)
