@@ -176,7 +176,7 @@ class Diagnose(FromLogs):
     """Rank hypotheses by how well they predict logged trials, without a robot.
 
     Give the logs in the order in which the trials were run. The self-model is fitted to the
-    trials of the healthy robot: those of --healthy, or else of the stage before. The hypotheses
+    trials of the healthy robot: those of --healthy, and those of the stage before. The hypotheses
     predict all others.
     """
 
