@@ -352,6 +352,7 @@ class _Topic:
         layouts: Indices and rows of these by the names in them, nearly always the same.
         refused: Numbers of messages left out, by reason.
         listed: Columns to decode of the messages after the first.
+        absent: Those that the first does not have: a list in another one may be longer.
     """
 
     types: dict[str, None] = field(default_factory=dict)
@@ -360,6 +361,7 @@ class _Topic:
     layouts: dict[tuple[str, ...], list[tuple[int, "FloatArray"]]] = field(default_factory=dict)
     refused: Counter[str] = field(default_factory=Counter)
     listed: tuple[str, ...] = ()
+    absent: frozenset[str] = frozenset()
 
     def add(self, item: _Stored, place: int, columns: Collection[str] | None) -> None:
         """Adds a message, or an announcement; ``columns`` of it, all if empty, or None."""
@@ -386,8 +388,11 @@ class _Topic:
         except messages.RefusedError as refused:
             self.refused[str(refused)] += 1
             return
-        if not self.layouts:
-            self.listed = tuple(name for name in columns if name in set(names))
+        if by_place and not self.layouts:
+            self.listed = tuple(columns)
+            self.absent = frozenset(columns) - set(names)
+            rows = np.append(rows, np.full((len(self.absent), 1), np.nan), axis=0)
+            names = (*names, *sorted(self.absent))
         if names or not by_place:
             self.layouts.setdefault(names, []).append((len(self.times), rows))
             self.times.append((stamp, item.time, place))
@@ -405,9 +410,10 @@ class _Topic:
             index = np.concatenate([part.index for part in some])
             order = np.argsort(index)
             values = np.concatenate([part.values for part in some])
-            columns[name] = Column(index[order], values[order])
+            if name not in self.absent or not np.isnan(values).all():
+                columns[name] = Column(index[order], values[order])
         stamps, logged, places = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
-        kind, names, count = " and ".join(self.types), tuple(parts), self.count
+        kind, names, count = " and ".join(self.types), tuple(columns), self.count
         by_place = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
         return Series(
             kind, count, stamps, logged, places, names, columns, self.refused, by_place=by_place

@@ -155,17 +155,22 @@ def _numbers(value: Any, name: str = "") -> Iterator[tuple[str, float]]:  # noqa
 
 
 def _number(message: Any, name: str) -> float:  # noqa: ANN401
-    """Number of that name in a message; NaN in one whose list is shorter."""
+    """Number of that name in a message; NaN in one that has none, as its list is shorter."""
     value = message
     for part in _parts(name):
-        if isinstance(part, int) and part >= len(value):
+        try:
+            if isinstance(part, int) and len(value) > MAX_ELEMENTS:
+                return math.nan
+            value = value[part] if isinstance(part, int) else vars(value)[part]
+        except (LookupError, TypeError):
             return math.nan
-        value = value[part] if isinstance(part, int) else getattr(value, part)
-    return float(value)
+    return float(value) if isinstance(value, int | float | np.number | np.bool_) else math.nan
 
 
 @cache
 def _parts(name: str) -> tuple[str | int, ...]:
+    if not re.fullmatch(r"\w+(\.[A-Za-z]\w*|\[(0|[1-9]\d?)\])*", name):
+        return (name,)
     return tuple(int(part) if part.isdecimal() else part for part in re.findall(r"\w+", name))
 
 

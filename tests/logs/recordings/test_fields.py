@@ -132,7 +132,7 @@ right_hip_y = "wanted[3]"
 
 @pytest.fixture(scope="module")
 def of_lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bag of a laboratory's own type, whose list has three joints in messages 20 to 23."""
+    """A bag of a laboratory's own type, whose list has three joints in messages 0 and 20 to 23."""
     kind = "lab_msgs/msg/State"
     ROS.register(get_types_from_msg(STATE, kind))
     path = tmp_path_factory.mktemp("lab") / "bag.mcap"
@@ -148,7 +148,7 @@ def of_lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "/undefined": writer.register_channel("/undefined", "cdr", unknown),
         }
         for k in range(50):
-            stamp, seen = T0 + k * 10**7, 3 if 20 <= k < 24 else 4
+            stamp, seen = T0 + k * 10**7, 3 if k < 1 or 20 <= k < 24 else 4
             joints = [made("lab_msgs/msg/Joint", angle=k / 100 + j) for j in range(seen)]
             message = made(kind, header=header(stamp), joints=joints, wanted=[1, 2, 3, 4])
             data = bytes(ROS.serialize_cdr(message, kind))
@@ -165,9 +165,9 @@ def test_numbers_of_a_type_of_ones_own_are_named_by_their_place_in_a_message(
     angles = recording.trajectory["joint_positions"]
     time = recording.trajectory.time
 
-    assert np.allclose(angles[:, 0], time, atol=1e-6)
-    assert np.allclose(angles[:, 1], 0.1 - (1 + time), atol=1e-6)
-    assert np.flatnonzero(np.isnan(angles[:, 3])).tolist() == [20, 21, 22, 23]
+    assert np.allclose(angles[:, 0], 0.01 + time, atol=1e-6)
+    assert np.allclose(angles[:, 1], 0.1 - (1.01 + time), atol=1e-6)
+    assert np.flatnonzero(np.isnan(angles[:, 3])).tolist() == [19, 20, 21, 22]
     assert np.allclose(recording.trajectory["commands"], [1, 2, 3, 4])
     assert recording.qualities["/state"].latency == pytest.approx(0.005)
 
