@@ -24,7 +24,7 @@ PAPER_KINDS: tuple[FaultKind, ...] = (joints.BROKEN, joints.JAMMED, sensors.FAIL
 """Kinds of the paper's diagnosis, in the order of its genome."""
 
 _BODY_KINDS = tuple(KINDS[name] for name in ("break", "jam", "jam-angle", "sensor", "motor"))
-_ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload", "load"))
+_ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload"))
 
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)
 """All built-in kinds that a diagnosis may propose."""

@@ -57,7 +57,8 @@ def test_the_kinds_of_a_set_are_those_of_the_robots_base_and_others_are_searched
     for kinds in (KIND_SETS["default"], ALL_KINDS, (*KIND_SETS["default"], KINDS["damping"])):
         names = {kind.name for kind in HypothesisSpace.of(kinds, arm().anatomy).kinds}
         assert names.isdisjoint({*of_ground_and_air, "payload"})
-        assert {"motor", "load"} <= names
+        assert "motor" in names
+        assert ("load" in names) == (kinds == ALL_KINDS)  # in place of a weak servo on a real one
     named = (KINDS["motor"], KINDS["wind"], KINDS["slope"])
     assert HypothesisSpace.of(named, arm().anatomy).kinds == named
     walking = HypothesisSpace.of(KIND_SETS["environment"], quadruped.anatomy).kinds
