@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.logs.recordings.recording import Column, IntArray, Series
@@ -132,7 +132,8 @@ def reach(times: FloatArray | IntArray, step: float = 0.0) -> FloatArray:
         return np.zeros(len(times))
     usual = np.full(len(periods), np.median(periods))
     if (last := len(periods) - RATE_WINDOW) >= 0:
-        medians = np.median(sliding_window_view(periods, RATE_WINDOW), axis=1)
+        half = RATE_WINDOW // 2
+        medians = median_filter(periods, RATE_WINDOW, mode="nearest")[half : len(periods) - half]
         place = np.arange(len(periods))
         for first in (np.minimum(place, last), np.maximum(place - RATE_WINDOW + 1, 0)):
             usual = np.maximum(usual, medians[first])

@@ -63,8 +63,8 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
     loss = fit.intact_loss if accused else fit.loss
     is_small = loss <= ratio * worst + significance.LOSS_FLOOR
-    faster, left, reason = faster_joints(problem.trials, problem), share_left(accused, problem), ""
-    if left > MAX_LEFT:
+    faster, reason = faster_joints(problem.trials, problem), ""
+    if share_left(accused, fit, problem) > MAX_LEFT:
         if is_small or faster:
             whatever = f"{accused} explains less" if accused else "no hypothesis explains more"
             reason = (
@@ -73,7 +73,6 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     elif is_small:
         joints = {joint.name for joint in problem.space.anatomy.joints}
         parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
-        refit = problem.recalibrated
         if any(joint in faster for joint in parts):
             faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}
             reason = f"the healthy trials do not cover {' and '.join(faster)}"
@@ -82,7 +81,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
                 f"the healthy trials have one gait, which does not tell how large the error of the "
                 f"self-model is in another, and {accused} explains no more than it may"
             )
-        elif refit is None:
+        elif (refit := problem.recalibrated) is None:
             reason = f"the trials are too short for a fit that could explain them without {accused}"
         elif is_explained_without(accused, refit, problem):
             reason = (
@@ -124,13 +123,15 @@ def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
     return all(significance.is_better(losses, fewer) for fewer in others)
 
 
-def share_left(accused: Hypothesis, problem: Problem) -> float:
-    """Returns the share of the loss beyond that of the healthy trials that a hypothesis leaves."""
-    if not accused:
+def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
+    """Returns the share of the loss beyond that of the healthy trials that a hypothesis leaves.
+
+    An empty one leaves all. Without such a loss, nothing is left.
+    """
+    if not accused or fit.healthy_loss is None:
         return 1.0
     loss, intact = problem.losses([accused, INTACT]).mean(axis=1)
-    healthy = 0.0 if problem.reference is None else problem.reference.mean()
-    return float((loss - healthy) / (intact - healthy)) if loss > healthy else 0.0
+    return significance.share_left(float(loss), float(intact), fit.healthy_loss) or 0.0
 
 
 def is_explained_without(accused: Hypothesis, refit: LossTable, problem: Problem) -> bool:

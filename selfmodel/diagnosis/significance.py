@@ -196,6 +196,15 @@ def excess_over_healthy(losses: FloatArray, healthy: FloatArray) -> float:
     return difference / error if error > 0 else math.inf
 
 
+def share_left(loss: float, intact_loss: float, healthy_loss: float) -> float | None:
+    """Returns the share of the loss beyond that of healthy trials that a hypothesis leaves, 0 to 1.
+
+    None if the empty hypothesis has no such loss.
+    """
+    beyond = intact_loss - healthy_loss
+    return min(max((loss - healthy_loss) / beyond, 0.0), 1.0) if beyond > 0 else None
+
+
 def _welch(one: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Difference of the means and its standard error (Welch)."""
     variance = one.var(ddof=1) / len(one) + other.var(ddof=1) / len(other)

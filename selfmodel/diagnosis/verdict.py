@@ -160,8 +160,7 @@ def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
     if (reference := problem.reference) is not None:
         healthy_loss = float(reference.mean())
         excess = significance.excess_over_healthy(losses, reference)
-        if (beyond := intact_loss - healthy_loss) > 0:
-            left = min(max((loss - healthy_loss) / beyond, 0.0), 1.0)
+        left = significance.share_left(loss, intact_loss, healthy_loss)
     return Fit(
         loss,
         intact_loss,

@@ -114,7 +114,8 @@ def doubted(problem: Problem, accused: str, ratio: float = 2.0) -> Doubt | None:
     hypothesis = parse(accused, problem.space.anatomy)
     worst = max(problem.table.losses([INTACT], [one]).mean() for one in problem.healthy_trials)
     loss = ratio * float(worst)
-    return doubt_of(hypothesis, Fit(loss, loss, None, None, 6.0, bool(hypothesis)), problem)
+    healthy = float(problem.healthy([INTACT]).mean())
+    return doubt_of(hypothesis, Fit(loss, loss, healthy, None, 6.0, bool(hypothesis)), problem)
 
 
 def test_what_a_refit_explains_without_a_fault_is_no_fault(
@@ -282,3 +283,15 @@ def test_the_time_before_a_change_shows_its_gait_as_healthy(
     assert later is not None
     assert is_shown_in_known_gaits(INTACT, later)
     assert not is_shown_in_known_gaits(INTACT, problem)
+
+
+def test_no_refit_is_made_where_the_gaits_decide(
+    table: LossTable, healthy: list[Trial], weak: Trial
+):
+    def unexpected(_: Sequence[Trial]) -> Calibration:
+        raise AssertionError("a refit takes seconds")
+
+    problem = problem_of(table, weak, healthy[:1])
+    problem.calibrate = unexpected
+
+    assert doubted(problem, WEAK) is not None
