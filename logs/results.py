@@ -107,6 +107,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
         model: Digest of the self-model, ``self_model_digest``.
         comparator: Name of the comparator, for ``comparator_reason``.
         kinds: Names of the fault kinds that were searched.
+        summary: What is wrong, since when, how sure that is, and what to do.
         files: SHA-256 of each log, by its path.
         logs: Paths of the logs that a diagnosis of logs explains, in order.
         intact: Paths of its logs of the healthy robot.
@@ -129,6 +130,8 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     unsearched: dict[str, Any] | None = None
     intact_distance: float | None
     reason: str | None = None
+    summary: str = ""
+    probability: dict[str, float] = {}  # a struct copies it
     fit: dict[str, Any] | None = None
     change: dict[str, Any] | None = None
     residual: dict[str, Any] | None = None

@@ -14,6 +14,7 @@ from benchmarks.foreign.scoring import (
     QUESTIONS,
     Question,
     read_rows,
+    reliability,
     score,
     summary,
     table,
@@ -108,7 +109,7 @@ def _table(options: argparse.Namespace) -> None:
     rows = read_rows(options.rows)
     if options.csv:
         write_csv(rows, options.csv)
-    print(table(rows, options.by))
+    print(table(rows, options.by), reliability(rows), sep="\n\n")
 
 
 if __name__ == "__main__":

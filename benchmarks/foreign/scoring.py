@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import hashlib
+import itertools
 import json
 import os
 import re
@@ -21,6 +22,7 @@ import numpy as np
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.generate import MATTERS
 from benchmarks.foreign.model import LEVELS
+from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.studies.statistics import proportion
 
 LIMIT = 1800
@@ -170,6 +172,10 @@ class Judgement:
     onset_error: float | None = None
     onset_found: bool | None = None
     seconds: float = 0.0
+    probability: float | None = None
+    """Probability that is stated: of the first hypothesis; for ``unexplained`` that of no one."""
+    is_so: bool = False
+    """Whether what has this probability is true."""
 
 
 def judged(row: Row) -> Judgement:
@@ -206,7 +212,16 @@ def judged(row: Row) -> Judgement:
         onset_error=abs(onset - truth["onset"]) if truth["onset"] and onset is not None else None,
         onset_found=onset is not None if truth["onset"] else None,
         seconds=row["seconds"],
+        probability=_probability(answer),
+        is_so=not right if verdict == "unexplained" else right,
     )
+
+
+def _probability(answer: Row) -> float | None:
+    known: dict[str, float] = answer.get("probability") or {}
+    if answer["verdict"] == "unexplained" and known:
+        return 1 - sum(known.values())
+    return known.get(answer["diagnosis"][0]["hypothesis"])
 
 
 def terms(faults: Iterable[str]) -> Terms:
@@ -323,6 +338,45 @@ def table(rows: Sequence[Row], by: str) -> str:
     return "\n".join(lines)
 
 
+BINS = (0.0, 0.5, 0.7, 0.9, 0.95, 1.0)
+"""Bounds of the stated probabilities of a row of the reliability table."""
+
+RESAMPLES = 2000
+"""Bootstrap samples of the recordings behind the interval of the calibration error."""
+
+
+def reliability(rows: Sequence[Row]) -> str:
+    """Returns how often what was said is so, by its probability, as Markdown.
+
+    Below the table is the expected calibration error: the mean difference between probability and
+    rate over the rows of the table, weighted by their recordings, with a 95 % interval.
+    """
+    found = [one for one in map(judged, rows) if one.probability is not None]
+    if not found:
+        return "No probabilities are stated."
+    said = np.array([one.probability for one in found], dtype=float)
+    so = np.array([one.is_so for one in found], dtype=float)
+    place = np.clip(np.searchsorted(BINS, said, side="right") - 1, 0, len(BINS) - 2)
+    lines = ["| probability | recordings | mean probability | so |", "|---|---|---|---|"]
+    for k, (low, high) in enumerate(itertools.pairwise(BINS)):
+        inside = place == k
+        if inside.any():
+            lines.append(
+                f"| {low:.0%} to {high:.0%} | {inside.sum()} | {said[inside].mean():.1%} | "
+                f"{rate(so[inside].astype(bool).tolist())} |"
+            )
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(len(said), size=(RESAMPLES, len(said)))
+    errors = [_calibration_error(said[one], so[one], place[one]) for one in drawn]
+    low, high = np.quantile(errors, (0.025, 0.975))
+    error = _calibration_error(said, so, place)
+    return "\n".join([*lines, "", f"Calibration error {error:.1%} ({low:.1%} to {high:.1%})"])
+
+
+def _calibration_error(said: FloatArray, so: FloatArray, place: IndexArray) -> float:
+    return float(np.abs(np.bincount(place, said - so)).sum() / len(said))
+
+
 def rate(values: Sequence[bool]) -> str:
     """Returns the share of true values with Wilson's 95 % interval, as text."""
     if not values:
@@ -368,6 +422,7 @@ def _line(row: Row) -> Row:
         "change": (answer.get("change") or {}).get("time"),
         "loss": loss("loss"),
         "healthy_loss": loss("healthy_loss"),
+        "probability": None if found.probability is None else round(found.probability, 3),
         "right": found.right,
         "verdict_right": found.verdict_right,
         "seconds": round(row.get("seconds", 0.0), 1),

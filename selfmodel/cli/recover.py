@@ -16,7 +16,7 @@ from selfmodel.cli.progress import displacement_text, display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
-from selfmodel.diagnosis.text import right_or_wrong, verdict_sentences
+from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
@@ -167,6 +167,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
             for trial, tried, score, predicted, fall in zip(*columns, strict=True)
         ),
         **output_of(recovery.diagnosis),
+        summary=summary(recovery.diagnosis),
         calibration=recovery.calibration.to_dict() if recovery.calibration else None,
         correct=outcome.correct,
         displacement={name: getattr(recovery, name) for name in ("before", "after", "recovered")},
@@ -204,11 +205,12 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
     rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in values["trials"]]
     columns = ("trial", "best hypothesis so far", column.removesuffix(", "))
     trials = folding(columns, rows, title="physical trials", texts=2)
-    print_tables(trials, ranking_table(values["diagnosis"], found.truth))
+    print_tables(trials, ranking_table(values, found.truth))
     gap = f", at a reality gap of {found.gap:g}" if found.gap else ""
     verdict = right_or_wrong(str(diagnosis.best), found.truth, correct=found.correct)
     print_lines(
         f"truth: {found.truth}{gap}; the diagnosis is {verdict}.",
+        found.summary,
         verdict_sentences(diagnosis),
         f"{subject} {before} before, {after} after the failure, and {recovered} at best in "
         f"{counted(found.physical_trials, 'trial')} since.",

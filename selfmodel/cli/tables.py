@@ -62,14 +62,17 @@ def show(columns: Sequence[str], rows: Iterable[Sequence[str]], *, texts: int = 
         print_lines(f"{columns[0]}: {row[0]}", *(f"  {title}: {cell}" for title, cell in cells))
 
 
-def ranking_table(values: Sequence[dict[str, Any]], truth: str | None = None) -> Table:
-    """Returns hypotheses, as JSON values, best first; the truth is marked where it is given."""
+def ranking_table(values: dict[str, Any], truth: str | None = None) -> Table:
+    """Returns the hypotheses of a diagnosis, as JSON values; a given truth is marked."""
+    known = values["probability"]
     rows = [
         (
             str(rank),
             one["hypothesis"] + (" (the truth)" if one["hypothesis"] == truth else ""),
             "diverged" if one["distance"] is None else f"{one['distance']:.4f}",
+            f"{known[one['hypothesis']]:.2f}" if one["hypothesis"] in known else "",
         )
-        for rank, one in enumerate(values, start=1)
+        for rank, one in enumerate(values["diagnosis"], start=1)
     ]
-    return folding(("", "hypothesis", "distance"), rows, title="diagnosis", texts=2)
+    columns = ("", "hypothesis", "distance", "probability")
+    return folding(columns, rows, title="diagnosis", texts=2)

@@ -192,6 +192,9 @@ class Diagnosis:
             None if one hypothesis is enough.
         residual: Signals and time of the loss that is left, if it is unexplained.
         doubt: Why the trials cannot be judged, if they cannot.
+        probability: Probabilities of the best hypothesis and its neighbours, by their notation; see
+            ``diagnosis.probability``. None of a comparator without a test, and of trials that are
+            not judged.
     """
 
     ranked: tuple[Candidate, ...]
@@ -208,6 +211,7 @@ class Diagnosis:
     change: Change | None = None
     residual: Residual | None = None
     doubt: Doubt | None = None
+    probability: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Hypothesis:

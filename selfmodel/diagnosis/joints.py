@@ -65,15 +65,14 @@ def excesses(hypothesis: Hypothesis, problem: Problem) -> dict[str, float]:
     return dict(sorted(excess.items(), key=lambda item: -item[1]))
 
 
-def predicts_joints_worse(other: Hypothesis, best: Hypothesis, problem: Problem) -> bool:
-    """Returns whether a hypothesis predicts some joint significantly worse than the best.
+def lead_at_joints(best: Hypothesis, other: Hypothesis, problem: Problem) -> float:
+    """Returns by how many standard errors the best predicts some joint better than another does.
 
     The joints at which exactly one of the two has a fault are compared.
     """
-    return any(
-        significance.joint_is_better(*problem.of_joint(joint, [best, other]))
-        for joint in _joints_of(set(best.faults) ^ set(other.faults), problem)
-    )
+    joints = _joints_of(set(best.faults) ^ set(other.faults), problem)
+    leads = (significance.joint_lead(*problem.of_joint(joint, [best, other])) for joint in joints)
+    return max(leads, default=0.0)
 
 
 def _joints_of(faults: Sequence[Fault] | set[Fault], problem: Problem) -> list[str]:

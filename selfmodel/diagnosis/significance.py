@@ -83,33 +83,45 @@ TEST = f"paired z over the pieces of the trials >= {MIN_Z:g}, or {LOSS_RATIO:g} 
 
 
 def is_better(one: FloatArray, other: FloatArray, min_z: float = MIN_Z) -> bool:
-    """Returns whether the first of two hypotheses predicts significantly better.
+    """Returns whether the first of two hypotheses leads by at least ``min_z``; see ``lead``."""
+    return lead(one, other) >= min_z
+
+
+def lead(one: FloatArray, other: FloatArray) -> float:
+    """Returns by how many standard errors the first of two hypotheses predicts better.
 
     Args:
         one: Losses of the first hypothesis, ``(pieces,)``; infinite where a simulation diverged.
-        other: Losses of the second hypothesis on the same pieces. A hypothesis that diverged is
-            never better; a finite one is better than a diverged one.
-        min_z: Standard errors of the paired difference that are required.
+        other: Losses of the second hypothesis on the same pieces.
+
+    Returns:
+        The paired difference: 0 if the first one is not better, or diverged; infinite if the other
+        one diverged, or has ``LOSS_RATIO`` times the loss.
     """
     if not np.isfinite(one).all():
-        return False
+        return 0.0
     if not np.isfinite(other).all():
-        return True
+        return math.inf
     if not other.mean() > one.mean() + NEGLIGIBLE_LOSS:
-        return False
+        return 0.0
     has_ratio = other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS
-    return bool(has_ratio or paired_z(other, one) >= min_z)
+    return math.inf if has_ratio else paired_z(other, one)
 
 
 def joint_is_better(one: FloatArray, other: FloatArray) -> bool:
-    """Returns whether the first losses of a joint, ``(pieces,)``, are significantly smaller.
+    """Returns whether the first losses of a joint are significantly smaller; see ``joint_lead``."""
+    return joint_lead(one, other) >= MIN_Z
 
-    False with fewer than ``MIN_PIECES`` pieces that are known (not NaN) in both.
+
+def joint_lead(one: FloatArray, other: FloatArray) -> float:
+    """Returns by how many standard errors the first losses of a joint, ``(pieces,)``, are smaller.
+
+    0 with fewer than ``MIN_PIECES`` pieces that are known (not NaN) in both.
     """
     smaller, larger = known(np.stack([one, other]))
     if len(smaller) < MIN_PIECES or not np.isfinite(smaller).all():
-        return False
-    return not np.isfinite(larger).all() or paired_z(larger, smaller) >= MIN_Z
+        return 0.0
+    return paired_z(larger, smaller) if np.isfinite(larger).all() else math.inf
 
 
 def known(rows: FloatArray) -> FloatArray:

@@ -8,10 +8,93 @@ from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, 
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import is_too_high
+from selfmodel.faults.hypothesis import Hypothesis
+
+MAX_NAMED = 3
+"""Causes that a summary names."""
+
+NO_DOUBT = Doubt("the diagnosis does not say why", "record a trial of the healthy robot like these")
 
 SIGMA = "\u03c3"  # standard errors
 
 _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, the number does not
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """Returns what is wrong, since when, how sure that is, and what to do, in plain words."""
+    what, change = what_is_wrong(diagnosis), diagnosis.change
+    since = "" if change is None else f", since {change.time:.1f} s into {change.trial}"
+    sure = ""
+    if diagnosis.verdict in ("intact", "explained"):
+        sure = _sure(diagnosis, diagnosis.best)
+    elif diagnosis.verdict == "unexplained" and diagnosis.probability:
+        sure = f" ({percent(1 - sum(diagnosis.probability.values()))} sure)"
+    return f"{what[0].upper()}{what[1:]}{since}{sure}. {_advice(diagnosis)}"
+
+
+def what_is_wrong(diagnosis: Diagnosis) -> str:
+    """Returns what is wrong with the robot, as a clause in plain words."""
+    match diagnosis.verdict:
+        case "intact":
+            return "nothing is wrong that these trials would show"
+        case "explained":
+            return in_words(diagnosis.best)
+        case "ambiguous":
+            alike = [diagnosis.best, *diagnosis.indistinguishable]
+            causes = [f"{in_words(one)}{_sure(diagnosis, one)}" for one in alike[:MAX_NAMED]]
+            more = len(alike) - MAX_NAMED
+            causes += [f"it is one of {more} other causes"] if more > 0 else []
+            return f"either {', or '.join(causes)}"
+        case "unexplained":
+            more = diagnosis.unsearched
+            near = f"; it is most like this: {in_words(more.hypothesis)}" if more else ""
+            return f"something is wrong that none of the searched faults explains{near}"
+        case "not judged":
+            return "these trials do not show whether something is wrong with the robot"
+
+
+def in_words(hypothesis: Hypothesis) -> str:
+    """Returns the faults of a hypothesis as clauses in plain words."""
+    return ", and ".join(fault.words for fault in hypothesis.faults) or "nothing is wrong"
+
+
+def percent(probability: float) -> str:
+    """Returns a probability as text."""
+    return "< 1 %" if probability < 0.01 else f"{probability:.0%}".replace("%", " %")
+
+
+def _sure(diagnosis: Diagnosis, hypothesis: Hypothesis) -> str:
+    """Returns the probability of a hypothesis in brackets; empty without one."""
+    probability = diagnosis.probability.get(str(hypothesis))
+    return "" if probability is None else f" ({percent(probability)} sure)"
+
+
+def _advice(diagnosis: Diagnosis) -> str:
+    """Returns what to do, and what would make the diagnosis surer, as sentences."""
+    fit, joints = diagnosis.fit, list(diagnosis.fit.joints if diagnosis.fit else ())
+    unsearched = diagnosis.unsearched
+    if diagnosis.reason:
+        return "Check the model and the logs: no simulation of them works."
+    if fit is None or fit.healthy_loss is None:
+        surer = "give a trial of the healthy robot to compare with (--healthy)"
+    else:
+        surer = "record another trial, with another gait"
+    match diagnosis.verdict:
+        case "intact":
+            return f"There is nothing to repair; to find smaller faults, {surer}."
+        case "explained":
+            return f"Check this first; to be surer, {surer}."
+        case "ambiguous":
+            return f"Check these; to tell them apart, {surer}."
+        case "unexplained":
+            where = f"Check {', '.join(joints)}, and search" if joints else "Search"
+            kinds = unsearched.kind if unsearched else "all"
+            return f"{where} more kinds of faults (--kinds {kinds})."
+        case "not judged":
+            return (
+                f"The model of the robot is not known to be right for such a motion: "
+                f"{(diagnosis.doubt or NO_DOUBT).remedy}, and repeat the diagnosis."
+            )
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:
@@ -118,12 +201,9 @@ def _verdict(diagnosis: Diagnosis) -> str:
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
-    """Returns why trials are not judged, and the remedy, as sentences."""
-    doubt = diagnosis.doubt or Doubt("the diagnosis does not say why", "repeat it")
-    return (
-        f"{doubt.reason}, so that a fault and an error of the self-model cannot be told apart. To "
-        f"have these trials judged, {doubt.remedy}."
-    )
+    """Returns why trials are not judged, as a sentence."""
+    reason = (diagnosis.doubt or NO_DOUBT).reason
+    return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
 
 
 def _missing(diagnosis: Diagnosis) -> str:

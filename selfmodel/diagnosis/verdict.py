@@ -6,7 +6,7 @@ the ranking are the search's.)
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +22,9 @@ from selfmodel.diagnosis.diagnosis import (
     UnsearchedFault,
     Verdict,
 )
-from selfmodel.diagnosis.joints import excesses, predicts_joints_worse
+from selfmodel.diagnosis.joints import excesses, lead_at_joints
 from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.probability import probabilities, unlikeness
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
@@ -62,17 +63,8 @@ def verdict_of(
 
 
 def is_too_high(fit: Fit) -> bool:
-    """Returns whether the loss is higher than that of healthy trials, significantly and by much.
-
-    Faults make a motion harder to predict: a slipping foot, a body on the ground. So the loss of a
-    hypothesis with faults has to exceed the reference by the factor ``FAULTY_RATIO`` too.
-    """
-    if fit.healthy_loss is None or fit.excess is None:
-        return False
-    if fit.loss > significance.LOSS_RATIO * fit.healthy_loss + significance.LOSS_FLOOR:
-        return True
-    is_much = fit.loss > significance.FAULTY_RATIO * fit.healthy_loss + significance.LOSS_FLOOR
-    return fit.excess > fit.threshold and (is_much or not fit.has_faults)
+    """Returns whether the loss is higher than that of healthy trials, significantly and by much."""
+    return unlikeness(fit) > 1.0
 
 
 def diagnosis_of(
@@ -97,8 +89,9 @@ def diagnosis_of(
     if not math.isfinite(totals[best]):
         return _all_diverged(ranked, problem)
     order = best_severities([best, *ranked])
+    leads = leads_of(best, problem) if problem.has_test else {}
     if problem.has_test:
-        alike, unsearched = indistinguishable(best, problem), unsearched_fault(best, problem)
+        alike, unsearched = indistinguishable(leads), unsearched_fault(best, problem)
     else:
         equal = [one for one in order if totals[one] == totals[best]]
         alike, unsearched = [one for one in equal if not _has_more(one, best)], None
@@ -107,6 +100,8 @@ def diagnosis_of(
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
     doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
+    closest = best_severities(sorted(leads, key=lambda one: leads[one]))
+    is_stated = problem.has_test and doubt is None
     has_severities = problem.has_test and not best and doubt is None
     severities = (
         detectable_severities(best, problem.space, problem.losses) if has_severities else []
@@ -124,6 +119,11 @@ def diagnosis_of(
         fit=fit,
         residual=_residual_of(best, problem) if verdict == "unexplained" else None,
         doubt=doubt,
+        probability=probabilities(
+            best, {one: leads[one] for one in closest}, fit, misses=unsearched is not None
+        )
+        if is_stated
+        else {},
     )
 
 
@@ -219,15 +219,15 @@ def _has_more(one: Hypothesis, best: Hypothesis) -> bool:
     return without_severities(best) <= without_severities(one)
 
 
-def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
-    """Returns the neighbours of the best hypothesis that predict the trials about as well.
+def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
+    """Returns by how many standard errors the best hypothesis predicts better than its neighbours.
 
     The neighbours have one fault less than the best, or another fault of the searched kinds in the
-    place of one of its faults, or are single faults; they have at most as many faults. The eight
-    best by the surrogate are compared, with the severity of the other fault fitted. A neighbour is
-    indistinguishable unless it is significantly worse, by the loss or by that of a joint at which
-    the two differ, or one of its faults corrects model error. They are sorted by total loss; of
-    those that differ in severities alone, there is the one with the smallest loss.
+    place of one of its faults, or are single faults or none; they have at most as many faults. The
+    eight best by the surrogate are compared, with the severity of the other fault fitted, and the
+    empty hypothesis. The lead is that of the loss, or that at a joint at which the two differ;
+    infinite over a neighbour of whose faults one corrects model error. They are sorted by total
+    loss.
     """
     space = problem.space
     neighbours = dict.fromkeys(
@@ -236,16 +236,24 @@ def indistinguishable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:
     smaller = [one for one in neighbours if len(one) <= len(best) and not _has_more(one, best)]
     few = best_severities(by_total_loss(smaller, problem.coarse))[: search.SHORTLIST_SIZE]
     fitted = [_with_fitted_others(one, best, problem) for one in few]
-    candidates = by_total_loss(list(dict.fromkeys([*few, *fitted])), problem.losses)
-    best_losses, *rows = problem.losses([best, *candidates])
-    return best_severities(
-        one
-        for one, row in zip(candidates, rows, strict=True)
-        if without_severities(one) != without_severities(best)
-        and not significance.is_better(best_losses, row)
-        and not search.any_fault_is_model_error(one, problem)
-        and not (problem.has_joints and predicts_joints_worse(one, best, problem))
-    )
+    others = [one for one in dict.fromkeys([*few, *fitted, INTACT]) if not _has_more(one, best)]
+    leads = {}
+    for one in by_total_loss(others, problem.losses):
+        lead = significance.lead(*problem.losses([best, one]))
+        if problem.has_joints:
+            lead = max(lead, lead_at_joints(best, one, problem))
+        if lead < significance.MIN_Z and search.any_fault_is_model_error(one, problem):
+            lead = math.inf
+        leads[one] = lead
+    return leads
+
+
+def indistinguishable(leads: Mapping[Hypothesis, float]) -> list[Hypothesis]:
+    """Returns the neighbours over which the best hypothesis has no significant lead.
+
+    Of those that differ in severities alone, there is the one with the smallest loss.
+    """
+    return best_severities(one for one, lead in leads.items() if lead < significance.MIN_Z)
 
 
 def _with_fitted_others(one: Hypothesis, best: Hypothesis, problem: Problem) -> Hypothesis:

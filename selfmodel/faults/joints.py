@@ -229,14 +229,15 @@ class LoadedLink(JointFault):
         variant.load_link(anatomy.joint(fault.part).hinges[0], fault.severity)
 
 
-BROKEN = BrokenJoint(name="break")
-JAMMED = Jammed(name="jam", is_of_joint=True)
+BROKEN = BrokenJoint(name="break", words="the limb is lost from the joint {part} on")
+JAMMED = Jammed(name="jam", words="the joint {part} is stuck", is_of_joint=True)
 JAMMED_AT_ANGLE = JammedAtAngle(
     name="jam-angle",
     keyword="jam",
     bounds=(-math.inf, math.inf),  # narrower at each joint
     degenerates_to={0.0: JAMMED},
     unit="rad",
+    words="the joint {part} is stuck at {severity:.2f} rad",
     is_of_joint=True,
 )
 WEAK_MOTOR = WeakMotor(
@@ -245,6 +246,7 @@ WEAK_MOTOR = WeakMotor(
     levels=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     degenerates_to={1.0: None},
     unit="of its torque",
+    words="the motor of the joint {part} has {severity:.0%} of its torque",
     is_of_joint=True,
 )
 DAMPED_JOINT = DampedJoint(
@@ -253,6 +255,7 @@ DAMPED_JOINT = DampedJoint(
     levels=(3.0, 10.0, 30.0),
     degenerates_to={1.0: None},
     unit="times",
+    words="the joint {part} moves stiffly, with {severity:.2g} times its damping",
     is_of_joint=True,
 )
 JOINT_FRICTION = JointFriction(
@@ -261,6 +264,7 @@ JOINT_FRICTION = JointFriction(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={0.0: None},
     unit="of the motors' largest torque",
+    words="the joint {part} rubs, with {severity:.0%} of its motor's torque",
     is_of_joint=True,
 )
 ENCODER_OFFSET = EncoderOffset(
@@ -269,6 +273,7 @@ ENCODER_OFFSET = EncoderOffset(
     levels=(-0.3, -0.1, 0.1, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
+    words="the encoder of the joint {part} is off by {severity:.2g} rad",
     is_of_joint=True,
 )
 ENCODER_SLIP = EncoderSlip(
@@ -279,6 +284,7 @@ ENCODER_SLIP = EncoderSlip(
     levels=(-0.3, -0.1, 0.1, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
+    words="the encoder that the joint {part} is driven by has slipped by {severity:.2g} rad",
     is_of_joint=True,
 )
 LOST_GRIP = LostGrip(
@@ -288,6 +294,7 @@ LOST_GRIP = LostGrip(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={1.0: None},
     unit="of its friction",
+    words="the foot of the joint {part} has {severity:.0%} of its grip",
 )
 LOADED_LINK = LoadedLink(
     name="load",
@@ -297,4 +304,5 @@ LOADED_LINK = LoadedLink(
     degenerates_to={0.0: None},
     is_single=True,
     unit="kg",
+    words="the link of the joint {part} carries {severity:.2g} kg more",
 )

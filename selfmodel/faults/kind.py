@@ -40,6 +40,8 @@ class FaultKind:
         bounds: Lowest and highest severity; None for a kind without severities.
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
+        words: Clause about a fault in plain words, a format with ``part`` and ``severity``, such as
+            "the joint {part} is stuck"; "" for the notation.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
@@ -62,6 +64,7 @@ class FaultKind:
     bounds: tuple[float, float] | None = None
     levels: tuple[float, ...] = (0.0,)
     unit: str = ""
+    words: str = ""
     degenerates_to: Mapping[float, Optional["FaultKind"]] = field(default_factory=dict)
     degenerates_alone_to: Mapping[float, "FaultKind"] = field(default_factory=dict)
     affects_dynamics: bool = True
@@ -185,6 +188,12 @@ class Fault:
         term = f"{self.kind.keyword}:{self.part}" if self.part else self.kind.keyword
         graded = self.kind.bounds is not None
         return f"{term}={self.kind.prefix}{self.severity!r}" if graded else term
+
+    @property
+    def words(self) -> str:
+        """A clause about the fault; see ``FaultKind.words``."""
+        words = self.kind.words or f"there is the fault {self}"
+        return words.format(part=self.part, severity=self.severity).replace("%", " %")
 
     @property
     def canonical(self) -> "Fault | None":

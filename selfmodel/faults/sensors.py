@@ -115,7 +115,9 @@ class SilentNeuron(FaultKind):
         variant.silent_neurons.add(int(fault.part))
 
 
-FAILED_SENSOR = FailedSensor(name="sensor", affects_dynamics=False)
+FAILED_SENSOR = FailedSensor(
+    name="sensor", words="the sensor {part} always reads 0", affects_dynamics=False
+)
 SENSOR_GAIN = SensorGain(
     name="sensor-gain",
     keyword="sensor",
@@ -126,6 +128,7 @@ SENSOR_GAIN = SensorGain(
     # With a bias, a gain of 0 is a stuck reading, which no other kind expresses.
     degenerates_alone_to={0.0: FAILED_SENSOR},
     unit="times",
+    words="the sensor {part} reads {severity:.2g} times what it should",
     affects_dynamics=False,
 )
 SENSOR_BIAS = SensorBias(
@@ -136,6 +139,7 @@ SENSOR_BIAS = SensorBias(
     levels=(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
     degenerates_to={0.0: None},
     unit="of the reading's range",
+    words="the sensor {part} is off by {severity:.0%} of its range",
     affects_dynamics=False,
 )
 SENSOR_NOISE = SensorNoise(
@@ -146,6 +150,7 @@ SENSOR_NOISE = SensorNoise(
     levels=(0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8),
     degenerates_to={0.0: None},
     unit="of the reading's range",
+    words="the sensor {part} has noise of {severity:.0%} of its range",
     affects_dynamics=False,
 )
 SILENT_NEURON = SilentNeuron(name="neuron", searchable=False)

@@ -244,6 +244,7 @@ FRICTION = Friction(
     bounds=(0.01, 3.0),
     levels=(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
     unit="(coefficient)",
+    words="the ground has a friction of {severity:.2g}",
 )
 SLOPE = Slope(
     name="slope",
@@ -252,6 +253,7 @@ SLOPE = Slope(
     levels=(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
+    words="the ground rises by {severity:.2g} rad in the forward direction",
 )
 WIND, CROSSWIND = (
     Wind(
@@ -262,6 +264,7 @@ WIND, CROSSWIND = (
         levels=_SPEEDS,
         degenerates_to={0.0: None},
         unit="m/s",
+        words=f"there is a {name} of {{severity:.2g}} m/s",
     )
     for axis, name in enumerate(("wind", "crosswind"))
 )
@@ -272,6 +275,7 @@ PAYLOAD = Payload(
     degenerates_to={0.0: None},
     is_single=True,
     unit="of the robot's mass",
+    words="the robot carries a load of {severity:.0%} of its mass",
 )
 GROWN_DELAY = GrownDelay(
     name="delay",
@@ -279,6 +283,7 @@ GROWN_DELAY = GrownDelay(
     levels=(1.0, 2.0, 3.0),
     degenerates_to={0.0: None},
     unit="control steps",
+    words="commands take effect {severity:.0f} control steps late",
 )
 ROUGHNESS = Roughness(
     name="roughness",
@@ -287,4 +292,5 @@ ROUGHNESS = Roughness(
     levels=(0.01, 0.02, 0.04),
     degenerates_to={0.0: None},
     unit="m",
+    words="the ground is uneven by {severity:.2g} m",
 )

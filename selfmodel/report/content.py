@@ -8,7 +8,13 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.text import fit_sentence, right_or_wrong, verdict_sentences
+from selfmodel.diagnosis.text import (
+    fit_sentence,
+    right_or_wrong,
+    summary,
+    verdict_sentences,
+    what_is_wrong,
+)
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
@@ -68,9 +74,10 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
 
 def headline(subject: Subject) -> str:
     """Returns what happened, in one sentence."""
-    verdict, result = _verdict(subject.diagnosis), subject.result
+    result = subject.result
     if result is None:
-        return f"{_counted(len(subject.damaged))} of the {subject.robot.name}: it {verdict}."
+        trials = _counted(len(subject.damaged))
+        return f"{trials} of the {subject.robot.name}. {summary(subject.diagnosis)}"
     score = result.score
     before, after, recovered = (
         f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
@@ -81,7 +88,7 @@ def headline(subject: Subject) -> str:
     fall = ", and fell" if result.fell else ""
     return (
         f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
-        f"it; it {verdict}, and {achieved} {recovered} at best in "
+        f"it; {what_is_wrong(subject.diagnosis)}. It {achieved} {recovered} at best in "
         f"{_counted(result.physical_trials)} since{fall}."
     )
 
@@ -95,7 +102,7 @@ def details(subject: Subject) -> tuple[str, ...]:
     diagnosis = subject.diagnosis
     sentences = [verdict_sentences(diagnosis), fit_sentence(diagnosis)]
     if subject.result is not None:
-        sentences.append(_truth(subject.result))
+        sentences = [summary(diagnosis), *sentences, _truth(subject.result)]
     return tuple(sentence for sentence in sentences if sentence)
 
 
@@ -104,21 +111,6 @@ def _truth(result: RecoveryResult) -> str:
     best = str(result.diagnosis[0]["hypothesis"])
     judgement = right_or_wrong(best, result.truth, correct=result.correct)
     return f"True faults: {result.truth}{gap}; the diagnosis is {judgement}."
-
-
-def _verdict(diagnosis: Diagnosis) -> str:
-    match diagnosis.verdict:
-        case "intact":
-            return "is healthy: no fault is needed to predict its trials"
-        case "explained":
-            return f"has the fault {diagnosis.best}, which explains its trials"
-        case "ambiguous":
-            faults = [str(one) for one in (diagnosis.best, *diagnosis.indistinguishable)]
-            more = f" or one of {len(faults) - 3} others" if len(faults) > 3 else ""
-            return f"has {' or '.join(faults[:3])}{more}"
-        case "not judged":
-            return "cannot be judged from these trials"
-    return f"moves in a way that no searched hypothesis explains; the nearest is {diagnosis.best}"
 
 
 def shots_of(subject: Subject) -> tuple[Shot, ...]:
@@ -208,9 +200,9 @@ def hypotheses_section(subject: Subject) -> Section:
         names=("distance",),
         groups=tuple(charts.Group(str(one), (distance,)) for one, distance in ranked),
     )
-    columns = ("rank", "hypothesis", "distance", "against the best")
+    columns = ("rank", "hypothesis", "distance", "probability", "against the best")
     rows = tuple(
-        (rank, str(one), distance, _standing(diagnosis, one))
+        (rank, str(one), distance, diagnosis.probability.get(str(one)), _standing(diagnosis, one))
         for rank, (one, distance) in enumerate(ranked, start=1)
     )
     table = charts.Table("Hypotheses", columns, rows)

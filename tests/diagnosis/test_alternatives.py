@@ -14,6 +14,7 @@ from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import (
     detectable_severities,
     indistinguishable,
+    leads_of,
     undetectable,
     unsearched_fault,
 )
@@ -67,7 +68,7 @@ def test_neighbours_that_predict_as_well_are_indistinguishable_and_others_are_no
     larger = f"{best}+{JAM}"
     losses = of({best: 1.0, **alike, far: 1.0, larger: 0.99}, otherwise=2.0)
 
-    found = indistinguishable(said(best), Synthetic(PAPER, losses))
+    found = indistinguishable(leads_of(said(best), Synthetic(PAPER, losses)))
 
     assert named(found) == [f"{BREAK}+sensor:back_left_touch", f"{BREAK}+{JAM}"]
 
@@ -91,7 +92,7 @@ def test_the_same_faults_at_another_severity_are_no_alternative_and_others_are_f
             rows.append(mean * np.linspace(0.99, 1.01, PIECES))
         return np.array(rows)
 
-    (found,) = indistinguishable(best, Synthetic(space, losses))
+    (found,) = indistinguishable(leads_of(best, Synthetic(space, losses)))
 
     assert found.faults[0].part == "front_left_knee"
     assert found.faults[0].severity == pytest.approx(0.37, abs=0.021)
@@ -102,18 +103,18 @@ def test_an_alternative_that_corrects_model_error_or_misses_a_joint_is_none():
     space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
     levels = {f"friction={level}": 1.0 for level in FRICTION.levels}
     after = of({f"motor:{KNEE}=0.4": 1.0, **levels, "intact": 1.5}, otherwise=3.0)
-    (found,) = indistinguishable(best, Synthetic(space, after))
+    (found,) = indistinguishable(leads_of(best, Synthetic(space, after)))
     assert found.faults[0].kind == FRICTION
 
     slippery = of(dict.fromkeys(levels, 0.5))
-    assert indistinguishable(best, Synthetic(space, after, before=slippery)) == []
+    assert indistinguishable(leads_of(best, Synthetic(space, after, before=slippery))) == []
 
     def hinges(hypotheses: Sequence[Hypothesis]) -> FloatArray:
         rows = np.full((len(hypotheses), PIECES, len(ANATOMY.hinges)), 0.1)
         rows[[one != best for one in hypotheses], :, ANATOMY.hinges.index(KNEE)] = 2.0
         return rows * np.linspace(0.9, 1.1, PIECES)[:, np.newaxis]
 
-    assert indistinguishable(best, Synthetic(space, after, hinges=hinges)) == []
+    assert indistinguishable(leads_of(best, Synthetic(space, after, hinges=hinges))) == []
 
 
 def test_a_fault_that_makes_no_difference_is_undetectable_and_one_that_makes_one_is_not():

@@ -118,7 +118,12 @@ def test_wrong_values_of_a_file_are_refused(found: Diagnosis, key: str, values: 
 def test_a_diagnosis_survives_the_output_of_the_command_line(found: Diagnosis):
     fit = Fit(0.1, 0.5, 0.1, math.inf, 5.0, has_faults=True)
     whole = dataclasses.replace(
-        found, change=CHANGE, residual=RESIDUAL, detectable=DETECTABLE, fit=fit
+        found,
+        change=CHANGE,
+        residual=RESIDUAL,
+        detectable=DETECTABLE,
+        fit=fit,
+        probability={BEST: 0.9, OTHER: 0.05},
     )
     output = json.loads(json.dumps(output_of(whole), allow_nan=False))
 
@@ -131,6 +136,7 @@ def test_the_output_has_the_names_of_python_and_keys_of_0_1_are_read(found: Diag
     assert set(values) == {
         *("diagnosis", "verdict", "indistinguishable", "undetectable", "test", "unsearched"),
         *("intact_distance", "reason", "fit", "change", "residual", "doubt", "detectable"),
+        "probability",
     }
     assert values["undetectable"] == [f"{BEST}+sensor:back_left_touch"]
     assert values["reason"] is values["fit"] is values["change"] is values["residual"] is None

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from selfmodel.diagnosis.joints import excesses, predicts_joints_worse, with_joint_faults
+from selfmodel.diagnosis.joints import excesses, lead_at_joints, with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction as Losses
 from selfmodel.diagnosis.search import LocalSearch
-from selfmodel.diagnosis.significance import MIN_PIECES, joint_is_better
+from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z, joint_is_better
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.registry import KINDS
@@ -228,7 +228,7 @@ def test_hypotheses_are_distinguished_at_the_joints_where_their_faults_differ():
     there = {KNEE: {STIFF: 0.3}}
 
     def is_worse(one: Hypothesis, best: Hypothesis, after: HingeLosses) -> bool:
-        return predicts_joints_worse(one, best, losses_of_joints(after, None))
+        return lead_at_joints(best, one, losses_of_joints(after, None)) >= MIN_Z
 
     assert is_worse(STIFF, WEAK, hinge_losses(1, there))
     assert not is_worse(STIFF, WEAK, hinge_losses(1, elsewhere))

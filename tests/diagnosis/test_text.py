@@ -11,6 +11,7 @@ from selfmodel.diagnosis.diagnosis import (
     Diagnosis,
     Doubt,
     Fit,
+    UnsearchedFault,
 )
 from selfmodel.diagnosis.direct_evidence import ConstantSensor, DirectEvidence
 from selfmodel.diagnosis.text import (
@@ -18,6 +19,7 @@ from selfmodel.diagnosis.text import (
     evidence_sentences,
     fit_sentence,
     right_or_wrong,
+    summary,
     verdict_sentences,
 )
 from selfmodel.faults.hypothesis import INTACT
@@ -168,8 +170,66 @@ def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
     ]
 
 
-def test_trials_that_are_not_judged_have_a_reason_and_a_remedy():
-    sentence = verdict_sentences(diagnosis(verdict="not judged", doubt=Doubt("WHY", "DO THIS")))
+DOUBT = Doubt("WHY", "DO THIS")
+MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
+HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
+
+
+def test_trials_that_are_not_judged_have_a_reason():
+    sentence = verdict_sentences(diagnosis(verdict="not judged", doubt=DOUBT))
 
     assert sentence.startswith("Not judged: WHY, so that")
-    assert sentence.endswith("To have these trials judged, DO THIS.")
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        (
+            {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
+            (
+                "Nothing is wrong that these trials would show (95 % sure). There is nothing to "
+                "repair; to find smaller faults, record another trial, with another gait."
+            ),
+        ),
+        (
+            {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
+            (
+                "The joint front_left_knee is stuck, since 4.9 s into 02-recovery (93 % sure). "
+                "Check this first; to be surer, record another trial, with another gait."
+            ),
+        ),
+        (
+            {
+                "verdict": "ambiguous",
+                "indistinguishable": (OTHER,),
+                "probability": {str(JAM): 0.6, str(OTHER): 0.35},
+                "fit": None,
+            },
+            (
+                "Either the joint front_left_knee is stuck (60 % sure), or the joint "
+                "back_left_knee is stuck (35 % sure). Check these; to tell them apart, give a "
+                "trial of the healthy robot to compare with (--healthy)."
+            ),
+        ),
+        (
+            {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.01}},
+            (
+                "Something is wrong that none of the searched faults explains; it is most like "
+                "this: the foot of the joint front_left_knee has 20 % of its grip (99 % sure). "
+                "Search more kinds of faults (--kinds grip)."
+            ),
+        ),
+        (
+            {"verdict": "not judged", "doubt": DOUBT},
+            (
+                "These trials do not show whether something is wrong with the robot. The model of "
+                "the robot is not known to be right for such a motion: DO THIS, and repeat the "
+                "diagnosis."
+            ),
+        ),
+    ],
+)
+def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
+    fields: dict[str, Any], said: str
+):
+    assert summary(diagnosis(**{"fit": HEALTHY, **fields})) == said

@@ -15,7 +15,7 @@ SMALL = ("--population", "8", "--generations", "2")
 
 DIAGNOSIS = (
     *("diagnosis", "verdict", "indistinguishable", "undetectable", "test", "intact_distance"),
-    *("unsearched", "calibration", "reason", "fit", "change", "residual"),
+    *("unsearched", "calibration", "reason", "fit", "change", "residual", "probability"),
 )
 """JSON keys of a diagnosis, in the output of a recovery and of `selfmodel diagnose`."""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from selfmodel.diagnosis.text import in_words
 from selfmodel.faults.notation import parse
 from selfmodel.report.charts import GaitDiagram
 from selfmodel.report.content import details, gait_section, headline, report_of
@@ -29,7 +30,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     ]
     assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
     assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline
-    assert result["diagnosis"][0]["hypothesis"] in report.headline
+    assert in_words(subject.diagnosis.best) in report.headline
     assert f"True faults: {result['truth']}, at a reality gap of 0.1" in report.verdict[-1]
     trials = report.sections[0].items[1]
     assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]
@@ -40,14 +41,15 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
 @pytest.mark.parametrize(
     ("verdict", "said"),
     [
-        ("explained", "2 trials of the quadruped: it has the fault {best}, which explains"),
-        ("intact", "it is healthy: no fault is needed"),
-        ("unexplained", "no searched hypothesis explains; the nearest is {best}"),
+        ("explained", "2 trials of the quadruped. {words}"),
+        ("intact", "Nothing is wrong"),
+        ("unexplained", "none of the searched faults explains"),
     ],
 )
 def test_every_verdict_has_its_sentence(subject: Subject, verdict: str, said: str):
     assert not any("True" in one for one in details(with_verdict(subject)))
-    expected = said.format(best=subject.diagnosis.best)
+    words = in_words(subject.diagnosis.best)
+    expected = said.format(words=words[0].upper() + words[1:])
 
     assert expected in headline(with_verdict(subject, verdict=verdict))
 
@@ -60,7 +62,8 @@ def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subje
 
     found = headline(with_verdict(subject, verdict="ambiguous", indistinguishable=others))
 
-    assert "or motor:back_left_knee=0.9 or motor:back_right_knee=0.9 or one of 2 others" in found
+    assert "or the motor of the joint back_right_knee has 90 % of its torque" in found
+    assert "or it is one of 2 other causes" in found
 
 
 def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: tuple[Shot, ...]):

@@ -108,8 +108,8 @@ def test_a_recovery_rewrites_its_report_which_states_whether_it_is_finished(
     headlines = [headline for headline, _ in pages]
     assert headlines[0] == "The recovery is not finished: the trial 00-before was run."
     assert headlines[1] == "The recovery is not finished: the trial 01-after was run."
-    assert headlines[2].startswith("The recovery is not finished: 1 trial of the quadruped: it ")
-    assert headlines[3].startswith("The recovery is not finished: 2 trials of the quadruped: it ")
+    assert headlines[2].startswith("The recovery is not finished: 1 trial of the quadruped. ")
+    assert headlines[3].startswith("The recovery is not finished: 2 trials of the quadruped. ")
     assert pages[3][1] == 6
     last = (tmp_path / "run" / "report.html").read_text()
     assert '"headline":"The quadruped moved' in last
