@@ -5,6 +5,7 @@ import dataclasses
 import hashlib
 import itertools
 import json
+import math
 import os
 import re
 import subprocess
@@ -175,7 +176,7 @@ class Judgement:
     probability: float | None = None
     """Probability that is stated: of the first hypothesis; for ``unexplained`` that of no one."""
     is_so: bool = False
-    """Whether what has this probability is true."""
+    """Whether that is so; ``intact`` is if no fault is beyond a stated limit."""
 
 
 def judged(row: Row) -> Judgement:
@@ -213,7 +214,23 @@ def judged(row: Row) -> Judgement:
         onset_found=onset is not None if truth["onset"] else None,
         seconds=row["seconds"],
         probability=_probability(answer),
-        is_so=not right if verdict == "unexplained" else right,
+        is_so=(not right) if verdict == "unexplained" else right or _is_hidden(real, answer),
+    )
+
+
+def _is_hidden(real: Terms, answer: Row) -> bool:
+    """Returns whether the answer is ``intact``, and names each fault as too small to be seen."""
+    unseen = [key for one in answer.get("undetectable", ()) for key in terms(one.split("+"))]
+    limits = {
+        (one["kind"], one["part"]): (
+            -math.inf if one["below"] is None else one["below"],
+            math.inf if one["above"] is None else one["above"],
+        )
+        for one in answer.get("detectable") or ()
+    }
+    return answer["verdict"] == "intact" and all(
+        key in unseen or (key in limits and limits[key][0] < (severity or 0.0) < limits[key][1])
+        for key, severity in real.items()
     )
 
 

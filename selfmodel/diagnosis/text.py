@@ -47,7 +47,8 @@ def what_is_wrong(diagnosis: Diagnosis) -> str:
             return f"either {', or '.join(causes)}"
         case "unexplained":
             more = diagnosis.unsearched
-            near = f"; it is most like this: {in_words(more.hypothesis)}" if more else ""
+            nearest = more.hypothesis if more else diagnosis.best
+            near = f"; the nearest is that {in_words(nearest)}" if nearest else ""
             return f"something is wrong that none of the searched faults explains{near}"
         case "not judged":
             return "these trials do not show whether something is wrong with the robot"

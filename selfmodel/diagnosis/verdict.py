@@ -100,8 +100,12 @@ def diagnosis_of(
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
     doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
-    closest = best_severities(sorted(leads, key=lambda one: leads[one]))
-    is_stated = problem.has_test and doubt is None
+    probability: dict[str, float] = {}
+    if problem.has_test and doubt is None:
+        nearest = best_severities(sorted(leads, key=lambda one: leads[one]))
+        misses = unsearched is not None or bool(fit.joints)
+        some = {one: leads[one] for one in nearest}
+        probability = probabilities(best, some, fit, misses=misses)
     has_severities = problem.has_test and not best and doubt is None
     severities = (
         detectable_severities(best, problem.space, problem.losses) if has_severities else []
@@ -119,11 +123,7 @@ def diagnosis_of(
         fit=fit,
         residual=_residual_of(best, problem) if verdict == "unexplained" else None,
         doubt=doubt,
-        probability=probabilities(
-            best, {one: leads[one] for one in closest}, fit, misses=unsearched is not None
-        )
-        if is_stated
-        else {},
+        probability=probability,
     )
 
 

@@ -35,7 +35,7 @@ def test_recover_prints_one_json_object_with_every_key(short: tuple[Path, dict])
         *DIAGNOSIS,
         *("displacement", "recovery", "physical_trials", "evaluations", "seconds", "next_trial"),
         *("controller", "neurons", "correct", "score", "comparator_reason", "repair", "fell"),
-        *("search", "repertoire", "model"),
+        *("search", "repertoire", "model", "summary"),
         *({"detectable"} & set(told)),
         "doubt",
     }

@@ -214,8 +214,8 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.01}},
             (
-                "Something is wrong that none of the searched faults explains; it is most like "
-                "this: the foot of the joint front_left_knee has 20 % of its grip (99 % sure). "
+                "Something is wrong that none of the searched faults explains; the nearest is "
+                "that the foot of the joint front_left_knee has 20 % of its grip (99 % sure). "
                 "Search more kinds of faults (--kinds grip)."
             ),
         ),

@@ -14,7 +14,7 @@ from benchmarks.foreign.cases import CASES, NOTATION, UNKNOWN, Fault, faults_of,
 from benchmarks.foreign.generate import Plan, generate
 from benchmarks.foreign.model import compiled, draw_gap
 from benchmarks.foreign.robots import NAMES, Robot, robot
-from benchmarks.foreign.scoring import is_expressible, judged, terms
+from benchmarks.foreign.scoring import is_expressible, judged, reliability, terms
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.robot.robot import Robot as Body
@@ -202,6 +202,34 @@ def test_an_ambiguous_verdict_is_right_if_it_names_the_truth():
     assert not judged(
         row(["break:a"], "jam:a", "ambiguous", indistinguishable=["jam:b"])
     ).verdict_right
+
+
+def test_what_is_stated_is_so_if_it_is_the_truth_and_intact_if_no_fault_is_beyond_a_limit():
+    limit = {"kind": "motor", "part": "a", "below": 0.3, "above": None}
+    sure = {"probability": {"intact": 0.9}, "detectable": [limit]}
+    found = [
+        judged(row(["break:a"], "break:a", "explained", probability={"break:a": 0.9})),
+        judged(row(["break:a"], "break:b", "explained", probability={"break:b": 0.9})),
+        judged(row(["outside:tether"], "jam:a", "unexplained", probability={"jam:a": 0.1})),
+        judged(row(["motor:a=0.4"], "intact", "intact", **sure)),
+        judged(row(["motor:a=0.2"], "intact", "intact", **sure)),
+    ]
+
+    assert [one.probability for one in found] == [0.9] * 5
+    assert [one.is_so for one in found] == [True, False, True, True, False]
+
+
+def test_the_calibration_error_is_the_mean_difference_of_probability_and_rate():
+    rows = [
+        row(["break:a"], best, "explained", probability={best: sure})
+        for best, sure, count in (("break:a", 0.92, 9), ("break:b", 0.92, 1), ("break:a", 0.6, 10))
+        for _ in range(count)
+    ]
+
+    found = reliability(rows)
+
+    assert "| 90% to 95% | 10 | 92.0% | 9/10, 90 %" in found
+    assert "Calibration error 21.0% (" in found
 
 
 def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():
