@@ -42,8 +42,8 @@ def what_is_wrong(diagnosis: Diagnosis) -> str:
         case "ambiguous":
             alike = [diagnosis.best, *diagnosis.indistinguishable]
             causes = [f"{in_words(one)}{_sure(diagnosis, one)}" for one in alike[:MAX_NAMED]]
-            more = len(alike) - MAX_NAMED
-            causes += [f"it is one of {more} other causes"] if more > 0 else []
+            rest = len(alike) - MAX_NAMED
+            causes += [f"it is one of {rest} other causes"] if rest > 0 else []
             return f"either {', or '.join(causes)}"
         case "unexplained":
             more = diagnosis.unsearched

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from selfmodel.diagnosis.diagnosis import Fit
-from selfmodel.diagnosis.probability import EVEN, UNKNOWN, probabilities, unlikeness
+from selfmodel.diagnosis.probability import UNKNOWN, probabilities, unlikeness
 from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_FLOOR, MIN_Z
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -33,7 +33,7 @@ def test_a_smaller_lead_is_a_larger_probability_and_without_one_both_have_half()
 
 
 def test_loss_that_is_left_is_a_probability_of_another_fault():
-    limit = EVEN * (FAULTY_RATIO * 0.1 + LOSS_FLOOR)
+    limit = FAULTY_RATIO * 0.1 + LOSS_FLOOR
     fits = [
         dataclasses.replace(CLEAR, loss=times * limit, excess=20.0) for times in (0.0, 0.5, 1.0, 4)
     ]
