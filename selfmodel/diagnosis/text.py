@@ -23,12 +23,12 @@ _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, th
 def summary(diagnosis: Diagnosis) -> str:
     """Returns what is wrong, since when, how sure that is, and what to do, in plain words."""
     what, change = what_is_wrong(diagnosis), diagnosis.change
-    since = "" if change is None else f", since {change.time:.1f} s into {change.trial}"
+    since = "" if change is None else f", since {change.time:.1f} s into the trial {change.trial}"
     sure = ""
     if diagnosis.verdict in ("intact", "explained"):
         sure = _sure(diagnosis, diagnosis.best)
     elif diagnosis.verdict == "unexplained" and diagnosis.probability:
-        sure = f" ({percent(1 - sum(diagnosis.probability.values()))} sure)"
+        sure = f" ({_percent(1 - sum(diagnosis.probability.values()))} sure)"
     return f"{what[0].upper()}{what[1:]}{since}{sure}. {_advice(diagnosis)}"
 
 
@@ -40,16 +40,11 @@ def what_is_wrong(diagnosis: Diagnosis) -> str:
         case "explained":
             return in_words(diagnosis.best)
         case "ambiguous":
-            alike = [diagnosis.best, *diagnosis.indistinguishable]
-            causes = [f"{in_words(one)}{_sure(diagnosis, one)}" for one in alike[:MAX_NAMED]]
-            rest = len(alike) - MAX_NAMED
-            causes += [f"it is one of {rest} other causes"] if rest > 0 else []
-            return f"either {', or '.join(causes)}"
+            return _alternatives(diagnosis)
         case "unexplained":
-            more = diagnosis.unsearched
-            nearest = more.hypothesis if more else diagnosis.best
-            near = f"; the nearest is that {in_words(nearest)}" if nearest else ""
-            return f"something is wrong that none of the searched faults explains{near}"
+            if diagnosis.reason:
+                return "these trials cannot be simulated"
+            return "something is wrong that none of the searched faults explains"
         case "not judged":
             return "these trials do not show whether something is wrong with the robot"
 
@@ -59,27 +54,36 @@ def in_words(hypothesis: Hypothesis) -> str:
     return ", and ".join(fault.words for fault in hypothesis.faults) or "nothing is wrong"
 
 
-def percent(probability: float) -> str:
-    """Returns a probability as text."""
-    return "< 1 %" if probability < 0.01 else f"{probability:.0%}".replace("%", " %")
+def _alternatives(diagnosis: Diagnosis) -> str:
+    """Returns the faults that all alternatives have, then those in which they differ."""
+    alike = [diagnosis.best, *diagnosis.indistinguishable]
+    clauses = [[fault.words for fault in one.faults] for one in alike]
+    common = [words for words in clauses[0] if all(words in each for each in clauses)]
+    causes, nothing = [], "nothing else is wrong" if common else "nothing is wrong"
+    for one, each in zip(alike[:MAX_NAMED], clauses, strict=False):
+        own = ", and ".join(words for words in each if words not in common)
+        causes.append(f"{own or nothing}{_sure(diagnosis, one)}")
+    if len(alike) > MAX_NAMED:
+        causes.append(f"it is one of {len(alike) - MAX_NAMED} other causes")
+    return "; also ".join([*common, f"either {', or '.join(causes)}"])
+
+
+def _percent(probability: float) -> str:
+    return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
 
 
 def _sure(diagnosis: Diagnosis, hypothesis: Hypothesis) -> str:
     """Returns the probability of a hypothesis in brackets; empty without one."""
     probability = diagnosis.probability.get(str(hypothesis))
-    return "" if probability is None else f" ({percent(probability)} sure)"
+    return "" if probability is None else f" ({_percent(probability)} sure)"
 
 
 def _advice(diagnosis: Diagnosis) -> str:
     """Returns what to do, and what would make the diagnosis surer, as sentences."""
-    fit, joints = diagnosis.fit, list(diagnosis.fit.joints if diagnosis.fit else ())
-    unsearched = diagnosis.unsearched
-    if diagnosis.reason:
-        return "Check the model and the logs: no simulation of them works."
+    fit = diagnosis.fit
+    surer = "record another trial, with other movements"
     if fit is None or fit.healthy_loss is None:
         surer = "give a trial of the healthy robot to compare with (--healthy)"
-    else:
-        surer = "record another trial, with another gait"
     match diagnosis.verdict:
         case "intact":
             return f"There is nothing to repair; to find smaller faults, {surer}."
@@ -88,14 +92,27 @@ def _advice(diagnosis: Diagnosis) -> str:
         case "ambiguous":
             return f"Check these; to tell them apart, {surer}."
         case "unexplained":
-            where = f"Check {', '.join(joints)}, and search" if joints else "Search"
-            kinds = unsearched.kind if unsearched else "all"
-            return f"{where} more kinds of faults (--kinds {kinds})."
+            return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
             return (
                 f"The model of the robot is not known to be right for such a motion: "
                 f"{(diagnosis.doubt or NO_DOUBT).remedy}, and repeat the diagnosis."
             )
+
+
+def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
+    unsearched, best = diagnosis.unsearched, diagnosis.best
+    if diagnosis.reason:
+        return "Check the model of the robot and the logs."
+    if unsearched is not None:
+        return (
+            f"Perhaps {in_words(unsearched.hypothesis)}: check this, and repeat the diagnosis with "
+            f"{unsearched.kind} added to --kinds."
+        )
+    nearest = f"The nearest is that {in_words(best)}: check this, and" if best else ""
+    check = f"Check the joints {', '.join(joints)}, and" if joints else nearest
+    repeat = "repeat the diagnosis with more kinds of faults (--kinds all)."
+    return f"{check} {repeat}" if check else f"{repeat[0].upper()}{repeat[1:]}"
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:

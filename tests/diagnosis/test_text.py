@@ -172,6 +172,7 @@ def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
 
 DOUBT = Doubt("WHY", "DO THIS")
 MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
+JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
 
 
@@ -188,14 +189,14 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
             (
                 "Nothing is wrong that these trials would show (95 % sure). There is nothing to "
-                "repair; to find smaller faults, record another trial, with another gait."
+                "repair; to find smaller faults, record another trial, with other movements."
             ),
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
             (
-                "The joint front_left_knee is stuck, since 4.9 s into 02-recovery (93 % sure). "
-                "Check this first; to be surer, record another trial, with another gait."
+                "The joint front_left_knee is stuck, since 4.9 s into the trial 02-recovery (93 % "
+                "sure). Check this first; to be surer, record another trial, with other movements."
             ),
         ),
         (
@@ -214,10 +215,21 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.01}},
             (
-                "Something is wrong that none of the searched faults explains; the nearest is "
-                "that the foot of the joint front_left_knee has 20 % of its grip (99 % sure). "
-                "Search more kinds of faults (--kinds grip)."
+                "Something is wrong that none of the searched faults explains (99 % sure). Perhaps "
+                "the foot of the joint front_left_knee has 20 % of its grip: check this, and "
+                "repeat the diagnosis with grip added to --kinds."
             ),
+        ),
+        (
+            {"verdict": "unexplained", "fit": JOINT, "best": INTACT},
+            (
+                "Something is wrong that none of the searched faults explains. Check the joints "
+                "knee, and repeat the diagnosis with more kinds of faults (--kinds all)."
+            ),
+        ),
+        (
+            {"verdict": "unexplained", "reason": "no simulation works"},
+            "These trials cannot be simulated. Check the model of the robot and the logs.",
         ),
         (
             {"verdict": "not judged", "doubt": DOUBT},
