@@ -2,7 +2,8 @@
 
 A loss above that of the healthy trials has two causes: a fault, or a motion that the model predicts
 worse than those it was fitted to. In a trial with the gait of a healthy one, only the first is
-left. For other trials, the following is asked before a robot is called damaged:
+left, unless the loss is as small as theirs: then the third question below is asked. For other
+trials, the following is asked before a robot is called damaged:
 
 1. **Explanation.** Does the fault explain most of the loss? If not, or if there is no fault that
    does, the gait may be the cause, unless it is no faster than the healthy ones and the loss is too
@@ -55,15 +56,17 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     """
     if problem.calibrate is None or problem.healthy([INTACT]) is None:
         return None
-    if is_shown_in_known_gaits(accused, problem):
-        return None
     healthy = problem.healthy_trials
     worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
+    loss, reason = fit.intact_loss if accused else fit.loss, ""
+    if is_shown_in_known_gaits(accused, problem):
+        if accused and loss <= worst + significance.LOSS_FLOOR:
+            reason = refit_reason(accused, problem)
+        return _doubt(reason, {}) if reason else None
     has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
-    loss = fit.intact_loss if accused else fit.loss
     is_small = loss <= ratio * worst + significance.LOSS_FLOOR
-    faster, reason = faster_joints(problem.trials, problem), ""
+    faster = faster_joints(problem.trials, problem)
     if share_left(accused, fit, problem) > MAX_LEFT:
         if is_small or faster:
             whatever = f"{accused} explains less" if accused else "no hypothesis explains more"
@@ -81,12 +84,8 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
                 f"the healthy trials have one gait, which does not tell how large the error of the "
                 f"self-model is in another, and {accused} explains no more than it may"
             )
-        elif (refit := problem.recalibrated) is None:
-            reason = f"the trials are too short for a fit that could explain them without {accused}"
-        elif is_explained_without(accused, refit, problem):
-            reason = (
-                f"a self-model that is fitted to all trials predicts them as well without {accused}"
-            )
+        else:
+            reason = refit_reason(accused, problem)
     return _doubt(reason, faster) if reason else None
 
 
@@ -132,6 +131,15 @@ def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
         return 1.0
     loss, intact = problem.losses([accused, INTACT]).mean(axis=1)
     return significance.share_left(float(loss), float(intact), fit.healthy_loss) or 0.0
+
+
+def refit_reason(accused: Hypothesis, problem: Problem) -> str:
+    """Returns why a self-model that is fitted to all trials leaves a doubt; empty without."""
+    if (refit := problem.recalibrated) is None:
+        return f"the trials are too short for a fit that could explain them without {accused}"
+    if is_explained_without(accused, refit, problem):
+        return f"a self-model that is fitted to all trials predicts them as well without {accused}"
+    return ""
 
 
 def is_explained_without(accused: Hypothesis, refit: LossTable, problem: Problem) -> bool:

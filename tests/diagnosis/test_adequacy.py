@@ -157,6 +157,15 @@ def test_the_same_gait_as_that_of_a_healthy_trial_is_not_doubted(
     assert doubted(problem_of(table, same, healthy, real), accused) is None
 
 
+def test_a_loss_as_small_as_that_of_healthy_trials_has_to_beat_a_refit_in_any_gait(
+    table: LossTable, real: Robot, healthy: list[Trial], weaker: Robot
+):
+    same = moved(real, "first", truth=WEAK)
+
+    assert doubted(problem_of(table, same, healthy, weaker), WEAK, 1.0) is not None
+    assert doubted(problem_of(table, same, healthy), WEAK, 1.0) is None
+
+
 @pytest.mark.parametrize("accused", ["intact", WEAK])
 def test_a_loss_beyond_any_error_of_a_fitted_model_is_not_doubted(
     table: LossTable, covering: list[Trial], weak: Trial, weaker: Robot, accused: str
