@@ -188,6 +188,13 @@ def test_what_is_lost_is_pale_and_what_is_jammed_red_in_a_film(robot: Robot):
     np.testing.assert_array_equal(drawn.model.geom_rgba, before)
 
 
+def test_the_camera_is_on_the_side_of_what_is_damaged(quadruped: Robot):
+    left, right = (film(quadruped, f"break:front_{side}_shoulder") for side in ("left", "right"))
+
+    assert left.azimuth == -right.azimuth
+    assert film(quadruped, "intact").azimuth == right.azimuth
+
+
 @pytest.mark.parametrize("kind", ["png", "pdf"])
 def test_steps_that_were_not_observed_are_marked_in_every_kind_of_strip(
     quadruped: Robot, kind: str

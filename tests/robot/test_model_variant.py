@@ -186,6 +186,16 @@ def test_a_detached_body_has_no_contacts_even_in_an_explicit_pair(text: str, con
     assert np.count_nonzero(data.contact.efc_address >= 0) == contacts
 
 
+def test_friction_of_an_explicit_pair_with_the_ground_is_that_of_sliding_alone():
+    both = '<pair geom1="toe" geom2="ground" friction="1 1 .1 .2 .3"/></contact>'
+    robot = Robot("paired", made().mjcf.replace("</contact>", both), 0.01)
+
+    before, after = (built(robot, text).pair_friction for text in ("intact", "friction=0.4"))
+
+    assert after[0].tolist() == [0.4, 0.4, 0.1, 0.2, 0.3]
+    assert after[1].tolist() == before[1].tolist(), "of the robot with itself"
+
+
 OFFSET = 0.2
 KP = 30.0
 

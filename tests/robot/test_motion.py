@@ -7,7 +7,15 @@ from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as arrays
 
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.robot.motion import POSE, Poses, opacity, poses_of, stick_geoms, visible_geoms
+from selfmodel.robot.motion import (
+    POSE,
+    Poses,
+    opacity,
+    poses_of,
+    stick_geoms,
+    triangles_of,
+    visible_geoms,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import signal_fields
 from selfmodel.simulation.simulator import Simulator
@@ -131,6 +139,16 @@ def test_each_body_is_drawn_with_the_geoms_that_are_meant_to_be_seen(
     geoms: str, expected: list[bool]
 ):
     assert seen(geoms) == expected
+
+
+def test_a_mesh_has_the_triangles_of_its_own_vertices():
+    double = MESH.replace('"m"', '"n"').replace('"/>', ' 0 0 -.1"/>')
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{MESH}{double}</mujoco>")
+
+    for mesh in range(2):
+        vertices, faces = triangles_of(model, mesh)
+        assert (len(vertices), len(faces)) == (4 + mesh, 2 * (4 + mesh) - 4)
+        assert np.unique(faces).tolist() == list(range(len(vertices)))
 
 
 def test_a_ground_in_a_group_that_is_hidden_is_drawn():
