@@ -46,7 +46,7 @@ def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_s
     assert (done.returncode, again.returncode) == (0, 0), done.stderr + again.stderr
     told = json.loads(done.stdout)
     assert told["bytes"] == (logs / "a.html").stat().st_size
-    assert told["headline"].startswith("1 trial of the quadruped: it ")
+    assert told["headline"].startswith("1 trial of the quadruped. ")
     assert "quadruped: after" in (logs / "a.html").read_text()
     assert (logs / "again.html").read_bytes() == (logs / "a.html").read_bytes()
     assert "diagnostic EA" not in again.stderr
