@@ -9,14 +9,25 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators import encoders, readings
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
-from selfmodel.simulation.requests import command_steps, cut_segments
-from selfmodel.trials.estimation import ONBOARD, STATE, estimated_states, known_rows
+from selfmodel.simulation.requests import chained, command_steps, cut_segments
+from selfmodel.trials.estimation import (
+    BASE,
+    JOINTS,
+    ONBOARD,
+    STATE,
+    estimated_states,
+    known_rows,
+    known_steps,
+)
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 MIN_SEGMENTS = 4
 """Segments of a trial, at least."""
+
+MIN_COVER = 0.9
+"""Share of a trial that segments cover without gaps that matter."""
 
 COMPARISONS = 4
 """Steps within a segment at which prediction and log are compared, evenly spread to its end."""
@@ -40,42 +51,44 @@ class SegmentPrediction:
 
     A hinge whose encoder was lost is unknown where it is NaN: it continues from its predicted state
     at the end of the segment before, and has no loss. The mean over the columns of a signal is then
-    that of the known columns.
+    that of the known columns. So does the base of ``segment-prediction-onboard``, which requires
+    neither its position nor its linear velocity. Such segments follow each other (``chained``).
 
-    Limits: needs the base's pose and velocity and at least one encoder.
-    ``segment-prediction-onboard`` requires neither the base's position nor its linear velocity, and
-    continues each segment from the base's predicted state at the end of the segment before, which
-    makes it less sharp. Slow effects, such as a light wind, hardly show within an eighth of a
-    second. The network is taken to be known: without one (a recording of other software) its
-    arithmetic is not compared. Segments with a late step (``Trajectory.late``) have no loss: the
-    effect of a command in a quarter of a second is not its effect in an eighth.
+    Limits: needs the base's pose and velocity and at least one encoder. Slow effects, such as a
+    light wind, hardly show within an eighth of a second. The network is taken to be known: without
+    one (a recording of other software) its arithmetic is not compared. Segments with a late step
+    (``Trajectory.late``) have no loss: the effect of a command in a quarter of a second is not its
+    effect in an eighth.
 
     Attributes:
         name: The comparator's name.
         state: Signals of the state in which a segment begins, which are also predicted.
         horizon: Control steps of a segment.
-        max_segments: Segments at most, evenly spread over the trial.
+        max_segments: Segments of a short trial, at most, evenly spread over it.
+        density: Segments per control step of a longer trial.
     """
 
     name: str
     state: tuple[Signal, ...] = STATE
     horizon: int = 12
     max_segments: int = 80
+    density: float = 0.08
 
     @property
     def surrogate(self) -> "SegmentPrediction":
-        """The same comparator with a third of the segments."""
-        return dataclasses.replace(self, max_segments=max(self.max_segments // 3, MIN_SEGMENTS))
+        """The same comparator with a third of the segments of a short trial, for any trial."""
+        fewer = max(self.max_segments // 3, MIN_SEGMENTS)
+        return dataclasses.replace(self, max_segments=fewer, density=0.0)
 
     def prepare(self, trial: Trial) -> Prepared:
         """Returns the segments of the trial and the logged values to compare them with.
 
-        Segments with a late step are predicted, because later segments may continue from their end,
-        and have no loss.
+        Segments with a late step, and those that warm up a chain, are predicted, because later ones
+        may continue from their end, and have no loss.
         """
         trajectory, horizon = trial.trajectory, self.horizon
         states = estimated_states(trajectory, self.state)
-        starts, steady = self._starts(trial, states)
+        starts, steady, chains = self._starts(trial, states)
         compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
         logged = {s: values[starts[:, np.newaxis] + compared] for s, values in states.items()}
         reading_log = readings.logged_readings(trajectory["sensors"], starts, horizon)
@@ -84,7 +97,7 @@ class SegmentPrediction:
         arithmetic = readings.arithmetic_loss(trial, starts, horizon)
 
         def losses(simulated: Trajectory) -> Losses:
-            """Returns the losses of each segment without a late step."""
+            """Returns the losses of each segment that has any."""
             predicted = (
                 encoders.with_loose_encoders(simulated, loose) if loose else simulated.signals
             )
@@ -105,14 +118,18 @@ class SegmentPrediction:
                 by_hinge=encoders.hinge_losses(simulated, logged, compared)[:, steady],
             )
 
-        request = cut_segments(trajectory, states, starts, horizon, (*self.state, "sensors"))
+        record: tuple[Signal, ...] = (*self.state, "sensors")
+        request = cut_segments(trajectory, states, starts, horizon, record, chains=chains)
         piece_steps = (starts[:, np.newaxis] + np.array([0, horizon]))[steady]
         return Prepared(request, losses, piece_steps)
 
     def _starts(
         self, trial: Trial, states: Mapping[Signal, FloatArray]
-    ) -> tuple[IndexArray, BoolArray]:
-        """Returns the steps at which segments begin, and a mask of those without a late step."""
+    ) -> tuple[IndexArray, BoolArray, int]:
+        """Returns the steps at which segments begin, a mask of those that have a loss, and chains.
+
+        Segments that follow each other are consecutive, if not all of a trial are simulated.
+        """
         trajectory, horizon = trial.trajectory, self.horizon
         if trajectory.steps < MIN_SEGMENTS * horizon + 1:
             raise TrialRefusedError(
@@ -120,7 +137,12 @@ class SegmentPrediction:
                 f"and the trial has {trajectory.steps}",
                 "leave this log out",
             )
-        count = min(self.max_segments, (trajectory.steps - 1) // horizon)
+        fitting = (trajectory.steps - 1) // horizon
+        most = max(self.max_segments, round(self.density * trajectory.steps))
+        follow = not set(BASE) <= states.keys() or any(
+            np.isnan(states[signal][known_steps(states)]).any() for signal in JOINTS
+        )
+        count = fitting if follow and most < MIN_COVER * fitting else min(most, fitting)
         starts = np.linspace(0, trajectory.steps - 1 - horizon, count).round().astype(np.intp)
         known: dict[Signal, BoolArray] = {
             signal: known_rows(signal, states[signal][starts]) for signal in self.state
@@ -142,7 +164,11 @@ class SegmentPrediction:
                 f"have it",
                 "give a comparator that needs fewer signals, or leave this log out",
             )
-        return starts[usable], steady[usable]
+        starts, steady = starts[usable], steady[usable]
+        if not follow:
+            return starts, steady, 1
+        rows, counted, chains = chained(len(starts), most)
+        return starts[rows], steady[rows] & counted, chains
 
 
 def _all_finite(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:

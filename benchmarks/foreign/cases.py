@@ -92,7 +92,7 @@ def faults_of(case: Case, robot: Robot, seed: int) -> Faults:
 def onset_of(case: Case, robot: Robot, seed: int) -> float | None:
     """Returns the time at which the faults begin, s; None if they hold from the start."""
     if case.group != "onset":
-        return None
+        return ONSETS.get(case.name)
     drawn = stream(seed, robot.name, case.name, "onset").uniform(3, 7)
     return round(round(drawn / robot.control_timestep) * robot.control_timestep, 6)
 
@@ -235,6 +235,21 @@ def _foot(robot: Robot, rng: np.random.Generator) -> str:
     return _one_of(rng, list(robot.touches.values()))
 
 
+def _two_kilograms(robot: Robot, _rng: np.random.Generator) -> Faults:
+    part = 2.0 / robot.spec().compile().body_mass.sum()
+    return (Fault("payload", value=round(float(part), 3), place=(0.0, 0.0, 0.05)),)
+
+
+def _thigh(robot: Robot, rng: np.random.Generator) -> str:
+    """Returns one of the parts with one hinge that carry another and are no hips of a Go2."""
+    return _one_of(rng, [part.name for part in robot.parts if len(part.beyond) == 2])
+
+
+def _worn_foot(robot: Robot, rng: np.random.Generator) -> Faults:
+    """A foot whose friction is 0.12 in place of 0.8."""
+    return (Fault("grip", _foot(robot, rng), 0.15),)
+
+
 _LOST = _limb("freezes", "follows")
 _FRICTION = _single("friction", _nowhere, _between(0.35, 0.6))
 _MOTOR = _single("motor", _part, _between(0.05, 0.5))
@@ -280,6 +295,12 @@ _GROUPS: dict[str, dict[str, Draw]] = {
         "onset-break": _LOST,
     },
     "lost-encoder": {"break-nan": _limb("nan"), "break-none": _limb("none"), "encoder": _encoder},
+    "long": {
+        "long-motor": _single("motor", _thigh, lambda _rng: 0.5),
+        "long-payload": _two_kilograms,
+        "long-grip": _worn_foot,
+        "long-healthy": _together(),
+    },
     "outside": {
         "crossed": _crossed,
         "tether": _tether,
@@ -289,6 +310,9 @@ _GROUPS: dict[str, dict[str, Draw]] = {
         "short-range": _single("short-range", _hinge, _between(0.1, 0.2, digits=None)),
     },
 }
+
+ONSETS = {"long-motor": 17.0, "long-grip": 5.0}
+"""Onset of cases for trials of 30 s, s."""
 
 GROUPS = tuple(_GROUPS)
 """The groups in the order of the tables."""

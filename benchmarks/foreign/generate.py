@@ -29,7 +29,7 @@ class Plan:
     """What to record: robot, case and gap by name, and the trials of the robot with its faults.
 
     With ``own_gait``, there are two healthy trials, and the trial of the robot with its faults has
-    another gait: a trot for every second seed.
+    another gait: a trot for every second seed (of the Go2, which trots, a walk).
     """
 
     robot: str
@@ -79,6 +79,7 @@ def generate(out: Path, plan: Plan) -> Path:
         moved.append(record(name=f"after-{k + 1}", faults=present, onset=start, gait=gaits[k]))
     if machine.mapped_as != machine.name:  # the MJCF beside the mappings, with its settings
         shutil.copyfile(machine.path, folder / machine.mapped_as)
+    if machine.name == "ant":
         stiffness, damping = SERVO_GAINS
         settings = f"kp = {stiffness}\nkd = {damping}\n"
         (folder / machine.mapped_as).with_suffix(".toml").write_text(settings)
@@ -135,6 +136,7 @@ def _gaits(machine: Robot, case: Case, plan: Plan, faults: Faults) -> list[Gait]
     rng = plan.stream("gaits")
     wrong = "sensor" in case.name  # so that a network has to control the robot
     kind = "network" if wrong or rng.random() < 1 / 3 else "playback"
+    kind = kind if machine.has_odometry else "stride"
     gaits = [draw_gait(machine, kind, rng) for _ in range(CANDIDATES)]
     return _by_displacement(machine, plan, gaits, faults if case.group == "outside" else ())[:GAITS]
 
@@ -173,10 +175,8 @@ def _by_displacement(
 
 def _trot(machine: Robot, plan: Plan) -> Gait:
     """Returns the trot with the largest displacement of the robot without gap and faults."""
-    rng = plan.stream("trot")
-    return _by_displacement(machine, plan, [draw_gait(machine, "trot", rng) for _ in range(GAITS)])[
-        0
-    ]
+    rng, kind = plan.stream("trot"), "trot" if machine.has_odometry else "walk"
+    return _by_displacement(machine, plan, [draw_gait(machine, kind, rng) for _ in range(GAITS)])[0]
 
 
 def _record(

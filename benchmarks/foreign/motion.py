@@ -25,9 +25,12 @@ def draw_gait(robot: Robot, kind: str, rng: np.random.Generator) -> Gait:
     """Returns a random gait, which grows in the first half second.
 
     Its kind is ``playback``, a sinusoid per motor; ``trot``, one sinusoid for each motor of a leg
-    and every second leg in antiphase; or ``network``, a hidden layer of tanh neurons with a clock
+    and every second leg in antiphase; ``stride`` or ``walk``, the legs of a Go2 in pairs or one
+    after the other; or ``network``, a hidden layer of tanh neurons with a clock
     of two phases as inputs. The joints' ranges are those of the commands.
     """
+    if kind in ("stride", "walk"):
+        return _strides(rng, (0.0, 0.5, 0.5, 0.0) if kind == "stride" else (0.0, 0.5, 0.75, 0.25))
     model = robot.spec().compile()
     limits = np.array([model.joint(hinge).range for hinge in robot.motors.values()])
     centre, half = limits.mean(axis=1), (limits[:, 1] - limits[:, 0]) / 2
@@ -56,6 +59,20 @@ def draw_gait(robot: Robot, kind: str, rng: np.random.Generator) -> Gait:
         return np.asarray(centre + min(time / 0.5, 1.0) * half * (amplitude * wave + offset))
 
     return sinusoids
+
+
+def _strides(rng: np.random.Generator, phases: Sequence[float]) -> Gait:
+    """Returns a gait of four legs of hip, thigh and calf, which swing and lift by their phases."""
+    frequency, swing, lift = rng.uniform(1.5, 2.2), rng.uniform(0.1, 0.2), rng.uniform(0.2, 0.35)
+
+    def strides(time: float, _angles: np.ndarray, _touch: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * (frequency * time + np.array(phases))
+        grown = min(time / 0.5, 1.0)
+        thigh = 0.9 + grown * swing * np.cos(angle)
+        calf = -1.8 - grown * lift * np.maximum(0.0, np.sin(angle))
+        return np.stack([np.zeros(4), thigh, calf], axis=1).ravel()
+
+    return strides
 
 
 def _places_of_motors(robot: Robot, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

@@ -76,10 +76,10 @@ def encoders_of(robot: Robot, faults: Faults, onset: float, signs: dict[str, int
 def recorded(
     robot: Robot, motion: Motion, encoders: Encoders, noise: Noise, rng: np.random.Generator
 ) -> list[Item]:
-    """Returns the messages of a motion: /joint_states, /joint_commands, /odom and /foot/NAME."""
+    """Returns the messages of a motion: joint states and commands, odometry or IMU, and feet."""
     return [
         *_joints(robot, motion, encoders, noise, rng),
-        *_odometry(motion, noise, rng),
+        *(_odometry if robot.has_odometry else _imu)(motion, noise, rng),
         *_commands(robot, motion),
     ]
 
@@ -108,6 +108,11 @@ def mapping(robot: Robot, encoders: Encoders, duration: float, *, healthy: bool)
     touches = "".join(
         f'\n[touch.{name}]\ntopic = "/foot/{name}"\nunit = "N"\n' for name in robot.touches
     )
+    base = (
+        f'[base]\ntopic = "/odom"\nframe = "start"\nunit = "m"\n{touches}'
+        if robot.has_odometry
+        else '[imu]\ntopic = "/imu"\n'
+    )
     hinges = "\n".join(
         f"{hinge} = "
         + (
@@ -122,7 +127,7 @@ def mapping(robot: Robot, encoders: Encoders, duration: float, *, healthy: bool)
         f'robot = "{robot.mapped_as}"\n{file}{stage}duration = {duration}\n\n'
         f'[joints]\ntopic = "/joint_states"\nunit = "rad"\n[joints.names]\n{hinges}\n\n'
         f'[commands]\ntopic = "/joint_commands"\nunit = "rad"\n[commands.names]\n{motors}\n\n'
-        f'[base]\ntopic = "/odom"\nframe = "start"\nunit = "m"\n{touches}'
+        f"{base}"
     )
 
 
@@ -198,6 +203,28 @@ def _odometry(motion: Motion, noise: Noise, rng: np.random.Generator) -> Iterato
         linear = _rotation(turn).T @ twist[:3] + rng.normal(0, noise.linear, 3)
         angular = twist[3:] + rng.normal(0, noise.angular, 3)
         yield "/odom", _stamp(time), _odom(time, position, turn, linear, angular)
+
+
+def _imu(motion: Motion, noise: Noise, rng: np.random.Generator) -> Iterator[Item]:
+    """Yields orientation and angular velocity of the root body; accelerations are 0."""
+    for time in np.arange(-STANDING, motion.time[-1], ODOMETRY_PERIOD):
+        true = _jittered(time, noise, rng)
+        pose, twist = _at(motion.time, motion.pose, true), _at(motion.time, motion.twist, true)
+        turn = pose[3:] / np.linalg.norm(pose[3:]) + rng.normal(0, noise.orientation / 2, 4)
+        w, x, y, z = map(float, turn / np.linalg.norm(turn))
+        angular = twist[3:] * (true >= 0) + rng.normal(0, noise.angular, 3)
+        unknown = np.zeros(9)
+        message = _message(
+            "sensor_msgs/msg/Imu",
+            header=_header(time, "base"),
+            orientation=_message("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
+            orientation_covariance=unknown,
+            angular_velocity=_vector(angular),
+            angular_velocity_covariance=unknown,
+            linear_acceleration=_vector(np.zeros(3)),
+            linear_acceleration_covariance=unknown,
+        )
+        yield "/imu", _stamp(time), message
 
 
 def _rotation(turn: np.ndarray) -> np.ndarray:

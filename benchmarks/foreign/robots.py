@@ -15,7 +15,7 @@ TOUCH_REACH = 0.02
 """Distance by which the touch sites of the ant extend beyond its feet, m: a contact at rest lies up
 to the margin of a geom beyond it, 0.01 m."""
 
-NAMES = ("quadruped", "hexapod", "ant")
+NAMES = ("quadruped", "hexapod", "ant", "go2")
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ class Robot:
     control_timestep: float = 0.01
     frequencies: tuple[float, float] = (0.8, 1.8)
     amplitudes: tuple[float, float] = (0.2, 1.0)
+    has_odometry: bool = True
+    """Whether odometry and touch sensors are recorded; else an IMU is."""
 
     def part(self, name: str) -> Part:
         """Returns a part by name."""
@@ -76,7 +78,7 @@ def robot(name: str) -> Robot:
     return Robot(
         name=name,
         path=path,
-        mapped_as="ant.xml" if name == "ant" else name,
+        mapped_as=f"{name}.xml" if name in ("ant", "go2") else name,
         root=model.body(1).name,
         hinges=hinges,
         motors={
@@ -85,11 +87,14 @@ def robot(name: str) -> Robot:
         },
         touches=touches,
         parts=tuple(_parts(model, hinges, touches)),
+        **({"control_timestep": 0.02, "has_odometry": False} if name == "go2" else {}),
     )
 
 
 def _path(name: str) -> Path:
     """Returns the MJCF file of a robot, without an import of its package."""
+    if name == "go2":
+        return Path(__file__).with_name("go2.xml")
     package, inside = (
         ("gymnasium", "envs/mujoco/assets/ant.xml")
         if name == "ant"

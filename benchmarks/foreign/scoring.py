@@ -60,6 +60,7 @@ QUESTIONS = {
     "default": Question(trials=3),
     "onset": Question(),
     "lost-encoder": Question("break,jam,sensor"),
+    "long": Question("default,grip"),
     "outside": Question(),
 }
 """Question of each group."""

@@ -35,9 +35,9 @@ def predict(
     """Predicts segments of a trial with several models of a robot.
 
     Segments with the whole state are simulated in parallel. Segments without the position and the
-    linear velocity of the base, or with an unknown hinge, are simulated in sequence: each begins
-    with the base, or the hinge, in the predicted state at the end of the segment before. The first
-    begins in the initial pose.
+    linear velocity of the base, or with an unknown hinge, are simulated in chains: each begins with
+    the base, or the hinge, in the predicted state at the end of the segment before. The first of a
+    chain begins in the initial pose.
 
     Welded joints begin at their welded angle. The hinges of a detached limb have no logged motion:
     if the segments include joint positions, they begin at rest, at their median angle over the last
@@ -114,10 +114,8 @@ class _OpenLoop:
     ) -> None:
         self._segments, self._stats, self._substeps = segments, stats, robot.substeps
         count = len(segments.starts)
-        self._stages: list[IndexArray] = np.split(
-            np.arange(count), 1 if segments.independent else count
-        )
-        self.together = len(self._stages[0])
+        self.together = count if segments.independent else segments.chains
+        self._stages: list[IndexArray] = [*np.arange(count).reshape(self.together, -1).T]
         self.models = [own for own in moving for _ in range(self.together)]
         self.batch = RobotBatch(robot.model, self.models, threads)
         # Before the first step, after which a field that is bound remains zero.

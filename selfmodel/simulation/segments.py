@@ -22,15 +22,16 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import with_known_base
 from selfmodel.simulation.model_factors import Parameters, model_with_parameters
 from selfmodel.simulation.prediction import predict
-from selfmodel.simulation.requests import LEAD, Segments, command_steps, cut_segments
+from selfmodel.simulation.requests import LEAD, Segments, chained, command_steps, cut_segments
 from selfmodel.simulation.rollout import SimulationStats, largest_batch
 from selfmodel.trials import estimation
 from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, difference
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
 
-MAX_SEGMENTS = 40
-"""Largest number of segments of a trial in which the base was observed."""
+MAX_SEGMENTS, MAX_FOLLOWING = 40, 100
+"""Largest numbers of segments of a trial in which the base was observed, and of one in which it was
+not, so that segments follow each other."""
 
 HORIZON = 10
 """Length of a segment, control steps."""
@@ -146,7 +147,7 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     """Returns consecutive segments of the onboard state; None if too few steps are valid.
 
     Every segment with a known initial state and known commands is simulated, because later segments
-    continue from its end.
+    continue from its end; of a long trial, those of two parts.
     """
     if trajectory.steps <= LEAD + HORIZON:
         return None
@@ -154,7 +155,12 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     states = estimation.estimated_states(trajectory, estimation.ONBOARD)
     commanded = _all_known(_complete(trajectory["commands"]), begins)
     starts = begins[_known(states)[begins] & commanded]
-    cut = _cut(trajectory, states, starts, HORIZON, estimation.ONBOARD)
+    if not len(starts):
+        return None
+    rows, counted, chains = chained(len(starts), MAX_FOLLOWING)
+    cut = _cut(trajectory, states, starts[rows], HORIZON, estimation.ONBOARD)
+    segments = replace(cut.segments, chains=chains)
+    cut = replace(cut, segments=segments, valid=cut.valid & counted[:, np.newaxis])
     return cut if cut.valid.sum() >= HORIZON else None
 
 

@@ -19,7 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation import prediction
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.prediction import activations, predict
-from selfmodel.simulation.requests import END, Segments, cut_segments
+from selfmodel.simulation.requests import END, WARM_UP, Segments, chained, cut_segments
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
@@ -167,6 +167,34 @@ def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot:
     assert base[:, 1:, 0].tobytes() == base[:, :-1, -1].tobytes()
     # What was logged is what was predicted, so the whole chain is the trial.
     assert error(outcome.trajectory, run, CHAIN) < 10 * EXACT
+
+
+def test_chains_are_predicted_together_as_each_is_alone(quadruped: Robot):
+    (run,), simulator = trials(quadruped, INTACT), Simulator(quadruped, 1)
+    parts = [[0, 12, 24], [50, 62, 74]]
+    both = dataclasses.replace(cut(run, [*parts[0], *parts[1]], ONBOARD), chains=2)
+    together = simulator.predict([INTACT], both).trajectory
+    for part, rows in zip(parts, (slice(0, 3), slice(3, 6)), strict=True):
+        alone = simulator.predict([INTACT], cut(run, part, ONBOARD)).trajectory
+        for signal in RECORD:
+            assert together[signal][:, rows].tobytes() == alone[signal].tobytes(), signal
+
+
+@pytest.mark.parametrize(("count", "most"), [(80, 80), (125, 125), (2500, 2500), (125, 26), (9, 8)])
+def test_chains_count_each_segment_once_and_warm_up_where_they_begin_in_mid_trial(
+    count: int, most: int
+):
+    rows, counted, chains = chained(count, most)
+    parts = np.split(rows, chains)
+
+    assert len(rows) <= 1.1 * most
+    assert len(set(rows[counted].tolist())) == counted.sum()
+    if count <= most:
+        np.testing.assert_array_equal(rows[counted], np.arange(count))
+    assert rows[-1] == count - 1  # a fault may begin during the trial
+    for part, used in zip(parts, np.split(counted, chains), strict=True):
+        np.testing.assert_array_equal(np.diff(part), 1)
+        assert part[0] == 0 or not used[:WARM_UP].any()
 
 
 @pytest.mark.parametrize("signals", [STATE, ONBOARD], ids=["whole", "onboard"])

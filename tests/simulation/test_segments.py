@@ -8,9 +8,10 @@ import pytest
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.simulation.requests import LEAD
+from selfmodel.simulation.requests import LEAD, WARM_UP
 from selfmodel.simulation.segments import (
     HORIZON,
+    MAX_FOLLOWING,
     MAX_SEGMENTS,
     MIN_BASE_SHARE,
     SegmentErrors,
@@ -68,6 +69,20 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[S
 
     np.testing.assert_array_equal(found.segments.starts, np.arange(0, STEPS - HORIZON, HORIZON))
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
+
+
+def test_of_a_long_trial_without_the_base_two_parts_are_used_after_they_have_warmed_up():
+    run = WHOLE.trajectory
+    long = {signal: np.tile(values, (8, 1)) for signal, values in run.signals.items()}
+    time = 0.01 * np.arange(8 * STEPS)
+    tried = replace(lacking(WHOLE, BASE), trajectory=replace(run, time=time, signals=long))
+    found = observed_segments(QUADRUPED, lacking(tried, BASE))
+
+    assert (found.segments.chains, len(found.segments.starts)) == (2, MAX_FOLLOWING)
+    assert found.segments.starts[-1] == 8 * STEPS - 1 - HORIZON - (8 * STEPS - 1) % HORIZON
+    half = MAX_FOLLOWING // 2
+    assert not found.valid[half : half + WARM_UP].any()
+    assert found.valid.sum() == (MAX_FOLLOWING - WARM_UP) * HORIZON
 
 
 @SEEN
