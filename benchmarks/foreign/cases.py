@@ -241,8 +241,9 @@ def _two_kilograms(robot: Robot, _rng: np.random.Generator) -> Faults:
 
 
 def _thigh(robot: Robot, rng: np.random.Generator) -> str:
-    """Returns one of the parts with one hinge that carry another and are no hips of a Go2."""
-    return _one_of(rng, [part.name for part in robot.parts if len(part.beyond) == 2])
+    """Returns a part that carries one other hinge."""
+    carry = [part.name for part in robot.parts if len(part.beyond) == len(part.hinges) + 1]
+    return _one_of(rng, carry)
 
 
 def _worn_foot(robot: Robot, rng: np.random.Generator) -> Faults:
