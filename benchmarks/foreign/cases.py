@@ -205,9 +205,12 @@ def _heavier(robot: Robot, _rng: np.random.Generator) -> Faults:
     return (Fault("payload", value=round(float(part), 3)),)
 
 
-def _grip(robot: Robot, rng: np.random.Generator) -> Faults:
-    feet = [part.name for part in robot.parts if part.body in robot.touches.values()]
-    return (Fault("grip", _one_of(rng, feet), 0.1),)
+def _grip(factor: float) -> Draw:
+    def draw(robot: Robot, rng: np.random.Generator) -> Faults:
+        feet = [part.name for part in robot.parts if part.body in robot.touches.values()]
+        return (Fault("grip", _one_of(rng, feet), factor),)
+
+    return draw
 
 
 def _encoder(robot: Robot, rng: np.random.Generator) -> Faults:
@@ -246,11 +249,6 @@ def _thigh(robot: Robot, rng: np.random.Generator) -> str:
     return _one_of(rng, carry)
 
 
-def _worn_foot(robot: Robot, rng: np.random.Generator) -> Faults:
-    """A foot whose friction is 0.12 in place of 0.8."""
-    return (Fault("grip", _foot(robot, rng), 0.15),)
-
-
 _LOST = _limb("freezes", "follows")
 _FRICTION = _single("friction", _nowhere, _between(0.35, 0.6))
 _MOTOR = _single("motor", _part, _between(0.05, 0.5))
@@ -277,7 +275,7 @@ _GROUPS: dict[str, dict[str, Draw]] = {
         "delay": _single("delay", _nowhere, _between(2, 3, digits=2)),
         "encoder-offset": _single("encoder-offset", _hinge_part, _OFFSET),
         "encoder-slip": _single("encoder-slip", _hinge_part, _OFFSET),
-        "grip": _grip,
+        "grip": _grip(0.1),
         "backlash": _single("backlash", _hinge, _between(0.1, 0.3)),
     },
     "default": {
@@ -299,7 +297,7 @@ _GROUPS: dict[str, dict[str, Draw]] = {
     "long": {
         "long-motor": _single("motor", _thigh, lambda _rng: 0.5),
         "long-payload": _two_kilograms,
-        "long-grip": _worn_foot,
+        "long-grip": _grip(0.15),  # friction 0.12 in place of 0.8
         "long-healthy": _together(),
     },
     "outside": {
