@@ -46,11 +46,11 @@ class Robot:
     touches: dict[str, str]
     """Body of each touch sensor."""
     parts: tuple[Part, ...]
-    control_timestep: float = 0.01
+    control_timestep: float
+    has_odometry: bool
+    """Whether odometry and touch sensors are recorded; else an IMU is."""
     frequencies: tuple[float, float] = (0.8, 1.8)
     amplitudes: tuple[float, float] = (0.2, 1.0)
-    has_odometry: bool = True
-    """Whether odometry and touch sensors are recorded; else an IMU is."""
 
     def part(self, name: str) -> Part:
         """Returns a part by name."""
@@ -87,7 +87,8 @@ def robot(name: str) -> Robot:
         },
         touches=touches,
         parts=tuple(_parts(model, hinges, touches)),
-        **({"control_timestep": 0.02, "has_odometry": False} if name == "go2" else {}),
+        control_timestep=0.02 if name == "go2" else 0.01,
+        has_odometry=name != "go2",
     )
 
 
