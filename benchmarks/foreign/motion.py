@@ -119,6 +119,8 @@ class Motion:
     angles: np.ndarray
     """Of each hinge, rad; NaN for those of detached limbs."""
     speeds: np.ndarray
+    torques: np.ndarray
+    """Of the motor at each hinge, N m; NaN for those of welded and detached ones."""
     pose: np.ndarray
     """Position, m, and orientation, w x y z, of the root body."""
     twist: np.ndarray
@@ -185,9 +187,11 @@ class _Plant:
         mujoco.mj_forward(self.model, self.data)
 
     def row(self) -> np.ndarray:
-        """Returns time, pose and twist of the root, angles and speeds."""
-        data = self.data
-        return np.concatenate([[data.time], data.qpos[:7], data.qvel[:6], self.angles, self.speeds])
+        """Returns time, pose and twist of the root, angles, speeds and torques."""
+        data, torques = self.data, np.full(len(self.there), np.nan)
+        torques[self.there] = data.qfrc_actuator[self.qvel]
+        root = data.qpos[:7], data.qvel[:6]
+        return np.concatenate([[data.time], *root, self.angles, self.speeds, torques])
 
 
 def simulate(
@@ -235,10 +239,8 @@ def simulate(
                 plant.data.ctrl[plant.motors] = sent[plant.driven]
             rows.append(plant.row())
             mujoco.mj_step(plant.model, plant.data)
-    time, pose, twist, angles, speeds = np.split(
-        np.array(rows), [1, 8, 14, 14 + len(robot.hinges)], axis=1
-    )
+    table, hinges = np.array(rows), len(robot.hinges)
+    time, pose, twist, *joints = np.split(table, [1, 8, 14, 14 + hinges, 14 + 2 * hinges], axis=1)
     clock = robot.control_timestep * np.arange(count)
-    return Motion(
-        time[:, 0], angles, speeds, pose, twist, clock, np.array(commands), np.array(touches)
-    )
+    moved = np.array(commands), np.array(touches)
+    return Motion(time[:, 0], *joints, pose, twist, clock, *moved)

@@ -16,9 +16,10 @@ import numpy as np
 from selfmodel import arguments, plugins
 from selfmodel.api import by_stage
 from selfmodel.arguments import AUTO, comparator_choice, fitted
+from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
-from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.losses import LossTable, learned
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -114,7 +115,8 @@ class Subject:
     @cached_property
     def losses(self) -> LossTable:
         """Losses of hypotheses on the trials."""
-        return LossTable(self.simulator, self.comparator)
+        given = ChosenComparator(self.comparator, "of the diagnoses")
+        return LossTable(self.simulator, learned(given, self.simulator, self.healthy).comparator)
 
     @property
     def runner_up(self) -> Hypothesis | None:
