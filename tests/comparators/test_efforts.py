@@ -1,4 +1,4 @@
-"""Promises of logged torques: their unit and scale are learned, and what is no torque is left out."""
+"""Promises of logged torques: unit and scale are learned, and what is no torque is left out."""
 
 import dataclasses
 
