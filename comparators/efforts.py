@@ -17,10 +17,10 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray, mean_of_known, median_of_known
 
 ERRORS, MIN_SCALE = 3.0, 0.1
-"""Scale of the error of a mean torque: in median errors of the hinge in healthy trials, as scales of
-the state are about three times those of calibration; and at least, relative to the root mean square
-of its torques. At a fixed 0.2, torques were four times the rest of the loss of a healthy robot of
-another generator, whose commands were late by 16 to 24 ms."""
+"""Scale of the error of a mean torque, in median errors of the hinge in healthy trials: scales of
+the state are about three times those of calibration too. And at least, relative to the root mean
+square of its torques. At a fixed 0.2, torques were four times the rest of the loss of a healthy
+robot of another generator, whose commands were late by 16 to 24 ms."""
 
 MIN_PROPORTIONALITY = 0.8
 """Smallest cosine between log and prediction of a hinge in healthy trials at which the log is a
