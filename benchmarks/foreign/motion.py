@@ -240,7 +240,9 @@ def simulate(
             rows.append(plant.row())
             mujoco.mj_step(plant.model, plant.data)
     table, hinges = np.array(rows), len(robot.hinges)
-    time, pose, twist, *joints = np.split(table, [1, 8, 14, 14 + hinges, 14 + 2 * hinges], axis=1)
+    time, pose, twist, angles, speeds, torques = np.split(
+        table, [1, 8, 14, 14 + hinges, 14 + 2 * hinges], axis=1
+    )
     clock = robot.control_timestep * np.arange(count)
     moved = np.array(commands), np.array(touches)
-    return Motion(time[:, 0], *joints, pose, twist, clock, *moved)
+    return Motion(time[:, 0], angles, speeds, torques, pose, twist, clock, *moved)
