@@ -24,7 +24,8 @@ robot of another generator, whose commands were late by 16 to 24 ms."""
 
 MIN_PROPORTIONALITY = 0.8
 """Smallest cosine between log and prediction of a hinge in healthy trials at which the log is a
-torque. In 16 trials with a reality gap of 0.1, the smallest was 0.93."""
+torque. Over all hinges together, the correlation was 0.92 to 0.99 in six healthy trials of
+quadruped and hexapod with a reality gap of 0.1; noise has about 0."""
 
 
 @dataclass(frozen=True)
