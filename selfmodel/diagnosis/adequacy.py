@@ -54,10 +54,10 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         problem: The trials. Nothing is doubted without comparable healthy trials, or with a
             self-model that is not calibrated.
     """
-    if problem.calibrate is None or problem.healthy([INTACT]) is None:
+    hardest, healthy = problem.hardest, problem.healthy_trials
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or hardest is None:
         return None
-    healthy = problem.healthy_trials
-    worst = max(problem.table.losses([INTACT], [one]).mean() for one in healthy)
+    worst = float(hardest.mean())
     loss, reason = fit.intact_loss if accused else fit.loss, ""
     if is_shown_in_known_gaits(accused, problem):
         if accused and loss <= worst + significance.LOSS_FLOOR:

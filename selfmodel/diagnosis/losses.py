@@ -425,9 +425,17 @@ class Problem:
 
         Encoders that are lost in the trials to explain are left out of the healthy ones.
         """
-        if not self.healthy_trials:
-            return None
-        return np.asarray(self.table.losses([INTACT], self._observed(self.healthy_trials))[0])
+        return np.concatenate(self._references) if self._references else None
+
+    @property
+    def hardest(self) -> FloatArray | None:
+        """The part of ``reference`` of the healthy trial with the largest mean loss."""
+        return max(self._references, key=np.mean, default=None)
+
+    @cached_property
+    def _references(self) -> list[FloatArray]:
+        healthy = self._observed(self.healthy_trials)
+        return [np.asarray(self.table.losses([INTACT], [part])[0]) for part in healthy]
 
     @cached_property
     def has_joints(self) -> bool:

@@ -148,8 +148,11 @@ def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
 def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
     """Returns how well the best hypothesis predicts the trials.
 
-    Joints are suspected only if the trials have the gait of the healthy ones: another one loads
-    the joints otherwise, and 16 of 24 healthy robots would be suspected.
+    Trials with the gait of the healthy ones are compared with all of these. Others are compared
+    with the one that is predicted worst: gaits differ in how hard they are to predict, which the
+    scatter of the pieces of all healthy trials does not contain. Joints are suspected only in the
+    same gait: another one loads the joints otherwise, and 16 of 24 healthy robots would be
+    suspected.
     """
     losses, intact = problem.losses([best, INTACT])
     rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))
@@ -157,7 +160,8 @@ def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
     joints = excesses(INTACT, problem) if is_one_gait and not best else {}
     loss, intact_loss = float(losses.mean()), float(intact.mean())
     healthy_loss = excess = left = None
-    if (reference := problem.reference) is not None:
+    reference = problem.reference if is_one_gait else problem.hardest
+    if reference is not None:
         healthy_loss = float(reference.mean())
         excess = significance.excess_over_healthy(losses, reference)
         left = significance.share_left(loss, intact_loss, healthy_loss)

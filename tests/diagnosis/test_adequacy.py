@@ -1,7 +1,7 @@
 """A robot is accused only of what its healthy trials, or a refit of the self-model, exclude."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +14,7 @@ from selfmodel.diagnosis.adequacy import COVERAGE, doubt_of, faster_joints, is_s
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable, Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO
+from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -254,6 +255,19 @@ def test_trials_that_are_too_short_for_a_refit_are_not_judged(
 
     assert doubt is not None
     assert "too short" in doubt.reason
+
+
+@pytest.mark.parametrize(("gait", "reference"), [("third", max), ("first", np.mean)])
+def test_another_gait_is_compared_with_the_healthy_trial_that_is_predicted_worst(
+    table: LossTable, real: Robot, healthy: list[Trial], gait: str, reference: Callable
+):
+    problem = problem_of(table, moved(real, gait), healthy)
+    losses = [table.losses([INTACT], [one]).mean() for one in healthy]
+    fit = diagnosis_of(problem, [INTACT], INTACT).fit
+
+    assert losses[0] != pytest.approx(losses[1], rel=0.1)
+    assert fit is not None
+    assert fit.healthy_loss == pytest.approx(reference(losses))
 
 
 def test_each_fault_is_required_in_the_gait_of_a_healthy_trial(
