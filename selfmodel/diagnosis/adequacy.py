@@ -40,6 +40,12 @@ leaves more is not the cause of the loss, and what causes it may cause the rest 
 MAX_JOINTS = 3
 """Joints that are named, the fastest relative to the healthy trials first."""
 
+REMEDY = (
+    "give a trial of the healthy robot (from before the damage, or of another robot of the same "
+    "type) {}, or record this robot in the motions of the healthy trials"
+)
+"""What decides on a doubt: trials that a user can have of a robot that is damaged now."""
+
 FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
 
@@ -91,14 +97,15 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     if not faster:
-        return Doubt(reason, "record a trial of the healthy robot with this gait")
+        return Doubt(reason, REMEDY.format("with the gait of these"))
+    joint, (speed, _) = next(iter(faster.items()))
     listed = "; ".join(
         f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
         for joint, (speed, covered) in list(faster.items())[:MAX_JOINTS]
     )
     return Doubt(
         f"{reason}, and these trials are faster than the healthy ones ({listed})",
-        "record a trial of the healthy robot that is as fast",
+        REMEDY.format(f"in which {joint} is commanded as fast as in these ({speed:.2g} rad/s)"),
     )
 
 

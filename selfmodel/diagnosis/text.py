@@ -8,7 +8,7 @@ from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, 
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import is_too_high
-from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 
 MAX_NAMED = 3
 """Causes that a summary names."""
@@ -23,20 +23,22 @@ _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, th
 def summary(diagnosis: Diagnosis) -> str:
     """Returns what is wrong, since when, how sure that is, and what to do, in plain words."""
     what, change = what_is_wrong(diagnosis), diagnosis.change
-    since = "" if change is None else f", since {change.time:.1f} s into the trial {change.trial}"
+    if change is not None:
+        what = f"from {change.time:.1f} s of the trial '{change.trial}' on, {what}"
     sure = ""
     if diagnosis.verdict in ("intact", "explained"):
-        sure = _sure(diagnosis, diagnosis.best)
+        none = " that there is none" if diagnosis.verdict == "intact" else ""
+        sure = _probability(diagnosis, diagnosis.best, f" sure{none}")
     elif diagnosis.verdict == "unexplained" and diagnosis.probability:
         sure = f" ({_percent(1 - sum(diagnosis.probability.values()))} sure)"
-    return f"{what[0].upper()}{what[1:]}{since}{sure}. {_advice(diagnosis)}"
+    return f"{what[0].upper()}{what[1:]}{sure}. {_advice(diagnosis)}"
 
 
 def what_is_wrong(diagnosis: Diagnosis) -> str:
     """Returns what is wrong with the robot, as a clause in plain words."""
     match diagnosis.verdict:
         case "intact":
-            return "nothing is wrong that these trials would show"
+            return "no fault was found that is large enough to show in these trials"
         case "explained":
             return in_words(diagnosis.best)
         case "ambiguous":
@@ -44,9 +46,9 @@ def what_is_wrong(diagnosis: Diagnosis) -> str:
         case "unexplained":
             if diagnosis.reason:
                 return "these trials cannot be simulated"
-            return "something is wrong that none of the searched faults explains"
+            return "the robot differs from its model, and none of the faults tried explains it"
         case "not judged":
-            return "these trials do not show whether something is wrong with the robot"
+            return "these trials do not show whether the robot has a fault"
 
 
 def in_words(hypothesis: Hypothesis) -> str:
@@ -56,47 +58,56 @@ def in_words(hypothesis: Hypothesis) -> str:
 
 def _alternatives(diagnosis: Diagnosis) -> str:
     """Returns the faults that all alternatives have, then those in which they differ."""
-    alike = [diagnosis.best, *diagnosis.indistinguishable]
+    alike, probability = [diagnosis.best, *diagnosis.indistinguishable], diagnosis.probability
     clauses = [[fault.words for fault in one.faults] for one in alike]
-    common = [words for words in clauses[0] if all(words in each for each in clauses)]
-    causes, nothing = [], "nothing else is wrong" if common else "nothing is wrong"
+    shared = [one for one in alike[0].faults if all(one.words in each for each in clauses)]
+    common = Hypothesis(tuple(shared))
+    causes, known = [], [fault.words for fault in shared]
     for one, each in zip(alike[:MAX_NAMED], clauses, strict=False):
-        own = ", and ".join(words for words in each if words not in common)
-        causes.append(f"{own or nothing}{_sure(diagnosis, one)}")
-    if len(alike) > MAX_NAMED:
-        causes.append(f"it is one of {len(alike) - MAX_NAMED} other causes")
-    return "; also ".join([*common, f"either {', or '.join(causes)}"])
+        own = ", and ".join(words for words in each if words not in known)
+        nothing = "nothing else" if shared else in_words(INTACT)
+        causes.append(f"{own or nothing}{_probability(diagnosis, one)}")
+    if probability:
+        rest = 1 - sum(probability.get(str(one), 0.0) for one in alike[:MAX_NAMED])
+        causes.append(f"something else ({_percent(rest)})")
+    elif len(alike) > MAX_NAMED:
+        causes.append(f"one of {len(alike) - MAX_NAMED} others")
+    listed = f"one of these is true: {', or '.join(causes)}"
+    having = [p for one, p in probability.items() if _faults(str(common)) <= _faults(one)]
+    sure = f" ({_percent(sum(having))} sure)" if having else ""
+    return f"{in_words(common)}{sure}. In addition, {listed}" if shared else listed
 
 
 def _percent(probability: float) -> str:
     return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
 
 
-def _sure(diagnosis: Diagnosis, hypothesis: Hypothesis) -> str:
-    """Returns the probability of a hypothesis in brackets; empty without one."""
+def _probability(diagnosis: Diagnosis, hypothesis: Hypothesis, sure: str = "") -> str:
+    """Returns the probability of a hypothesis in brackets, before a word; empty without one."""
     probability = diagnosis.probability.get(str(hypothesis))
-    return "" if probability is None else f" ({_percent(probability)} sure)"
+    return "" if probability is None else f" ({_percent(probability)}{sure})"
 
 
 def _advice(diagnosis: Diagnosis) -> str:
     """Returns what to do, and what would make the diagnosis surer, as sentences."""
     fit = diagnosis.fit
-    surer = "record another trial, with other movements"
+    surer = "record a longer trial, or one with other movements (such as another gait)"
     if fit is None or fit.healthy_loss is None:
         surer = "give a trial of the healthy robot to compare with (--healthy)"
     match diagnosis.verdict:
         case "intact":
-            return f"There is nothing to repair; to find smaller faults, {surer}."
+            return f"To find smaller faults, {surer}."
         case "explained":
-            return f"Check this first; to be surer, {surer}."
+            return f"Check this; to be surer, {surer}."
         case "ambiguous":
-            return f"Check these; to tell them apart, {surer}."
+            return f"Check what is named; to tell the causes apart, {surer}."
         case "unexplained":
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
             return (
-                f"The model of the robot is not known to be right for such a motion: "
-                f"{(diagnosis.doubt or NO_DOUBT).remedy}, and repeat the diagnosis."
+                f"What differs from its model may be a fault, or an error of the model in these "
+                f"motions. To decide, {(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the "
+                f"diagnosis."
             )
 
 
@@ -106,13 +117,17 @@ def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> s
         return "Check the model of the robot and the logs."
     if unsearched is not None:
         return (
-            f"Perhaps {in_words(unsearched.hypothesis)}: check this, and repeat the diagnosis with "
-            f"{unsearched.kind} added to --kinds."
+            f"A kind of fault that was not tried fits better: {in_words(unsearched.hypothesis)}. "
+            f"Check this, and repeat the diagnosis with --kinds default,{unsearched.kind} (if "
+            f"other kinds than the default were tried, with these in place of default)."
         )
-    nearest = f"The nearest is that {in_words(best)}: check this, and" if best else ""
-    check = f"Check the joints {', '.join(joints)}, and" if joints else nearest
-    repeat = "repeat the diagnosis with more kinds of faults (--kinds all)."
-    return f"{check} {repeat}" if check else f"{repeat[0].upper()}{repeat[1:]}"
+    repeat = "repeat the diagnosis with all kinds of faults (--kinds all)."
+    if joints:
+        return f"The difference is largest at the joint {joints[0]}: inspect it, then {repeat}"
+    if best:
+        words = f"{in_words(best)}{_probability(diagnosis, best)}"
+        return f"Of those tried, the most probable is that {words}: check this, then {repeat}"
+    return f"{repeat[0].upper()}{repeat[1:]}"
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:

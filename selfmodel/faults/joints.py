@@ -229,7 +229,7 @@ class LoadedLink(JointFault):
         variant.load_link(anatomy.joint(fault.part).hinges[0], fault.severity)
 
 
-BROKEN = BrokenJoint(name="break", words="the limb is lost from the joint {part} on")
+BROKEN = BrokenJoint(name="break", words="the limb beyond the joint {part} is missing")
 JAMMED = Jammed(name="jam", words="the joint {part} is stuck", is_of_joint=True)
 JAMMED_AT_ANGLE = JammedAtAngle(
     name="jam-angle",
@@ -246,7 +246,7 @@ WEAK_MOTOR = WeakMotor(
     levels=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     degenerates_to={1.0: None},
     unit="of its torque",
-    words="the motor of the joint {part} has {severity:.0%} of its torque",
+    words="the motor of the joint {part} has only {severity:.0%} of its torque left",
     is_of_joint=True,
 )
 DAMPED_JOINT = DampedJoint(
@@ -255,7 +255,7 @@ DAMPED_JOINT = DampedJoint(
     levels=(3.0, 10.0, 30.0),
     degenerates_to={1.0: None},
     unit="times",
-    words="the joint {part} moves stiffly, with {severity:.2g} times its damping",
+    words="the joint {part} is hard to move, with {severity:.2g} times its damping",
     is_of_joint=True,
 )
 JOINT_FRICTION = JointFriction(
@@ -264,7 +264,7 @@ JOINT_FRICTION = JointFriction(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={0.0: None},
     unit="of the motors' largest torque",
-    words="the joint {part} rubs, with {severity:.0%} of its motor's torque",
+    words="the joint {part} rubs: friction takes {severity:.0%} of its motor's torque",
     is_of_joint=True,
 )
 ENCODER_OFFSET = EncoderOffset(
@@ -273,7 +273,7 @@ ENCODER_OFFSET = EncoderOffset(
     levels=(-0.3, -0.1, 0.1, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
-    words="the encoder of the joint {part} is off by {severity:.2g} rad",
+    words="the logged angle of the joint {part} is {amount:.2g} rad too {side}",
     is_of_joint=True,
 )
 ENCODER_SLIP = EncoderSlip(
@@ -284,7 +284,7 @@ ENCODER_SLIP = EncoderSlip(
     levels=(-0.3, -0.1, 0.1, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
-    words="the encoder that the joint {part} is driven by has slipped by {severity:.2g} rad",
+    words="the position encoder of the joint {part} reads {amount:.2g} rad too {side}",
     is_of_joint=True,
 )
 LOST_GRIP = LostGrip(
@@ -294,7 +294,7 @@ LOST_GRIP = LostGrip(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={1.0: None},
     unit="of its friction",
-    words="the foot of the joint {part} has {severity:.0%} of its grip",
+    words="the foot of the joint {part} has only {severity:.0%} of its grip left",
 )
 LOADED_LINK = LoadedLink(
     name="load",

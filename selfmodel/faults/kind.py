@@ -40,8 +40,9 @@ class FaultKind:
         bounds: Lowest and highest severity; None for a kind without severities.
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
-        words: Clause about a fault in plain words, a format with ``part`` and ``severity``, such as
-            "the joint {part} is stuck"; "" for the notation.
+        words: Clause about a fault in plain words, a format with ``part``, ``severity``, its
+            ``amount`` without the sign and ``side`` ("high" or "low"), such as "the joint {part} is
+            stuck"; "" for the notation.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
@@ -193,7 +194,9 @@ class Fault:
     def words(self) -> str:
         """A clause about the fault; see ``FaultKind.words``."""
         words = self.kind.words or f"there is the fault {self}"
-        return words.format(part=self.part, severity=self.severity).replace("%", " %")
+        side, amount = "high" if self.severity > 0 else "low", abs(self.severity)
+        named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
+        return words.format(**named).replace("%", " %")
 
     @property
     def canonical(self) -> "Fault | None":

@@ -139,7 +139,7 @@ SENSOR_BIAS = SensorBias(
     levels=(-0.9, -0.7, -0.5, -0.35, -0.2, -0.1, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9),
     degenerates_to={0.0: None},
     unit="of the reading's range",
-    words="the sensor {part} is off by {severity:.0%} of its range",
+    words="the sensor {part} reads {amount:.0%} of its range too {side}",
     affects_dynamics=False,
 )
 SENSOR_NOISE = SensorNoise(

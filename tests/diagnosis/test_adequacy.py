@@ -187,6 +187,7 @@ def test_an_unexplained_motion_that_is_faster_than_the_healthy_ones_is_not_judge
 
     assert doubt is not None
     assert KNEE in doubt.reason
+    assert KNEE in doubt.remedy
 
 
 def test_a_joint_that_moves_faster_than_in_the_healthy_trials_is_not_accused(

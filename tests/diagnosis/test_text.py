@@ -18,6 +18,7 @@ from selfmodel.diagnosis.text import (
     detectable_sentences,
     evidence_sentences,
     fit_sentence,
+    in_words,
     right_or_wrong,
     summary,
     verdict_sentences,
@@ -28,6 +29,7 @@ from selfmodel.tasks import ROBOTS
 
 ANATOMY = ROBOTS["quadruped"].robot().anatomy
 JAM, OTHER = (parse(f"jam:{leg}_knee", ANATOMY) for leg in ("front_left", "back_left"))
+BOTH = parse(f"{JAM}+{OTHER}", ANATOMY)
 CHANGE = Change("02-recovery", 1, 4.92, 4.8, 5.04, INTACT, JAM)
 
 
@@ -62,9 +64,8 @@ def test_an_unexplained_diagnosis_of_0_1_says_so_without_the_numbers_that_it_lac
 
 
 def test_the_change_and_the_undetectable_faults_follow_the_verdict():
-    more = parse("jam:front_left_knee+jam:back_left_knee", ANATOMY)
     alone = verdict_sentences(diagnosis(change=CHANGE))
-    both = verdict_sentences(diagnosis(change=CHANGE, undetectable=(more,)))
+    both = verdict_sentences(diagnosis(change=CHANGE, undetectable=(BOTH,)))
 
     changed = "Changed at about t = 4.9 s (4.8 to 5.0) of 02-recovery; before: intact."
     explained = "Explained: jam:front_left_knee predicts the trials"
@@ -188,15 +189,17 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
             (
-                "Nothing is wrong that these trials would show (95 % sure). There is nothing to "
-                "repair; to find smaller faults, record another trial, with other movements."
+                "No fault was found that is large enough to show in these trials (95 % sure that "
+                "there is none). To find smaller faults, record a longer trial, or one with other "
+                "movements (such as another gait)."
             ),
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
             (
-                "The joint front_left_knee is stuck, since 4.9 s into the trial 02-recovery (93 % "
-                "sure). Check this first; to be surer, record another trial, with other movements."
+                "From 4.9 s of the trial '02-recovery' on, the joint front_left_knee is stuck (93 "
+                "% sure). Check this; to be surer, record a longer trial, or one with other "
+                "movements (such as another gait)."
             ),
         ),
         (
@@ -207,24 +210,51 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "fit": None,
             },
             (
-                "Either the joint front_left_knee is stuck (60 % sure), or the joint "
-                "back_left_knee is stuck (35 % sure). Check these; to tell them apart, give a "
-                "trial of the healthy robot to compare with (--healthy)."
+                "One of these is true: the joint front_left_knee is stuck (60 %), or the joint "
+                "back_left_knee is stuck (35 %), or something else (5 %). Check what is named; to "
+                "tell the causes apart, give a trial of the healthy robot to compare with "
+                "(--healthy)."
+            ),
+        ),
+        (
+            {
+                "best": BOTH,
+                "verdict": "ambiguous",
+                "indistinguishable": (JAM,),
+                "probability": {str(BOTH): 0.6, f"{JAM}=0.3": 0.1, str(JAM): 0.2, str(OTHER): 0.05},
+            },
+            (
+                "The joint front_left_knee is stuck (90 % sure). In addition, one of these is "
+                "true: the joint back_left_knee is stuck (60 %), or nothing else (20 %), or "
+                "something else (20 %). Check what is named; to tell the causes apart, record a "
+                "longer trial, or one with other movements (such as another gait)."
             ),
         ),
         (
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.01}},
             (
-                "Something is wrong that none of the searched faults explains (99 % sure). Perhaps "
-                "the foot of the joint front_left_knee has 20 % of its grip: check this, and "
-                "repeat the diagnosis with grip added to --kinds."
+                "The robot differs from its model, and none of the faults tried explains it (99 % "
+                "sure). A kind of fault that was not tried fits better: the foot of the joint "
+                "front_left_knee has only 20 % of its grip left. Check this, and repeat the "
+                "diagnosis with --kinds default,grip (if other kinds than the default were tried, "
+                "with these in place of default)."
             ),
         ),
         (
             {"verdict": "unexplained", "fit": JOINT, "best": INTACT},
             (
-                "Something is wrong that none of the searched faults explains. Check the joints "
-                "knee, and repeat the diagnosis with more kinds of faults (--kinds all)."
+                "The robot differs from its model, and none of the faults tried explains it. The "
+                "difference is largest at the joint knee: inspect it, then repeat the diagnosis "
+                "with all kinds of faults (--kinds all)."
+            ),
+        ),
+        (
+            {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
+            (
+                "The robot differs from its model, and none of the faults tried explains it (60 % "
+                "sure). Of those tried, the most probable is that the joint front_left_knee is "
+                "stuck (30 %): check this, then repeat the diagnosis with all kinds of faults "
+                "(--kinds all)."
             ),
         ),
         (
@@ -234,9 +264,9 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "not judged", "doubt": DOUBT},
             (
-                "These trials do not show whether something is wrong with the robot. The model of "
-                "the robot is not known to be right for such a motion: DO THIS, and repeat the "
-                "diagnosis."
+                "These trials do not show whether the robot has a fault. What differs from its "
+                "model may be a fault, or an error of the model in these motions. To decide, DO "
+                "THIS; then repeat the diagnosis."
             ),
         ),
     ],
@@ -245,3 +275,15 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
     fields: dict[str, Any], said: str
 ):
     assert summary(diagnosis(**{"fit": HEALTHY, **fields})) == said
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("encoder-offset:front_left_knee=slip0.2", "reads 0.2 rad too high"),
+        ("encoder-offset:front_left_knee=-0.2", "is 0.2 rad too low"),
+        ("sensor:front_left_touch=bias-0.2", "reads 20 % of its range too low"),
+    ],
+)
+def test_the_words_of_an_offset_say_its_direction_without_a_sign(fault: str, said: str):
+    assert in_words(parse(fault, ANATOMY)).endswith(said)
