@@ -29,7 +29,7 @@ from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, differenc
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
 
-MAX_SEGMENTS, MAX_FOLLOWING = 40, 48
+MAX_SEGMENTS, MAX_FOLLOWING = 40, 100
 """Largest numbers of segments of a trial in which the base was observed, and of one in which it was
 not, so that segments follow each other."""
 
