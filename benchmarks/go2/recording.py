@@ -7,6 +7,7 @@ the gains of that README.
 
 import copy
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,19 +39,22 @@ RATE = 200
 FITTED, ALL = 10 * RATE, 15 * RATE
 """Steps that the model is fitted to, and all steps."""
 
-_SETTINGS = {"base": "fixed", "kp": 20, "kd": 1.5, "control_timestep": 1 / RATE}
+_SETTINGS = {"base": "fixed", "control_timestep": 1 / RATE}
+SERVOS = {"kp": 20.0, "kd": 1.5}
+"""Gains of the robot's own controller by the repository, N m/rad and N m s/rad."""
+
 _PHYSICS_TIMESTEP = 0.0025
 """Physics time step, s: a control step of the recording is a multiple of it."""
 
 
-def robot_on_stand(sample: Path = SAMPLE) -> Robot:
+def robot_on_stand(sample: Path = SAMPLE, servos: Mapping[str, float] = SERVOS) -> Robot:
     """Returns the robot of the recording, with its base fixed and with position servos."""
     text = (sample / "go2.xml").read_text(encoding="utf-8")
     text = text.replace("<option ", f'<option timestep="{_PHYSICS_TIMESTEP}" ', 1)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "go2-stand.xml"
         path.write_text(text, encoding="utf-8")
-        return load_mjcf(path, checked_settings(_SETTINGS))
+        return load_mjcf(path, checked_settings({**_SETTINGS, **servos}))
 
 
 def positions_and_commands(robot: Robot, sample: Path = SAMPLE) -> tuple[FloatArray, FloatArray]:

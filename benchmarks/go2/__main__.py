@@ -1,0 +1,50 @@
+"""``python -m benchmarks.go2``: diagnoses of a healthy Go2, by halves and thirds of its log."""
+
+import json
+import sys
+import time
+from itertools import permutations
+
+import numpy as np
+
+from benchmarks.go2 import recording
+from selfmodel import diagnose
+
+SERVOS = {"config": recording.SERVOS, "mjx": {"kp": 35.0, "kd": 0.5}}
+"""Gains of the repository's configuration, and those that are usual in models for MJX."""
+
+
+def main() -> None:
+    """Diagnoses each part of the recording with each other part as the healthy trial.
+
+    Prints a row for each ordered pair of halves and of thirds; the names of the servos to take are
+    the arguments.
+    """
+    for name in sys.argv[1:] or SERVOS:
+        robot = recording.robot_on_stand(servos=SERVOS[name])
+        logged = recording.positions_and_commands(robot)
+        for count in (2, 3):
+            edges = np.linspace(0, len(logged[0]), count + 1).round().astype(int).tolist()
+            parts = [
+                recording.trial_of(robot, *logged, *edges[part : part + 2]) for part in range(count)
+            ]
+            for healthy, trial in permutations(range(count), 2):
+                start = time.process_time()
+                found = diagnose(
+                    parts[trial], healthy=parts[healthy], robot=robot, seed=0, threads=1
+                )
+                row = {
+                    "servos": name,
+                    "parts": count,
+                    "healthy": healthy,
+                    "trial": trial,
+                    "best": str(found.best),
+                    "verdict": found.verdict,
+                    "reason": found.doubt.reason if found.doubt else "",
+                    "seconds": round(time.process_time() - start),
+                }
+                print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()
