@@ -69,7 +69,7 @@ def _alternatives(diagnosis: Diagnosis) -> str:
         causes.append(f"{own or nothing}{_probability(diagnosis, one)}")
     if probability:
         rest = 1 - sum(probability.get(str(one), 0.0) for one in alike[:MAX_NAMED])
-        causes.append(f"something else ({_percent(rest)})")
+        causes.append(f"something not named here ({_percent(rest)})")
     elif len(alike) > MAX_NAMED:
         causes.append(f"one of {len(alike) - MAX_NAMED} others")
     listed = f"one of these is true: {', or '.join(causes)}"
@@ -100,7 +100,9 @@ def _advice(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"Check this; to be surer, {surer}."
         case "ambiguous":
-            return f"Check what is named; to tell the causes apart, {surer}."
+            return (
+                f"Check what is named, the most probable first; to tell the causes apart, {surer}."
+            )
         case "unexplained":
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
