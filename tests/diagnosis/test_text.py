@@ -211,9 +211,9 @@ def test_trials_that_are_not_judged_have_a_reason():
             },
             (
                 "One of these is true: the joint front_left_knee is stuck (60 %), or the joint "
-                "back_left_knee is stuck (35 %), or something not named here (5 %). Check what is "
-                "named, the most probable first; to tell the causes apart, give a trial of the "
-                "healthy robot to compare with (--healthy)."
+                "back_left_knee is stuck (35 %), or something not named here (5 %). Check the "
+                "most probable first; to tell the causes apart, give a trial of the healthy robot "
+                "to compare with (--healthy)."
             ),
         ),
         (
@@ -226,9 +226,9 @@ def test_trials_that_are_not_judged_have_a_reason():
             (
                 "The joint front_left_knee is stuck (90 % sure). In addition, one of these is "
                 "true: the joint back_left_knee is stuck (60 %), or nothing else (20 %), or "
-                "something not named here (20 %). Check what is named, the most probable first; to "
-                "tell the causes apart, record a longer trial, or one with other movements (such "
-                "as another gait)."
+                "something not named here (20 %). Check the most probable first; to tell the "
+                "causes apart, record a longer trial, or one with other movements (such as another "
+                "gait)."
             ),
         ),
         (
