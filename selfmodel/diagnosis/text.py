@@ -100,9 +100,7 @@ def _advice(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"Check this; to be surer, {surer}."
         case "ambiguous":
-            return (
-                f"Check what is named, the most probable first; to tell the causes apart, {surer}."
-            )
+            return f"Check the most probable first; to tell the causes apart, {surer}."
         case "unexplained":
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
