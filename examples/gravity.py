@@ -27,4 +27,5 @@ GRAVITY = Gravity(
     levels=(1.0, 1.6, 2.5, 3.7, 5.0, 6.0, 7.0, 8.0, 9.0, 11.0, 12.5, 25.0),
     degenerates_to={9.81: None},
     unit="m/s^2",
+    words="objects fall with {severity:.3g} m/s^2",
 )

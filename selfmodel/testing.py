@@ -277,6 +277,7 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     _require(candidates, f"{kind.name} has no part or no level: nothing can be proposed")
     for fault in candidates:
         _check_candidate(fault, robot)
+    _check_words(kind, candidates)
     for other in kind.degenerate_kinds:
         _require(
             other.bounds is None and (other.searchable or not kind.searchable),
@@ -321,6 +322,21 @@ def _check_candidate(fault: Fault, robot: Robot) -> None:
     _require(
         not fault.kind.absorbs(fault, fault, robot.anatomy),
         f"{fault} absorbs itself, so no hypothesis can contain it",
+    )
+
+
+def _check_words(kind: FaultKind, candidates: tuple[Fault, ...]) -> None:
+    """Checks that the words of a kind are a format, and tell its parts apart."""
+    try:
+        words = {fault.part: fault.words for fault in candidates}
+    except (LookupError, ValueError) as error:
+        raise ValueError(
+            f"expected words of {kind.name} with part, severity, amount, side and at, got "
+            f"{kind.words!r}: {error!r}"
+        ) from error
+    _require(
+        len(set(words.values())) == len(words),
+        f"the words of {kind.name} are the same at two parts: {kind.words!r}",
     )
 
 

@@ -46,6 +46,9 @@ REMEDY = (
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
+LONGER = "record a longer trial of this robot, in the same motions"
+"""What decides on a doubt about a gait that the healthy trials have: more of it."""
+
 FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
 
@@ -68,7 +71,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     if is_shown_in_known_gaits(accused, problem):
         if accused and loss <= worst + significance.LOSS_FLOOR:
             reason = refit_reason(accused, problem)
-        return _doubt(reason, {}) if reason else None
+        return Doubt(reason, LONGER) if reason else None
     has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
     is_small = loss <= ratio * worst + significance.LOSS_FLOOR

@@ -435,7 +435,8 @@ class Problem:
     @cached_property
     def _references(self) -> list[FloatArray]:
         healthy = self._observed(self.healthy_trials)
-        return [np.asarray(self.table.losses([INTACT], [part])[0]) for part in healthy]
+        rows = [np.asarray(self.table.losses([INTACT], [part])[0]) for part in healthy]
+        return [row for row in rows if len(row)]  # a part before a change may have no piece
 
     @cached_property
     def has_joints(self) -> bool:

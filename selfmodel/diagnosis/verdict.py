@@ -102,7 +102,7 @@ def diagnosis_of(
     doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
     probability: dict[str, float] = {}
     if problem.has_test and doubt is None:
-        nearest = best_severities(sorted(leads, key=lambda one: leads[one]))
+        nearest = best_severities([*alike, *sorted(leads, key=lambda one: leads[one])])
         misses = unsearched is not None or bool(fit.joints)
         some = {one: leads[one] for one in nearest}
         probability = probabilities(best, some, fit, misses=misses)

@@ -255,7 +255,7 @@ DAMPED_JOINT = DampedJoint(
     levels=(3.0, 10.0, 30.0),
     degenerates_to={1.0: None},
     unit="times",
-    words="the joint {part} is hard to move, with {severity:.2g} times its damping",
+    words="the joint {part} is hard to move, with {severity:.3g} times its damping",
     is_of_joint=True,
 )
 JOINT_FRICTION = JointFriction(
@@ -304,5 +304,5 @@ LOADED_LINK = LoadedLink(
     degenerates_to={0.0: None},
     is_single=True,
     unit="kg",
-    words="the link of the joint {part} carries {severity:.2g} kg more",
+    words="the link of the joint {part} carries {severity:.3g} kg more",
 )

@@ -41,8 +41,8 @@ class FaultKind:
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
         words: Clause about a fault in plain words, a format with ``part``, ``severity``, its
-            ``amount`` without the sign and ``side`` ("high" or "low"), such as "the joint {part} is
-            stuck"; "" for the notation.
+            ``amount`` without the sign, ``side`` ("high" or "low") and ``at`` (" at the " and the
+            part, empty without one), such as "the joint {part} is stuck"; "" for the notation.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
@@ -193,10 +193,12 @@ class Fault:
     @property
     def words(self) -> str:
         """A clause about the fault; see ``FaultKind.words``."""
-        words = self.kind.words or f"there is the fault {self}"
+        if not self.kind.words:
+            return f"there is the fault {self}"
         side, amount = "high" if self.severity > 0 else "low", abs(self.severity)
         named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
-        return words.format(**named).replace("%", " %")
+        at = f" at the {self.part}" if self.part else ""
+        return self.kind.words.format(**named, at=at).replace("%", " %")
 
     @property
     def canonical(self) -> "Fault | None":

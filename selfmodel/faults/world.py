@@ -275,7 +275,7 @@ PAYLOAD = Payload(
     degenerates_to={0.0: None},
     is_single=True,
     unit="of the robot's mass",
-    words="the robot carries a load of {severity:.0%} of its mass",
+    words="the robot carries a load of {severity:.0%} of its mass{at}",
 )
 GROWN_DELAY = GrownDelay(
     name="delay",

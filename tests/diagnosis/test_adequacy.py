@@ -162,8 +162,10 @@ def test_a_loss_as_small_as_that_of_healthy_trials_has_to_beat_a_refit_in_any_ga
     table: LossTable, real: Robot, healthy: list[Trial], weaker: Robot
 ):
     same = moved(real, "first", truth=WEAK)
+    doubt = doubted(problem_of(table, same, healthy, weaker), WEAK, 1.0)
 
-    assert doubted(problem_of(table, same, healthy, weaker), WEAK, 1.0) is not None
+    assert doubt is not None
+    assert "longer" in doubt.remedy, "the healthy trials have the gait"
     assert doubted(problem_of(table, same, healthy), WEAK, 1.0) is None
 
 
@@ -269,6 +271,17 @@ def test_another_gait_is_compared_with_the_healthy_trial_that_is_predicted_worst
     assert losses[0] != pytest.approx(losses[1], rel=0.1)
     assert fit is not None
     assert fit.healthy_loss == pytest.approx(reference(losses))
+
+
+def test_a_healthy_part_without_a_piece_is_no_reference(
+    table: LossTable, weak: Trial, healthy: list[Trial]
+):
+    # A robot that fails between two trials.
+    problem = problem_of(table, weak, [TrialPart(healthy[1], end=0.0), healthy[0]])
+
+    (expected,) = table.losses([INTACT], healthy[:1])
+    for reference in (problem.hardest, problem.reference):
+        np.testing.assert_array_equal(reference, expected)
 
 
 def test_each_fault_is_required_in_the_gait_of_a_healthy_trial(

@@ -284,7 +284,12 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
         ("encoder-offset:front_left_knee=slip0.2", "reads 0.2 rad too high"),
         ("encoder-offset:front_left_knee=-0.2", "is 0.2 rad too low"),
         ("sensor:front_left_touch=bias-0.2", "reads 20 % of its range too low"),
+        ("payload:front=0.2", "a load of 20 % of its mass at the front"),
+        ("payload=0.2", "a load of 20 % of its mass"),
+        ("damping:front_left_knee=100.0", "with 100 times its damping"),
     ],
 )
-def test_the_words_of_an_offset_say_its_direction_without_a_sign(fault: str, said: str):
+def test_the_words_of_a_fault_say_its_direction_its_place_and_its_amount_without_a_power(
+    fault: str, said: str
+):
     assert in_words(parse(fault, ANATOMY)).endswith(said)

@@ -116,6 +116,11 @@ def heavier_each_time(variant: ModelVariant, _anatomy: Anatomy, _fault: Fault) -
         (dataclasses.replace(GRADED, bounds=None), "its kind has no bounds"),
         (dataclasses.replace(GRADED, degenerates_to={1.0: None}), "its canonical form is intact"),
         (dataclasses.replace(GRADED, keyword="friction"), "is parsed as friction=1.0"),
+        (dataclasses.replace(GRADED, words="worn by {wear}"), "expected words of .*'wear'"),
+        (
+            dataclasses.replace(with_methods(parts=lambda _anatomy: ("a", "b")), words="worn"),
+            "the same at two parts",
+        ),
         (with_methods(absorbs=lambda _fault, _other, _anatomy: True), "absorbs itself"),
         (with_methods(apply=lambda *_: None), "changes nothing about a robot"),
         (with_methods(apply=heavier_each_time), "does not make the same robot every time"),
