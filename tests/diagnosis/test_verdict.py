@@ -318,11 +318,12 @@ def test_the_verdict_does_not_depend_on_what_the_search_compared(quadruped: Robo
 def test_each_hypothesis_that_is_said_to_be_alike_has_a_probability(
     quadruped: Robot, lame: Problem, monkeypatch: pytest.MonkeyPatch
 ):
-    one, other, far = (parse(f"friction={level}", quadruped.anatomy) for level in (0.4, 0.5, 0.6))
+    levels = (parse(f"friction={level}", quadruped.anatomy) for level in (0.4, 0.5, 0.6))
+    best, (one, other, far) = parse(LAME, quadruped.anatomy), levels
     # The one with the smallest loss need not have the smallest lead.
     leads = {one: 2.5, other: 1.5, far: 9.0, INTACT: math.inf}
     monkeypatch.setattr("selfmodel.diagnosis.verdict.leads_of", lambda *_: leads)
-    found = diagnosis_of(lame, [INTACT], parse(LAME, quadruped.anatomy))
+    found = diagnosis_of(lame, [best], best)
 
     assert found.indistinguishable == (one,)
     assert set(found.probability) == {LAME, str(one), "intact"}

@@ -142,6 +142,12 @@ def test_the_contract_kit_sees_each_way_to_break_it(kind: FaultKind, said: str, 
         check_fault_kind(kind, quadruped)
 
 
+def test_a_fault_of_a_kind_without_words_is_named_by_its_notation():
+    kind = dataclasses.replace(GRADED, words="")
+
+    assert Fault(kind, "leg{0}", 1.0).words.endswith("odd:leg{0}=1.0")
+
+
 def test_the_contract_kit_sees_a_kind_that_edits_the_robot_itself():
     robot = arguments.robot_entry("quadruped").robot()
 
