@@ -113,12 +113,16 @@ class SegmentPrediction:
                 terms[signal] = readings.finite_mean(np.log1p(np.square(scaled)))
             terms["sensors"] = readings.readings_loss(predicted["sensors"], reading_log, steady)
             terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion)
-            if torques is not None and self.effort_scales is not None:
-                terms["joint_efforts"] = efforts.effort_loss(
-                    efforts.mean_efforts(simulated["joint_efforts"], compared),
-                    torques,
-                    self.effort_scales,
-                    simulated.hinge_mask("detached"),
+            if self.effort_scales is not None:  # 0 without efforts: trials have the same terms
+                terms["joint_efforts"] = (
+                    np.zeros(shape)
+                    if torques is None
+                    else efforts.effort_loss(
+                        efforts.mean_efforts(simulated["joint_efforts"], compared),
+                        torques,
+                        self.effort_scales,
+                        simulated.hinge_mask("detached"),
+                    )
                 )
             total = np.zeros(shape)
             for term in terms.values():
@@ -211,13 +215,7 @@ class SegmentPrediction:
         known["commands"] = _all_finite(trajectory["commands"], starts, horizon)
         usable = np.asarray(np.logical_and.reduce(list(known.values())))
         steady = _all_finite(trajectory.steady_commands, starts, horizon)
-        if np.sum(usable & steady) < MIN_SEGMENTS:
-            if usable.sum() >= MIN_SEGMENTS:
-                raise TrialRefusedError(
-                    f"{trial.path}: {self.name} needs {MIN_SEGMENTS} or more segments of {horizon} "
-                    f"steps in which none was late, and the log does not have them",
-                    "have the robot keep its control time step, or leave this log out",
-                )
+        if usable.sum() < MIN_SEGMENTS:
             lacking = [signal for signal, steps in known.items() if steps.sum() < MIN_SEGMENTS]
             raise TrialRefusedError(
                 f"{trial.path}: {self.name} needs {', '.join(lacking or self.state)} at "
@@ -225,11 +223,17 @@ class SegmentPrediction:
                 f"have it",
                 "give a comparator that needs fewer signals, or leave this log out",
             )
-        starts, steady = starts[usable], steady[usable]
-        if not follow:
-            return starts, steady, 1
-        rows, counted, chains = chained(len(starts), most)
-        return starts[rows], steady[rows] & counted, chains
+        starts, steady, chains = starts[usable], steady[usable], 1
+        if follow:
+            rows, counted, chains = chained(len(starts), most)
+            starts, steady = starts[rows], steady[rows] & counted
+        if steady.sum() < MIN_SEGMENTS:
+            raise TrialRefusedError(
+                f"{trial.path}: {self.name} needs {MIN_SEGMENTS} or more segments of {horizon} "
+                f"steps in which none was late, and the log does not have them",
+                "have the robot keep its control time step, or leave this log out",
+            )
+        return starts, steady, chains
 
 
 def compared_steps(horizon: int) -> IndexArray:

@@ -60,10 +60,12 @@ def generate(out: Path, plan: Plan) -> Path:
     written, asked = folder / "truth.json", dataclasses.asdict(plan)
     if written.exists() and asked.items() <= json.loads(written.read_text()).items():
         return folder
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
     machine, case = robot(plan.robot), CASES[plan.case]
     faults, onset = faults_of(case, machine, plan.seed), onset_of(case, machine, plan.seed)
+    if onset is not None and onset >= plan.duration:
+        raise SystemExit(f"{plan.name}: expected a --duration above the onset, {onset:g} s")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     gap = draw_gap(machine, LEVELS[plan.gap], plan.stream("gap"))
     gaits = _gaits(machine, case, plan, faults)
     record = partial(_record, folder, machine, plan, gap)

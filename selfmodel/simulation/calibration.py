@@ -43,7 +43,7 @@ class Calibration:
         error: Root mean square error with the fitted parameters, in the same units.
         joints: JSON values of the fit of a robot with a fixed base: its set, the share of the way
             from the set before to the fit that is used, delay and errors, the hinge with the
-            largest error (rad), and ``parameters``: of the gain and the force limit of each motor
+            largest error (rad), and ``parameters``: of the gain and any force limit of each motor
             (factors), and the damping, dry friction and armature of each hinge (N m s/rad, N m,
             kg m^2), the value in the model, the fitted value, the standard deviation of its
             logarithm, and whether the trials determine it. None for other robots.
@@ -204,13 +204,14 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
     robot, rows = segments.robot, list[dict[str, Any]]()
     quantities = {
         "gain": "motor_gains",
-        "force limit": "force_limits",
+        "force limit": model_factors.FORCE_LIMITS,
         "damping": "joint_damping",
         "dry friction": "dry_friction",
         "armature": "armature",
     }
     for name, quantity in quantities.items():
-        is_of_motor = quantity in ("motor_gains", "force_limits")
+        is_limit = quantity == model_factors.FORCE_LIMITS
+        is_of_motor = is_limit or quantity == "motor_gains"
         before, values = (
             np.array(getattr(own.parameters, quantity) or (1.0,) * robot.model.nu)
             if is_of_motor
@@ -229,6 +230,7 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
                 "determined": bool(known[k]),
             }
             for k, part in enumerate(robot.anatomy.motors if is_of_motor else robot.anatomy.hinges)
+            if not is_limit or model_factors.has_force_limit(robot, k)
         ]
     sizes = root_mean_square(segments.joint_errors(best.errors))
     worst = int(np.argmax(sizes))

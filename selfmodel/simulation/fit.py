@@ -7,8 +7,8 @@ nonlinear least squares (``mujoco.minimize``) with a Gaussian prior for those th
 determine.
 
 A robot with a floating base has one set of factors. With a fixed base, which determines neither
-masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
-friction and armature of all joints together, of each kind of joint, and of each joint.
+masses nor the friction of the ground, nor has contacts, there are three: gain, force limit,
+damping, dry friction and armature of all joints together, of each kind of joint, and of each joint.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -221,6 +221,13 @@ def joint_of_motor(robot: Robot) -> IndexArray:
     return np.array([hinges.index(own[0]) if own else 0 for own in driven], dtype=np.intp)
 
 
+def has_force_limit(robot: Robot, motor: int) -> bool:
+    """Returns whether the force of a motor, or of a joint that it drives, is limited."""
+    model = robot.model
+    joints = sorted(motor_joints(model, motor))
+    return bool(model.actuator_forcelimited[motor] or model.jnt_actfrclimited[joints].any())
+
+
 def _dofs(robot: Robot) -> IndexArray:
     addresses = [int(robot.model.joint(name).dofadr[0]) for name in robot.anatomy.hinges]
     return np.array(addresses, dtype=np.intp)
@@ -372,8 +379,7 @@ def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
         yield FACTORS, _basis(groups, PRIOR_DEVIATIONS)
         return
     hinges, size = np.arange(len(robot.anatomy.hinges)), 0
-    model = robot.model
-    has_force_limits = model.actuator_forcelimited.any() or model.jnt_actfrclimited.any()
+    has_force_limits = any(has_force_limit(robot, motor) for motor in range(robot.model.nu))
     kinds = (np.zeros_like(hinges), kinds_of_joints(robot), hinges)
     for name, kind in zip(JOINT_SETS, kinds, strict=True):
         of_motors = ("motor_gains", FORCE_LIMITS) if has_force_limits else ("motor_gains",)

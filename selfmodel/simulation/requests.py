@@ -115,7 +115,7 @@ def chained(count: int, most: int) -> tuple[IndexArray, BoolArray, int]:
         the number of chains.
     """
     if count <= most:
-        chains = max(1, math.ceil(count / MAX_CHAIN))
+        chains = max(1, math.ceil((count - WARM_UP) / (MAX_CHAIN - WARM_UP)))
         length = math.ceil((count + (chains - 1) * WARM_UP) / chains)
     else:
         chains = 2 if most >= 4 * WARM_UP else 1

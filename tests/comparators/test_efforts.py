@@ -85,6 +85,19 @@ def test_an_effort_that_is_no_torque_is_left_out_with_a_reason(
     np.testing.assert_array_equal(*terms)
 
 
+def test_parts_of_the_loss_have_a_number_for_each_segment_if_only_some_trials_have_efforts(
+    quadruped: Robot, healthy: Trial, weak: Trial
+):
+    silent = with_efforts(weak, np.full_like(weak.trajectory["joint_efforts"], np.nan))
+    table = LossTable(Simulator(quadruped, 1), chosen(quadruped, healthy).comparator)
+    parts = table.by_signal(parse("intact", quadruped.anatomy), [silent, weak])
+    without, with_them = np.split(parts["joint_efforts"], 2)
+
+    assert len({len(part) for part in parts.values()}) == 1
+    assert not without.any()
+    assert with_them.any()
+
+
 def test_without_logged_efforts_nothing_is_learned(quadruped: Robot, healthy: Trial):
     silent = with_efforts(healthy, np.full_like(healthy.trajectory["joint_efforts"], np.nan))
 

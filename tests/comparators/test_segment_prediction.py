@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators import SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD
 from selfmodel.comparators.encoders import encoder_motion_loss, logged_motion
 from selfmodel.comparators.readings import (
     CONTRADICTION,
@@ -14,8 +14,10 @@ from selfmodel.comparators.readings import (
     command_spans,
     noise_level_loss,
 )
+from selfmodel.comparators.segment_prediction import MIN_SEGMENTS
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
@@ -254,3 +256,16 @@ def test_sensors_of_yes_and_no_have_no_noise():
 
     assert loss(moving(0.1), logged) > 0
     assert loss(moving(0.1), logged, np.array([[True, True, False, True]])) == 0
+
+
+def test_a_surrogate_whose_segments_without_late_steps_only_warm_up_refuses_the_trial():
+    walking = gait()
+    late = np.zeros(walking.steps, np.bool_)
+    late[-60:] = True
+    hasty = logged(dataclasses.replace(walking, late=late))
+    cheap = SEGMENT_PREDICTION_ONBOARD.surrogate.surrogate
+
+    assert len(cheap.prepare(logged(walking)).piece_steps) == MIN_SEGMENTS
+    assert len(SEGMENT_PREDICTION_ONBOARD.prepare(hasty).piece_steps) > MIN_SEGMENTS
+    with pytest.raises(TrialRefusedError, match="late"):
+        cheap.prepare(hasty)

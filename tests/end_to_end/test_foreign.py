@@ -159,6 +159,13 @@ def row(truth: list[str], best: str, verdict: str, **more: object) -> dict[str, 
     }
 
 
+def test_a_trial_that_ends_before_its_fault_begins_is_not_recorded(tmp_path: Path):
+    with pytest.raises(SystemExit, match="17 s"):
+        generate(tmp_path, Plan("go2", "long-motor", 0, "none", duration=10.0))
+
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_trial_with_a_gait_of_its_own_has_two_healthy_trials_of_other_gaits(tmp_path: Path):
     plan = Plan("quadruped", "healthy", 1, "none", duration=1.0, trials=1, own_gait=True)
 

@@ -19,7 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation import prediction
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.prediction import activations, predict
-from selfmodel.simulation.requests import END, WARM_UP, Segments, chained, cut_segments
+from selfmodel.simulation.requests import END, MAX_CHAIN, WARM_UP, Segments, chained, cut_segments
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
@@ -188,6 +188,7 @@ def test_chains_count_each_segment_once_and_warm_up_where_they_begin_in_mid_tria
     parts = np.split(rows, chains)
 
     assert len(rows) <= 1.1 * most
+    assert len(parts[0]) <= MAX_CHAIN
     assert len(set(rows[counted].tolist())) == counted.sum()
     if count <= most:
         np.testing.assert_array_equal(rows[counted], np.arange(count))
