@@ -1,15 +1,15 @@
 """Error of short predictions from many logged states."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.comparators import efforts, encoders, readings
+from selfmodel.comparators import encoders, readings
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
-from selfmodel.simulation.requests import Request, chained, command_steps, cut_segments
+from selfmodel.simulation.requests import chained, command_steps, cut_segments
 from selfmodel.trials.estimation import (
     BASE,
     JOINTS,
@@ -40,11 +40,10 @@ class SegmentPrediction:
     A trial is cut into segments. Each begins in the logged state, continues under the logged
     commands, and is compared with the log at four steps. An error e of a signal whose scale is s
     has the loss ``log(1 + (e / s)^2)``, so that a chaotic moment cannot outweigh the rest; the loss
-    is averaged over the columns of a signal and summed over the signals. Four more terms are added
+    is averaged over the columns of a signal and summed over the signals. Three more terms are added
     to that of the motion: the predicted readings, against the controller's input; the controller's
-    arithmetic, the logged commands against the network's output for these readings; the motion of
-    each encoder at the scale of its own noise (``encoders``); and the torques of the joints, if the
-    comparator has learned their scales from healthy trials (``efforts``).
+    arithmetic, the logged commands against the network's output for these readings; and the motion
+    of each encoder at the scale of its own noise (``encoders``).
 
     Source: prediction over a short horizon is multiple shooting (Bock & Plitt 1984) without the
     fit. Its use here answers the paper's future work, section V: displacement contains too little
@@ -67,7 +66,6 @@ class SegmentPrediction:
         horizon: Control steps of a segment.
         max_segments: Segments of a short trial, at most, evenly spread over it.
         density: Segments per control step of a longer trial.
-        effort_scales: Units and scales of logged efforts; None if they are not compared.
     """
 
     name: str
@@ -75,7 +73,6 @@ class SegmentPrediction:
     horizon: int = 12
     max_segments: int = 80
     density: float = 0.08
-    effort_scales: efforts.EffortScales | None = None
 
     @property
     def surrogate(self) -> "SegmentPrediction":
@@ -92,13 +89,12 @@ class SegmentPrediction:
         trajectory, horizon = trial.trajectory, self.horizon
         states = estimated_states(trajectory, self.state)
         starts, steady, chains = self._starts(trial, states)
-        compared = compared_steps(horizon)
+        compared = np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(int)[1:])
         logged = {s: values[starts[:, np.newaxis] + compared] for s, values in states.items()}
         reading_log = readings.logged_readings(trajectory["sensors"], starts, horizon)
         motion = encoders.logged_motion(trajectory["joint_positions"], starts, horizon)
         loose = encoders.loose_encoders(trajectory, starts, horizon)
         arithmetic = readings.arithmetic_loss(trial, starts, horizon)
-        torques = self._torques(trajectory, starts) if self.effort_scales else None
 
         def losses(simulated: Trajectory) -> Losses:
             """Returns the losses of each segment that has any."""
@@ -113,17 +109,6 @@ class SegmentPrediction:
                 terms[signal] = readings.finite_mean(np.log1p(np.square(scaled)))
             terms["sensors"] = readings.readings_loss(predicted["sensors"], reading_log, steady)
             terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion)
-            if self.effort_scales is not None:  # 0 without efforts: trials have the same terms
-                terms["joint_efforts"] = (
-                    np.zeros(shape)
-                    if torques is None
-                    else efforts.effort_loss(
-                        efforts.mean_efforts(simulated["joint_efforts"], compared),
-                        torques,
-                        self.effort_scales,
-                        simulated.hinge_mask("detached"),
-                    )
-                )
             total = np.zeros(shape)
             for term in terms.values():
                 total += term
@@ -134,59 +119,9 @@ class SegmentPrediction:
             )
 
         record: tuple[Signal, ...] = (*self.state, "sensors")
-        if torques is not None:
-            record = (*record, "joint_efforts")
         request = cut_segments(trajectory, states, starts, horizon, record, chains=chains)
         piece_steps = (starts[:, np.newaxis] + np.array([0, horizon]))[steady]
         return Prepared(request, losses, piece_steps)
-
-    def learned(
-        self, healthy: Sequence[Trial], simulated: Callable[[Request, Trial], Trajectory]
-    ) -> tuple["SegmentPrediction", str]:
-        """Returns the comparator with the efforts of healthy trials as the scale of others.
-
-        Args:
-            healthy: Trials of the healthy robot that the comparator accepts.
-            simulated: Returns the simulation of the healthy robot that a request asks for.
-
-        Returns:
-            The comparator, and a clause about efforts that are not compared; empty if all are.
-        """
-        compared = compared_steps(self.horizon)
-        logged, predicted = list[FloatArray](), list[FloatArray]()
-        for trial in healthy:
-            trajectory = trial.trajectory
-            states = estimated_states(trajectory, self.state)
-            starts, steady, chains = self._starts(trial, states)
-            torques = self._torques(trajectory, starts)
-            if torques is not None:
-                request = cut_segments(
-                    *(trajectory, states, starts, self.horizon, ("joint_efforts",)), chains=chains
-                )
-                found = simulated(request, trial)["joint_efforts"][0]
-                logged.append(np.concatenate(torques[steady]))
-                predicted.append(np.concatenate(efforts.mean_efforts(found, compared)[steady]))
-        if not logged:
-            return self, ""
-        scales = efforts.learned_scales(np.concatenate(logged), np.concatenate(predicted))
-        left_out = np.isnan(scales.units) & np.isfinite(np.concatenate(logged)).any(axis=0)
-        names = [healthy[0].trajectory.names.hinges[k] for k in np.flatnonzero(left_out)]
-        clause = (
-            f"the logged efforts of {', '.join(names)} are not proportional to the self-model's "
-            f"torques in the healthy trials, and not compared"
-        )
-        return dataclasses.replace(self, effort_scales=scales), clause if names else ""
-
-    def _torques(self, trajectory: Trajectory, starts: IndexArray) -> FloatArray | None:
-        """Returns the mean logged efforts, ``(segments, comparisons, hinges)``; None without any.
-
-        They are in the unit of the log.
-        """
-        values = trajectory["joint_efforts"]
-        if not np.isfinite(values).any():
-            return None
-        rows = starts[:, np.newaxis] + np.arange(self.horizon + 1)
-        return efforts.mean_efforts(values[rows], compared_steps(self.horizon))
 
     def _starts(
         self, trial: Trial, states: Mapping[Signal, FloatArray]
@@ -234,11 +169,6 @@ class SegmentPrediction:
                 "have the robot keep its control time step, or leave this log out",
             )
         return starts, steady, chains
-
-
-def compared_steps(horizon: int) -> IndexArray:
-    """Returns the steps of a segment at which prediction and log are compared."""
-    return np.unique(np.linspace(0, horizon, COMPARISONS + 1).round().astype(np.intp)[1:])
 
 
 def _all_finite(commands: FloatArray, starts: IndexArray, horizon: int) -> BoolArray:

@@ -12,7 +12,6 @@ from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.losses import learned
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
@@ -468,10 +467,8 @@ def set_up_diagnosis(
     """
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
     fit = arguments.fitted(robot, healthy, count) if calibrate and healthy else None
-    simulator = Simulator(fit.robot if fit else robot, count)
-    chosen = learned(chosen, simulator, healthy)
     search = DiagnosticSearch(
-        simulator,
+        Simulator(fit.robot if fit else robot, count),
         chosen.comparator,
         settings,
         kinds,

@@ -119,8 +119,6 @@ class Motion:
     angles: np.ndarray
     """Of each hinge, rad; NaN for those of detached limbs."""
     speeds: np.ndarray
-    torques: np.ndarray
-    """Of the motor at each hinge, N m; NaN for those of welded and detached ones."""
     pose: np.ndarray
     """Position, m, and orientation, w x y z, of the root body."""
     twist: np.ndarray
@@ -187,11 +185,9 @@ class _Plant:
         mujoco.mj_forward(self.model, self.data)
 
     def row(self) -> np.ndarray:
-        """Returns time, pose and twist of the root, angles, speeds and torques."""
-        data, torques = self.data, np.full(len(self.there), np.nan)
-        torques[self.there] = data.qfrc_actuator[self.qvel]
-        root = data.qpos[:7], data.qvel[:6]
-        return np.concatenate([[data.time], *root, self.angles, self.speeds, torques])
+        """Returns time, pose and twist of the root, angles and speeds."""
+        data = self.data
+        return np.concatenate([[data.time], data.qpos[:7], data.qvel[:6], self.angles, self.speeds])
 
 
 def simulate(
@@ -239,10 +235,10 @@ def simulate(
                 plant.data.ctrl[plant.motors] = sent[plant.driven]
             rows.append(plant.row())
             mujoco.mj_step(plant.model, plant.data)
-    table, hinges = np.array(rows), len(robot.hinges)
-    time, pose, twist, angles, speeds, torques = np.split(
-        table, [1, 8, 14, 14 + hinges, 14 + 2 * hinges], axis=1
+    time, pose, twist, angles, speeds = np.split(
+        np.array(rows), [1, 8, 14, 14 + len(robot.hinges)], axis=1
     )
     clock = robot.control_timestep * np.arange(count)
-    moved = np.array(commands), np.array(touches)
-    return Motion(time[:, 0], angles, speeds, torques, pose, twist, clock, *moved)
+    return Motion(
+        time[:, 0], angles, speeds, pose, twist, clock, np.array(commands), np.array(touches)
+    )

@@ -34,7 +34,6 @@ class Noise:
 
     angle: float = 0.01
     speed: float = 0.1
-    torque: float = 0.5
     position: float = 0.001
     orientation: float = 0.002
     linear: float = 0.01
@@ -143,7 +142,6 @@ def _joints(
     signs = np.array([encoders.signs[hinge] for hinge in robot.hinges])
     order = [k for k in rng.permutation(len(robot.hinges)) if modes[k] != "none"]
     names = [f"{robot.hinges[k]}_joint" for k in order]
-    driver = rng.spawn(1)[0]  # leaves the stream of the other noise as it is
     still, unknown = np.isin(modes, ("freezes", "nan")), modes == "nan"
     for time in np.arange(-STANDING, motion.time[-1], JOINT_PERIOD):
         true = _jittered(time, noise, rng)
@@ -156,9 +154,7 @@ def _joints(
         )
         dead = unknown & (time >= encoders.onset)
         position[dead] = speed[dead] = np.nan
-        torque = _at(motion.time, motion.torques, true) + driver.normal(0, noise.torque, len(signs))
-        columns = [(signs * column)[order] for column in (position, speed, torque)]
-        message = _joint_state(time, names, *columns)
+        message = _joint_state(time, names, (signs * position)[order], (signs * speed)[order])
         yield "/joint_states", _stamp(time), message
 
 
@@ -248,8 +244,7 @@ def _commands(robot: Robot, motion: Motion) -> Iterator[Item]:
         motion.command_time, motion.commands, motion.touch, strict=True
     ):
         stamp = _stamp(time)
-        nothing = np.zeros(0)
-        yield "/joint_commands", stamp, _joint_state(time, names, command, nothing, nothing)
+        yield "/joint_commands", stamp, _joint_state(time, names, command, np.zeros(0))
         for name, force in zip(robot.touches, forces, strict=True):
             wrench = _message(
                 "geometry_msgs/msg/Wrench",
@@ -284,16 +279,14 @@ def _vector(values: np.ndarray, kind: str = "Vector3") -> Any:  # noqa: ANN401  
     return _message(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
 
 
-def _joint_state(
-    time: float, names: list[str], position: np.ndarray, speed: np.ndarray, torque: np.ndarray
-) -> Any:  # noqa: ANN401  # see above
+def _joint_state(time: float, names: list[str], position: np.ndarray, speed: np.ndarray) -> Any:  # noqa: ANN401  # see above
     return _message(
         "sensor_msgs/msg/JointState",
         header=_header(time, ""),
         name=names,
         position=np.asarray(position, dtype=np.float64),
         velocity=np.asarray(speed, dtype=np.float64),
-        effort=np.asarray(torque, dtype=np.float64),
+        effort=np.zeros(0),
     )
 
 

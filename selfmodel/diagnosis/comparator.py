@@ -17,8 +17,7 @@ class Comparator(Protocol):
 
     A plug-in is an object with these members; no base class is required.
     ``selfmodel.check_comparator`` tests conformance. An attribute ``surrogate`` is optional: a
-    comparator that requests less simulation, to pre-select hypotheses. So is a method ``learned``,
-    which returns the comparator with what healthy trials teach it; see ``losses.learned``.
+    comparator that requests less simulation, to pre-select hypotheses.
     """
 
     @property

@@ -1,7 +1,7 @@
 """Losses of hypotheses on logged trials, and the problem that a diagnosis solves with them."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray, median_of_known
-from selfmodel.diagnosis.choice import ChosenComparator, contract_error, prepared_trial
+from selfmodel.diagnosis.choice import contract_error, prepared_trial
 from selfmodel.diagnosis.comparator import (
     Comparator,
     Losses,
     PiecewiseTrial,
     PreparedTrial,
-    TrialRefusedError,
     as_comparator,
 )
 from selfmodel.diagnosis.significance import CONTRADICTION
@@ -26,7 +25,6 @@ from selfmodel.faults.joints import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import completed_trial
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
@@ -262,30 +260,6 @@ class LossTable:
         if by_hinge is not None:
             by_hinge = np.where(diverged[:, np.newaxis], np.inf, by_hinge)
         return Losses(np.where(diverged, np.inf, total), losses.by_signal, by_hinge)
-
-
-def learned(
-    chosen: ChosenComparator, simulator: Simulator, healthy: Sequence[Trial]
-) -> ChosenComparator:
-    """Returns a comparator with what it learns from healthy trials; the same if it cannot learn.
-
-    Trials that the comparator refuses teach nothing. What it does not use is added to the reason.
-    """
-    learn = getattr(chosen.comparator, "learned", None)
-    if learn is None:
-        return chosen
-    accepted = []
-    for trial in healthy:
-        with suppress(TrialRefusedError):
-            prepared_trial(chosen.comparator, simulator.robot, trial)
-            accepted.append(completed_trial(simulator.robot, trial))
-
-    def simulated(request: Request, trial: Trial) -> Trajectory:
-        return simulate(simulator, request, trial, [INTACT]).trajectory
-
-    comparator, unused = learn(accepted, simulated)
-    reason = f"{chosen.reason}; {unused}" if unused else chosen.reason
-    return ChosenComparator(as_comparator(comparator, chosen.comparator.name), reason)
 
 
 def simulate(

@@ -15,7 +15,6 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.choice import ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.losses import learned
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -177,8 +176,7 @@ class RecoveryLoop:
 
     def _choose_comparator(self) -> None:
         robot, trials = self.simulator.robot, self.known.trials
-        chosen = self.choose_comparator(robot, trials)
-        self._comparator = learned(chosen, self.simulator, trials[:1])
+        self._comparator = self.choose_comparator(robot, trials)
         self.on_event(self._comparator)
         self._search = DiagnosticSearch(
             self.simulator,

@@ -16,10 +16,9 @@ import numpy as np
 from selfmodel import arguments, plugins
 from selfmodel.api import by_stage
 from selfmodel.arguments import AUTO, comparator_choice, fitted
-from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
-from selfmodel.diagnosis.losses import LossTable, learned
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -115,8 +114,7 @@ class Subject:
     @cached_property
     def losses(self) -> LossTable:
         """Losses of hypotheses on the trials."""
-        given = ChosenComparator(self.comparator, "of the diagnoses")
-        return LossTable(self.simulator, learned(given, self.simulator, self.healthy).comparator)
+        return LossTable(self.simulator, self.comparator)
 
     @property
     def runner_up(self) -> Hypothesis | None:

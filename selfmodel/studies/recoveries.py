@@ -17,10 +17,8 @@ from typing import Any
 from selfmodel import plugins
 from selfmodel.arguments import comparator_choice, is_model, read_controller, robot_entry
 from selfmodel.controllers.controller import Controller, check_silent_neurons
-from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.losses import learned
 from selfmodel.errors import InputError
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -231,11 +229,9 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     trials = logged[HEALTHY_TRIALS:]
     robot = planned_entry(parameters).robot()
     mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
-    simulator = Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1)
-    given = ChosenComparator(plugins.comparator(parameters["comparator"]), "given")
     search = DiagnosticSearch(
-        simulator,
-        learned(given, simulator, logged[:HEALTHY_TRIALS]).comparator,
+        Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
+        plugins.comparator(parameters["comparator"]),
         Settings(**shared["settings"]),
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],

@@ -268,12 +268,7 @@ def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     reference for a trial with a lost encoder only without the same encoder.
     """
     reduced: dict[Signal, FloatArray] = {}
-    losable: tuple[Signal, ...] = (
-        "joint_positions",
-        "joint_velocities",
-        "joint_efforts",
-        "sensors",
-    )
+    losable: tuple[Signal, ...] = ("joint_positions", "joint_velocities", "sensors")
     for signal in losable:  # with an encoder
         observed = [np.isfinite(own.trajectory[signal]).any(axis=0) for own in (trial, *others)]
         lost = observed[0] & ~np.logical_and.reduce(observed)
