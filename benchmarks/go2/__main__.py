@@ -1,7 +1,7 @@
 """``python -m benchmarks.go2``: diagnoses of a healthy Go2, by halves and thirds of its log."""
 
+import argparse
 import json
-import sys
 import time
 from itertools import permutations
 
@@ -15,12 +15,10 @@ SERVOS = {"config": recording.SERVOS, "mjx": {"kp": 35.0, "kd": 0.5}}
 
 
 def main() -> None:
-    """Diagnoses each part of the recording with each other part as the healthy trial.
-
-    Prints a row for each ordered pair of halves and of thirds; the names of the servos to take are
-    the arguments.
-    """
-    for name in sys.argv[1:] or SERVOS:
+    """Diagnoses each part with each other part as the healthy trial, and prints a row for each."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.go2", description=__doc__)
+    parser.add_argument("--servos", choices=SERVOS, nargs="*", default=list(SERVOS))
+    for name in parser.parse_args().servos:
         robot = recording.robot_on_stand(servos=SERVOS[name])
         logged = recording.positions_and_commands(robot)
         for count in (2, 3):

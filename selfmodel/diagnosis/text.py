@@ -24,7 +24,8 @@ def summary(diagnosis: Diagnosis) -> str:
     """Returns what is wrong, since when, how sure that is, and what to do, in plain words."""
     what, change = what_is_wrong(diagnosis), diagnosis.change
     if change is not None:
-        what = f"from {change.time:.1f} s of the trial '{change.trial}' on, {what}"
+        before = f"; before that, {in_words(change.before)}" if change.before else ""
+        what = f"from {change.time:.1f} s of the trial '{change.trial}' on, {what}{before}"
     sure = ""
     if diagnosis.verdict in ("intact", "explained"):
         none = " that there is none" if diagnosis.verdict == "intact" else ""

@@ -1,5 +1,6 @@
 """Tests of the sentences of a diagnosis: verdict, change, numbers, limits and direct evidence."""
 
+import dataclasses
 from typing import Any
 
 import pytest
@@ -175,6 +176,14 @@ DOUBT = Doubt("WHY", "DO THIS")
 MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
+
+
+def test_a_fault_before_a_change_is_not_forgotten():
+    earlier = dataclasses.replace(CHANGE, before=OTHER)
+    ended = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
+
+    assert "; before that, the joint back_left_knee is stuck" in ended
+    assert "before that" not in summary(diagnosis(change=CHANGE))
 
 
 def test_trials_that_are_not_judged_have_a_reason():
