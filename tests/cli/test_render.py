@@ -192,6 +192,7 @@ def test_the_camera_is_on_the_side_of_what_is_damaged(quadruped: Robot):
     left, right = (film(quadruped, f"break:front_{side}_shoulder") for side in ("left", "right"))
 
     assert left.azimuth == -right.azimuth
+    assert right.azimuth > 0, "from the robot's right, it looks to the left, along y"
     assert film(quadruped, "intact").azimuth == right.azimuth
 
 
