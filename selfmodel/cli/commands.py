@@ -160,8 +160,7 @@ class RunTrial(Robot, Notation):
 class Calibrate(Command):
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
 
-    Of a robot with a fixed base, gain and force limit, damping, dry friction and armature of each
-    joint are fitted.
+    Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
 
     Give trials of the healthy robot: a fault in them would become part of the model. Commands
     that read logs take the new model as --robot MODEL.xml.

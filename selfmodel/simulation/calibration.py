@@ -41,12 +41,11 @@ class Calibration:
         error_before: Root mean square error of the predictions with the nominal parameters, in
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
-        joints: JSON values of the fit of a robot with a fixed base: its set, the share of the way
-            from the set before to the fit that is used, delay and errors, the hinge with the
-            largest error (rad), and ``parameters``: of the gain and any force limit of each motor
-            (factors), and the damping, dry friction and armature of each hinge (N m s/rad, N m,
-            kg m^2), the value in the model, the fitted value, the standard deviation of its
-            logarithm, and whether the trials determine it. None for other robots.
+        joints: JSON values of the fit of a robot with a fixed base: its set, delay and errors, the
+            hinge with the largest error (rad), and ``parameters``: of the gain of each motor and
+            the damping, dry friction and armature of each hinge (N m s/rad, N m, kg m^2), the value
+            in the model, the fitted value, the standard deviation of its logarithm, and whether the
+            trials determine it. None for other robots.
         chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
             ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
             or ``joints``.
@@ -81,8 +80,7 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
-        joints = (model_factors.FORCE_LIMITS, *model_factors.JOINT_FIELDS)
-        parts = (*joints, "body_mass", "body_inertia")
+        parts = (*model_factors.JOINT_FIELDS, "body_mass", "body_inertia")
         factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
         return {
             **({} if self.joints is None else {"joints": self.joints}),
@@ -141,8 +139,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     there on. After a late step, an unknown command, or an unknown state at the beginning of a
     segment (every tenth step), the rest of such a trial is not used.
 
-    With a fixed base, gain, force limit, damping, dry friction and armature are fitted to joint
-    positions.
+    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -179,7 +176,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
             chosen=best.name,
             determined=tuple(is_determined(deviations, known).tolist()) if best.is_fitted else (),
             held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
-            suspicion=None if is_exact else suspicion(segments, best),
+            suspicion=None if is_exact or is_fixed else suspicion(segments, best),
         )
 
 
@@ -204,17 +201,15 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
     robot, rows = segments.robot, list[dict[str, Any]]()
     quantities = {
         "gain": "motor_gains",
-        "force limit": model_factors.FORCE_LIMITS,
         "damping": "joint_damping",
         "dry friction": "dry_friction",
         "armature": "armature",
     }
     for name, quantity in quantities.items():
-        is_limit = quantity == model_factors.FORCE_LIMITS
-        is_of_motor = is_limit or quantity == "motor_gains"
+        is_gain = quantity == "motor_gains"
         before, values = (
-            np.array(getattr(own.parameters, quantity) or (1.0,) * robot.model.nu)
-            if is_of_motor
+            np.array(own.parameters.motor_gains)
+            if is_gain
             else model_factors.joint_values(robot, own.parameters, quantity)
             for own in (first, best)
         )
@@ -229,14 +224,12 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
                 "deviation": float(deviations[k]),
                 "determined": bool(known[k]),
             }
-            for k, part in enumerate(robot.anatomy.motors if is_of_motor else robot.anatomy.hinges)
-            if not is_limit or model_factors.has_force_limit(robot, k)
+            for k, part in enumerate(robot.anatomy.motors if is_gain else robot.anatomy.hinges)
         ]
     sizes = root_mean_square(segments.joint_errors(best.errors))
     worst = int(np.argmax(sizes))
     return {
         "set": best.name,
-        "weight": best.weight,
         "delay": best.parameters.delay,
         "error_before": float(root_mean_square(first.errors)),
         "error": float(root_mean_square(best.errors)),

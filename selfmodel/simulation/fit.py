@@ -7,11 +7,11 @@ nonlinear least squares (``mujoco.minimize``) with a Gaussian prior for those th
 determine.
 
 A robot with a floating base has one set of factors. With a fixed base, which determines neither
-masses nor the friction of the ground, nor has contacts, there are three: gain, force limit,
-damping, dry friction and armature of all joints together, of each kind of joint, and of each joint.
+masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
+friction and armature of all joints together, of each kind of joint, and of each joint.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -31,16 +31,12 @@ CANDIDATE_STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
 CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
 """Factors of the stiffness and the damping of contacts in the exhaustive search."""
 
-STEPS = (1.0, 0.3)
-"""Shares of a Gauss-Newton step that are tried with each delay."""
-
 FOLDS = 4
-"""Consecutive parts of each trial that are left out in turn, where the base is free."""
+"""Consecutive parts of each trial that are left out in turn."""
 
-MIN_Z, SHRUNK_MIN_Z, CONTACTS_MIN_Z = 1.645, 2.24, 3.0
+MIN_Z, CONTACTS_MIN_Z = 1.645, 3.0
 """Standard errors by which a larger set must predict segments better that it was not fitted to: a
-one-sided level of 5 %. A fit that is used in part is the best of four: a quarter of that level. The
-best of 25 contacts gains by chance, too; theirs is times the square
+one-sided level of 5 %. The best of 25 contacts gains by chance, too; theirs is times the square
 root of the overlap, because segments of a short trial share steps."""
 
 INDEPENDENT_ERRORS = 100
@@ -65,12 +61,9 @@ class Method:
         is_central: Whether the solver's differences are central, with that step; otherwise they are
             forward, and the step is relative to the deviation of the prior.
         iterations: Largest number of iterations of the least-squares solver.
-        delay_iterations: As ``iterations``, for each delay that is tried; 0 to keep the delay.
+        delay_iterations: As ``iterations``, for each neighbouring delay; 0 to keep the delay.
         regularizers: Smallest and largest regularizer of the solver, and the factor from one to the
             next; each that is tried takes a simulation.
-        tolerance: Size of a step, relative to the logarithms, below which the solver ends.
-        folds: Consecutive parts of each trial that are left out of the fit in turn.
-        weights: Shares of the way from the set before to the fit of which one is chosen.
     """
 
     prior_weight: float
@@ -79,26 +72,13 @@ class Method:
     iterations: int
     delay_iterations: int
     regularizers: Mapping[str, float]
-    tolerance: float
-    folds: int
-    weights: tuple[float, ...]
 
 
-FLOATING = Method(0.05, 0.1, True, 3, 0, {}, 1e-3, FOLDS, (1.0,))
+FLOATING = Method(0.05, 0.1, True, 3, 0, {})
 """Where there are contacts, smaller steps are dominated by noise: a parameter changes the time at
 which a foot makes contact."""
 
-FIXED = Method(
-    prior_weight=0.03,
-    step=0.05,
-    is_central=False,
-    iterations=5,
-    delay_iterations=2,
-    regularizers={"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0},
-    tolerance=1e-2,
-    folds=8,
-    weights=(0.25, 0.5, 0.75, 1.0),
-)
+FIXED = Method(0.01, 0.05, False, 5, 2, {"mu_min": 1e-3, "mu_max": 1e5, "mu_factor": 10.0})
 """Long simulations without contacts have errors far below their unit, so their prior weighs less
 than that of short predictions."""
 
@@ -115,7 +95,6 @@ class Fit:
         errors: Errors of its predictions, ``(errors,)``.
         held_out: Errors in segments that were each left out of the fit, ``(errors,)``.
         is_fitted: Whether the set contains factors.
-        weight: Share of the way from the set before to the fit.
     """
 
     name: str
@@ -124,7 +103,6 @@ class Fit:
     errors: FloatArray
     held_out: FloatArray
     is_fitted: bool = False
-    weight: float = 1.0
 
 
 def is_determined(deviation: FloatArray, prior: FloatArray) -> BoolArray:
@@ -156,11 +134,13 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             best = fit.parameters
     for number, (name, basis) in enumerate(bases(robot)):
         fitter = _Fitter(segments, basis, FIXED if robot.has_fixed_base else FLOATING)
-        best, x = fitter.fitted(best, is_first=not number)
+        if robot.has_fixed_base and not number:
+            best, x = fitter.solved(fitter.with_best_delay(best))
+        else:
+            best, x = fitter.with_near_delay(*fitter.solved(best))
         errors = segments.of([best])[:, 0]
         if _cost(errors) < _cost(chosen[-1].errors):
-            fit = fitter.tested(name, best, x, errors, chosen[-1])
-            choose(fit, MIN_Z if fit.weight == 1 else SHRUNK_MIN_Z)
+            choose(fitter.tested(name, best, x, errors), MIN_Z)
     return chosen
 
 
@@ -203,41 +183,32 @@ class _Fitter:
         prior, method = self.basis.prior, self.method
         return np.asarray(method.step * (np.ones_like(prior) if method.is_central else prior))
 
-    def residuals(self, points: Sequence[Parameters], coordinates: FloatArray) -> FloatArray:
-        """Returns those of the data, then those of the prior, ``(residuals, points)``.
-
-        The coordinates of the points are ``(points, coordinates)``.
-        """
-        errors = self.segments.of(points)
-        weight = np.sqrt(len(errors)) * self.method.prior_weight / self.basis.prior
-        return np.concatenate([pseudo_huber(errors), (weight * coordinates).T])
-
-    def slopes(self, start: Parameters, x: FloatArray, at: FloatArray) -> FloatArray:
-        """Returns the derivatives of the residuals, ``(residuals, coordinates)``."""
-        basis, width, steps = self.basis, self._widths, np.diag(self._widths)
-        moved = np.concatenate([x + steps, x - steps]) if self.method.is_central else x + steps
-        ahead = self.residuals([basis.applied(start, row) for row in moved], moved)
-        if not self.method.is_central:
-            return np.asarray((ahead - at[:, np.newaxis]) / width)
-        ahead, behind = np.split(ahead, 2, axis=1)
-        return np.asarray((ahead - behind) / (2 * width))
-
-    def solved(self, start: Parameters) -> tuple[Parameters, FloatArray]:
+    def solved(
+        self, start: Parameters, iterations: int | None = None
+    ) -> tuple[Parameters, FloatArray]:
         """Returns the fit of the start's factors, with its delay and contacts; its coordinates."""
-        basis = self.basis
+        basis, width, steps = self.basis, self._widths, np.diag(self._widths)
 
         def residual(logarithms: FloatArray) -> FloatArray:
-            rows = np.reshape(logarithms, (len(logarithms), -1)).T
-            return self.residuals([basis.applied(start, row) for row in rows], rows)
+            # Those of the data, then those of the prior.
+            rows = np.reshape(logarithms, (len(logarithms), -1))
+            errors = self.segments.of([basis.applied(start, row) for row in rows.T])
+            weight = np.sqrt(len(errors)) * self.method.prior_weight / basis.prior
+            return np.concatenate([pseudo_huber(errors), weight[:, np.newaxis] * rows])
+
+        def jacobian(x: FloatArray, at: FloatArray) -> FloatArray:
+            if self.method.is_central:
+                return np.asarray((residual(x + steps) - residual(x - steps)) / (2 * width))
+            return np.asarray((residual(x + steps) - at) / width)
 
         bounds = basis.bounds[:, np.newaxis]
         fitted, _ = mujoco.minimize.least_squares(
             basis.coordinates(start)[:, np.newaxis],
             residual,
             bounds=[-bounds, bounds],
-            jacobian=lambda x, at: self.slopes(start, x.ravel(), at.ravel()),
-            max_iter=self.method.iterations,
-            xtol=self.method.tolerance,
+            jacobian=jacobian,
+            max_iter=iterations or self.method.iterations,
+            xtol=1e-3,
             verbose=mujoco.minimize.Verbosity.SILENT,
             **self.method.regularizers,
         )
@@ -245,50 +216,66 @@ class _Fitter:
         return basis.applied(start, x), x
 
     @property
-    def delay_parts(self) -> int:
+    def _delay_parts(self) -> int:
         """Parts of a control step of which a delay is a multiple."""
         robot = self.segments.robot
         return 1 if robot.model.na else robot.substeps
 
-    def fitted(self, start: Parameters, *, is_first: bool) -> tuple[Parameters, FloatArray]:
-        """Returns the fit of a set, with the best delay, and its coordinates.
+    def with_best_delay(self, start: Parameters) -> Parameters:
+        """Returns the fit with the best delay: of whole control steps, then of parts of one.
 
-        All delays are tried before the first set is fitted, and those around its delay after each.
+        A wrong gain or damping looks like a wrong delay, so each is tried with a short fit.
         """
-        parts = self.delay_parts
-        if is_first and self.method.delay_iterations:
-            delays = range(0, MAX_CONTROL_DELAY * parts + 1, parts)
-            start = _Delays(self, start, delays).best_around(parts // 2)
-        best, x = self.solved(start)
-        if self.method.delay_iterations:
-            moved = _Delays(self, best, [round(best.delay * parts)]).best_around(1)
-            if moved.delay != best.delay:
-                best, x = self.solved(moved)
-        return best, x
+        parts, solved = self._delay_parts, dict[int, tuple[float, Parameters]]()
 
-    def tested(
-        self, name: str, point: Parameters, x: FloatArray, errors: FloatArray, before: Fit
-    ) -> Fit:
+        def cost(delay: int) -> float:
+            if delay not in solved:
+                moved = replace(start, delay=as_delay(delay, parts))
+                point, _ = self.solved(moved, self.method.delay_iterations)
+                solved[delay] = _cost(self.segments.of([point])), point
+            return solved[delay][0]
+
+        delays, step = range(MAX_CONTROL_DELAY * parts + 1), parts // 2
+        best = min(delays[::parts], key=cost)
+        while step:
+            near = (best - step, best, best + step)
+            best = min((delay for delay in near if delay in delays), key=cost)
+            step //= 2
+        return solved[best][1]
+
+    def with_near_delay(self, start: Parameters, x: FloatArray) -> tuple[Parameters, FloatArray]:
+        """Returns the fit with the best delay around that of a fit, and its coordinates.
+
+        The delay moves by a physics step at a time, as long as the fit improves.
+        """
+        iterations, parts = self.method.delay_iterations, self._delay_parts
+        best, delays = (start, x), range(MAX_CONTROL_DELAY * parts + 1)
+        least = _cost(self.segments.of([start])) if iterations else 0.0
+        for direction in (-1, 1) if iterations else ():
+            while (delay := round(best[0].delay * parts) + direction) in delays:
+                moved = self.solved(replace(best[0], delay=as_delay(delay, parts)), iterations)
+                cost = _cost(self.segments.of(moved[:1]))
+                if not cost < least:
+                    break
+                best, least = moved, cost
+        return best
+
+    def tested(self, name: str, point: Parameters, x: FloatArray, errors: FloatArray) -> Fit:
         """Returns a fit with its held-out errors and its posterior deviations.
 
         Its residuals are linearised around it, with independent segments: long simulations are
         chaotic, so that their derivatives would be meaningless. The fit without a part differs by
         one Gauss-Newton step, less that of the whole fit, which the solver left. ``x`` are the
         coordinates of the fitted parameters, ``point``.
-
-        The fit is used as far as it helps: it is moved towards that of the set before by the share
-        with the lowest held-out loss, by errors that change in proportion.
         """
         segments, basis, width = self.segments, self.basis, self._widths
+        moved = np.concatenate([x + np.diag(width), x - np.diag(width)])
         independent = segments.with_estimated_states(point)
         residuals = pseudo_huber(errors)
-
-        def slopes_of(widths: FloatArray) -> FloatArray:
-            moved = [basis.applied(point, own) for own in x + np.diag(widths)]
-            return (pseudo_huber(independent.of(moved)) - residuals[:, np.newaxis]) / widths
-
-        ahead = slopes_of(width)
-        behind = slopes_of(-width) if self.method.is_central else ahead
+        change = pseudo_huber(independent.of([basis.applied(point, own) for own in moved]))
+        change = (change - residuals[:, np.newaxis]) / np.tile(width, 2)
+        ahead, behind = np.split(change, 2, axis=1)
+        behind = -behind
 
         def step(used: BoolArray) -> FloatArray:
             slopes, left = (ahead + behind)[used] / 2, residuals[used]
@@ -298,29 +285,15 @@ class _Fitter:
             information = slopes.T @ slopes * weight + np.diag(prior)
             return np.asarray(-np.linalg.solve(information, gradient))
 
-        folds = self.method.folds
-        parts = segments.folds(folds)[segments.segment_of_error]
+        parts = segments.folds(FOLDS)[segments.segment_of_error]
         whole = step(np.ones(len(parts), np.bool_))
-        without = np.array([x + (step(parts != part) - whole) for part in range(folds)])
-        without = np.clip(without, -basis.bounds, basis.bounds)
-        known = basis.coordinates(before.parameters)
-
-        def held_out(weight: float) -> FloatArray:
-            points = [basis.applied(point, known + weight * (own - known)) for own in without]
-            return np.asarray(segments.of(points)[np.arange(len(parts)), parts])
-
-        left_out, known_errors = held_out(1.0), before.held_out
-
-        def loss(share: float) -> float:
-            return _cost(share * left_out + (1 - share) * known_errors)
-
-        weight = min(self.method.weights, key=loss)
-        if weight != 1.0:
-            point = basis.applied(point, known + weight * (x - known))
-            errors, left_out = segments.of([point])[:, 0], held_out(weight)
+        without = [x + (step(parts != part) - whole) for part in range(FOLDS)]
+        within = np.clip(without, -basis.bounds, basis.bounds)
+        every = segments.of([basis.applied(point, own) for own in within])
+        held_out = every[np.arange(len(parts)), parts]
         fitted = basis.by_quantity(self._deviations(residuals, ahead, behind))
         deviations = prior_deviations(segments.robot) | fitted
-        return Fit(name, point, deviations, errors, left_out, is_fitted=True, weight=weight)
+        return Fit(name, point, deviations, errors, held_out, is_fitted=True)
 
     def _deviations(
         self, residuals: FloatArray, ahead: FloatArray, behind: FloatArray
@@ -346,68 +319,6 @@ class _Fitter:
         inverse = np.linalg.inv(slopes.T @ slopes + np.diag(weight * prior**-2))
         variance = np.diag(inverse @ (spread + np.diag(weight**2 * prior**-2)) @ inverse)
         return np.asarray(np.minimum(np.sqrt(variance), prior))
-
-
-class _Delays:
-    """Short fits with several control delays, in parts of a control step.
-
-    A wrong gain or damping looks like a wrong delay, so the factors are fitted with each. All
-    delays take a step with the slopes at the best one, which they nearly have too.
-    """
-
-    def __init__(self, fitter: _Fitter, start: Parameters, delays: Iterable[int]) -> None:
-        self._fitter, self._start = fitter, start
-        # Cost, coordinates and residuals of the best point with each delay.
-        self._tried: dict[int, tuple[float, FloatArray, FloatArray]] = {}
-        self._try([(delay, fitter.basis.coordinates(start)) for delay in delays])
-        if len(self._tried) > 1:
-            for _ in range(fitter.method.delay_iterations):
-                self._improve(list(self._tried), self._inverse())
-
-    def best_around(self, step: int) -> Parameters:
-        """Returns the best point; its delay moves by ``step`` while that helps, then by less."""
-        inverse, last = self._inverse(), MAX_CONTROL_DELAY * self._fitter.delay_parts
-        while step:
-            centre = self._best
-            near = [own for own in (centre - step, centre + step) if 0 <= own <= last]
-            near = [own for own in near if own not in self._tried]
-            if near:
-                self._try([(own, self._tried[centre][1]) for own in near])
-                for _ in range(self._fitter.method.delay_iterations):
-                    self._improve(near, inverse)
-            if self._best == centre:
-                step //= 2
-        return self._point(self._best, self._tried[self._best][1])
-
-    @property
-    def _best(self) -> int:
-        return min(self._tried, key=lambda delay: self._tried[delay][0])
-
-    def _point(self, delay: int, x: FloatArray) -> Parameters:
-        start = replace(self._start, delay=as_delay(delay, self._fitter.delay_parts))
-        return self._fitter.basis.applied(start, x)
-
-    def _try(self, candidates: Sequence[tuple[int, FloatArray]]) -> None:
-        points = [self._point(*own) for own in candidates]
-        residuals = self._fitter.residuals(points, np.array([x for _, x in candidates])).T
-        for (delay, x), residual in zip(candidates, residuals, strict=True):
-            cost = float(residual @ residual)
-            if delay not in self._tried or cost < self._tried[delay][0]:
-                self._tried[delay] = cost, x, residual
-
-    def _inverse(self) -> FloatArray:
-        """Returns the pseudo-inverse of the slopes at the best point."""
-        _, x, residual = self._tried[self._best]
-        slopes = self._fitter.slopes(self._point(self._best, x), x, residual)
-        return np.asarray(np.linalg.pinv(slopes))
-
-    def _improve(self, delays: Iterable[int], inverse: FloatArray) -> None:
-        bounds, moved = self._fitter.basis.bounds, list[tuple[int, FloatArray]]()
-        for delay in delays:
-            _, x, residual = self._tried[delay]
-            step = inverse @ residual
-            moved += [(delay, np.clip(x - share * step, -bounds, bounds)) for share in STEPS]
-        self._try(moved)
 
 
 def consistent_information(ahead: FloatArray, behind: FloatArray) -> FloatArray:

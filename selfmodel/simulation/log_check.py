@@ -2,8 +2,7 @@
 
 A joint is suspicious if the calibrated model predicts its position over a tenth of a second worse
 than no motion at all, or off to one side. Then the same model predicts the trials with the signs or
-the order of the columns corrected, and the best correction names the joint. A joint of a fixed base
-is predicted for longer; it is suspicious if the error is large, beyond the noise of its encoder.
+the order of the columns corrected, and the best correction names the joint.
 """
 
 from collections.abc import Iterator
@@ -24,7 +23,7 @@ from selfmodel.simulation.segments import (
     is_better,
     root_mean_square,
 )
-from selfmodel.trials.estimation import JOINTS, encoder_noise
+from selfmodel.trials.estimation import JOINTS
 
 MAX_RATIO, MIN_ERROR = 1.0, 0.06
 """Largest root mean square error of a joint relative to that of the prediction of no motion; and
@@ -32,9 +31,6 @@ smallest one of a suspicious joint, rad: the ratio of a joint that rests is that
 
 MAX_BIAS = 0.04
 """Largest absolute mean error of a joint, rad."""
-
-SMOOTHING = 8.0
-"""White noise of an encoder, relative to what the estimate of the states leaves of it."""
 
 MIN_Z, WORST = 3.0, 3
 """Standard errors by which a correction must predict the segments better; and joints with the
@@ -68,8 +64,6 @@ def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
     """Returns the probable error in the recording of healthy trials; None if there is none."""
     hinges, delay = segments.robot.anatomy.hinges, fit.parameters.delay
     errors = segments.joint_errors(fit.errors)
-    if segments.robot.has_fixed_base:
-        return _large_error(segments, root_mean_square(errors))
     sizes, biases = root_mean_square(errors), errors.mean(axis=0)
     # The error of the prediction of no motion; the motion of an unknown hinge is 0.
     starts = [own.segments.states[POSITIONS][:, np.newaxis] for own in segments.data]
@@ -95,16 +89,6 @@ def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
         cause = f"the control delay is {delay} steps, the largest that is fitted"
         return Suspicion(None, cause)
     return None
-
-
-def _large_error(segments: SegmentErrors, sizes: FloatArray) -> Suspicion | None:
-    observed = np.concatenate([np.concatenate(own.observed[POSITIONS]) for own in segments.data])
-    beyond = sizes - np.hypot(MIN_ERROR, SMOOTHING * encoder_noise(observed))
-    worst = int(np.argmax(beyond))
-    if beyond[worst] <= 0:
-        return None
-    cause = f"after the fit its error is {1e3 * sizes[worst]:.0f} mrad"
-    return Suspicion(segments.robot.anatomy.hinges[worst], cause)
 
 
 def _corrected(own: ObservedSegments, joints: IndexArray, motors: IndexArray) -> ObservedSegments:

@@ -45,7 +45,6 @@ class Parameters:
         delay: Control delay, control steps; a multiple of a physics step.
         contact_stiffness: Factor of the stiffness of all contacts.
         contact_damping: Factor of their damping.
-        force_limits: Factor of the largest force of each motor, and of the joints that it drives.
         joint_damping: Factor of the damping of each hinge. A value that is 0 in the model is
             increased by its unit (``JOINT_FIELDS``) times the factor minus one.
         dry_friction: Factor of the dry friction of each hinge, in the same way.
@@ -62,7 +61,6 @@ class Parameters:
     delay: float = 0
     contact_stiffness: float = 1.0
     contact_damping: float = 1.0
-    force_limits: tuple[float, ...] = ()
     joint_damping: tuple[float, ...] = ()
     dry_friction: tuple[float, ...] = ()
     armature: tuple[float, ...] = ()
@@ -122,9 +120,6 @@ def model_with_parameters(
         motor_gains=np.array(parameters.motor_gains),
     )
     scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
-    for motor, factor in enumerate(parameters.force_limits):
-        scaled.actuator_forcerange[motor] *= factor
-        scaled.jnt_actfrcrange[sorted(motor_joints(model, motor))] *= factor
     further = [quantity for quantity in JOINT_FIELDS if getattr(parameters, quantity)]
     for quantity in further:
         values = joint_values(robot, parameters, quantity)
@@ -185,9 +180,7 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
         joint.armature = model.dof_armature[dof]
         joint.frictionloss = model.dof_frictionloss[dof]
-        joint.actfrcrange = model.jnt_actfrcrange[joint.id]
     for motor in spec.actuators:
-        motor.forcerange = model.actuator_forcerange[motor.id]
         motor.gainprm = model.actuator_gainprm[motor.id]
         motor.biasprm = model.actuator_biasprm[motor.id]
     for numeric in spec.numerics:
@@ -219,13 +212,6 @@ def joint_of_motor(robot: Robot) -> IndexArray:
     hinges = [int(model.joint(name).id) for name in robot.anatomy.hinges]
     driven = [sorted(motor_joints(model, motor) & set(hinges)) for motor in range(model.nu)]
     return np.array([hinges.index(own[0]) if own else 0 for own in driven], dtype=np.intp)
-
-
-def has_force_limit(robot: Robot, motor: int) -> bool:
-    """Returns whether the force of a motor, or of a joint that it drives, is limited."""
-    model = robot.model
-    joints = sorted(motor_joints(model, motor))
-    return bool(model.actuator_forcelimited[motor] or model.jnt_actfrclimited[joints].any())
 
 
 def _dofs(robot: Robot) -> IndexArray:
@@ -293,9 +279,6 @@ def exact(robot: Robot) -> LogNormal:
     return LogNormal(np.zeros(4 + robot.model.nu), np.zeros(robot.model.nbody))
 
 
-FORCE_LIMITS = "force_limits"
-"""Quantity of a robot with a fixed base whose motors have limits."""
-
 FACTORS, JOINT_SETS = "factors", ("shared", "kinds", "joints")
 """Names of the set of factors of a robot with a floating base; and of the nested sets of one with a
 fixed base: one factor per quantity, per quantity and kind of joint, per quantity and joint."""
@@ -312,7 +295,6 @@ many models."""
 
 JOINT_PRIOR_DEVIATIONS = {
     "motor_gains": 0.3,
-    FORCE_LIMITS: 0.3,
     "joint_damping": 0.5,
     "dry_friction": 1.0,
     "armature": 1.0,
@@ -326,8 +308,7 @@ armature of a joint, 0.05 to 20."""
 
 def prior_deviations(robot: Robot) -> dict[str, FloatArray]:
     """Returns the standard deviation of the prior of each factor's logarithm, by quantity."""
-    sizes = dict.fromkeys(("motor_gains", FORCE_LIMITS), robot.model.nu)
-    sizes |= dict.fromkeys(JOINT_FIELDS, len(_dofs(robot)))
+    sizes = {"motor_gains": robot.model.nu} | dict.fromkeys(JOINT_FIELDS, len(_dofs(robot)))
     prior = PRIOR_DEVIATIONS | (JOINT_PRIOR_DEVIATIONS if robot.has_fixed_base else {})
     return {name: np.full(sizes.get(name, 1), deviation) for name, deviation in prior.items()}
 
@@ -379,12 +360,9 @@ def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
         yield FACTORS, _basis(groups, PRIOR_DEVIATIONS)
         return
     hinges, size = np.arange(len(robot.anatomy.hinges)), 0
-    has_force_limits = any(has_force_limit(robot, motor) for motor in range(robot.model.nu))
     kinds = (np.zeros_like(hinges), kinds_of_joints(robot), hinges)
     for name, kind in zip(JOINT_SETS, kinds, strict=True):
-        of_motors = ("motor_gains", FORCE_LIMITS) if has_force_limits else ("motor_gains",)
-        groups = dict.fromkeys(of_motors, kind[joint_of_motor(robot)])
-        groups |= dict.fromkeys(JOINT_FIELDS, kind)
+        groups = {"motor_gains": kind[joint_of_motor(robot)]} | dict.fromkeys(JOINT_FIELDS, kind)
         basis = _basis(groups, JOINT_PRIOR_DEVIATIONS)
         if len(basis.prior) > size:
             size = len(basis.prior)

@@ -289,7 +289,6 @@ JOINTS_TRUE = {
     "armature": (3.0, 2.0),
 }
 """Factors of the damping 0.3, dry friction 0.1 and armature 0.01 of both joints."""
-FORCE_LIMIT = ' forcerange="-20 20"'
 ARM_DELAY, ARM_STEPS, ARM_NOISE = 1.5, 300, 1e-3
 
 
@@ -323,8 +322,7 @@ def test_joints_and_delay_of_an_arm_are_found_with_the_same_bits_on_any_number_o
     assert parameters.delay == found.robot.control_delay == ARM_DELAY
     assert joints is not None
     assert found.chosen == joints["set"] == "kinds"  # as many as joints: the two differ
-    fitted = [row for row in joints["parameters"] if row["quantity"] != "force limit"]
-    deviations = iter([row["deviation"] for row in fitted])
+    deviations = iter([row["deviation"] for row in joints["parameters"]])
     for quantity, true in JOINTS_TRUE.items():
         for value, factor in zip(getattr(parameters, quantity), true, strict=True):
             assert abs(np.log(value / factor)) < 3 * next(deviations) + 0.02, quantity
@@ -345,17 +343,6 @@ def test_an_arm_whose_truth_is_nominal_stays_nominal_and_as_uncertain_as_before(
     assert found.joints is not None
     assert not any(row["determined"] for row in found.joints["parameters"])
     assert all(row["value"] == row["before"] for row in found.joints["parameters"])
-
-
-@search
-def test_a_motor_without_a_force_limit_has_none_in_the_result():
-    text = ARM.replace(FORCE_LIMIT, "").replace('name="b"', f'name="b"{FORCE_LIMIT}')
-    robot = arm_of(text, control_timestep=0.01)
-    joints = calibrate(robot, [arm_trial(robot, 0.0)], 1).joints
-
-    assert joints is not None
-    limits = [row["name"] for row in joints["parameters"] if row["quantity"] == "force limit"]
-    assert limits == ["b"]
 
 
 def test_slopes_without_their_noise_are_fisher_information():

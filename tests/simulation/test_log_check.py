@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.robot import Robot
 from selfmodel.simulation.fit import Fit
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import nominal
@@ -14,7 +13,7 @@ from selfmodel.simulation.segments import SegmentErrors, observed_segments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial
-from tests.simulation.test_calibration import ARM_NOISE, arm, arm_trial, trial
+from tests.simulation.test_calibration import trial
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 HEALTHY = trial(QUADRUPED, SimulatedRobot(QUADRUPED), seed=1)
@@ -27,12 +26,12 @@ def found(tried: Trial) -> Suspicion | None:
     return suspicion(*nominal_fit(tried))
 
 
-def nominal_fit(
-    tried: Trial, delay: float = 0, robot: Robot = QUADRUPED
-) -> tuple[SegmentErrors, Fit]:
+def nominal_fit(tried: Trial, delay: float = 0) -> tuple[SegmentErrors, Fit]:
     """The segments of a trial, and their errors with the nominal model, said to have a delay."""
-    segments = SegmentErrors(robot, [observed_segments(robot, tried)], 1)
-    own = nominal(robot)
+    segments, own = (
+        SegmentErrors(QUADRUPED, [observed_segments(QUADRUPED, tried)], 1),
+        nominal(QUADRUPED),
+    )
     errors = segments.of([own])[:, 0]
     return segments, Fit("nominal", replace(own, delay=delay), {}, errors, errors)
 
@@ -74,19 +73,3 @@ def test_a_delay_at_the_limit_of_the_fit_is_reported():
     assert suspect is not None
     assert suspect.to_dict()["joint"] is None
     assert "control delay is 5 steps" in suspect.cause
-
-
-def test_of_a_fixed_base_a_joint_with_a_large_error_beyond_noise_is_named():
-    healthy = arm_trial(arm(), ARM_NOISE)
-    positions = healthy.trajectory["joint_positions"]
-    noise = np.random.default_rng(0).normal(0, 0.2, positions.shape)
-    flipped, noisy = (
-        replace(healthy, trajectory=healthy.trajectory.with_signals({"joint_positions": values}))
-        for values in (positions * [1, -1], positions + noise)
-    )
-
-    assert [suspicion(*nominal_fit(own, robot=arm())) for own in (healthy, noisy)] == [None, None]
-    named = suspicion(*nominal_fit(flipped, robot=arm()))
-    assert named is not None
-    assert named.joint == arm().anatomy.hinges[1]
-    assert str(named).startswith("your healthy trials are predicted badly")
