@@ -66,12 +66,13 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     hardest, healthy = problem.hardest, problem.healthy_trials
     if problem.calibrate is None or problem.healthy([INTACT]) is None or hardest is None:
         return None
-    worst = float(hardest.mean())
-    loss, reason = fit.intact_loss if accused else fit.loss, ""
-    if is_shown_in_known_gaits(accused, problem):
-        if accused and loss <= worst + significance.LOSS_FLOOR:
+    worst, reason = float(hardest.mean()), ""
+    if known := sufficient_trials(accused, problem):
+        intact = problem.table.losses([INTACT], known).mean()
+        if accused and intact <= worst + significance.LOSS_FLOOR:
             reason = refit_reason(accused, problem)
         return Doubt(reason, LONGER) if reason else None
+    loss = fit.intact_loss if accused else fit.loss
     has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
     is_small = loss <= ratio * worst + significance.LOSS_FLOOR
@@ -112,11 +113,11 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     )
 
 
-def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
-    """Returns whether the trials with the gait of a healthy one suffice for an accusation.
+def sufficient_trials(accused: Hypothesis, problem: Problem) -> list[TrialPart]:
+    """Returns the trials with the gait of a healthy one, if they suffice for an accusation.
 
     They do if each fault is required to predict them; without a fault, if there are no other
-    trials.
+    trials. Otherwise the result is empty.
     """
     drivers = [part.trial.plan.controller for part in problem.healthy_trials]
     healthy = [part.rows for part in problem.healthy_motions]
@@ -127,9 +128,9 @@ def is_shown_in_known_gaits(accused: Hypothesis, problem: Problem) -> bool:
         or (have_one_gait([part.rows], healthy) and not faster_joints([part], problem))
     ]
     if not accused or not known:
-        return len(known) == len(problem.trials)
+        return known if len(known) == len(problem.trials) else []
     losses, *others = problem.table.losses([accused, *problem.space.with_one_less(accused)], known)
-    return all(significance.is_better(losses, fewer) for fewer in others)
+    return known if all(significance.is_better(losses, fewer) for fewer in others) else []
 
 
 def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
