@@ -193,8 +193,8 @@ class Diagnosis:
         residual: Signals and time of the loss that is left, if it is unexplained.
         doubt: Why the trials cannot be judged, if they cannot.
         probability: Probabilities of the best hypothesis and its neighbours, by their notation; see
-            ``diagnosis.probability``. None of a comparator without a test, and of trials that are
-            not judged.
+            ``diagnosis.probability``. None of a comparator without a test, without healthy trials,
+            and of trials that are not judged.
     """
 
     ranked: tuple[Candidate, ...]
@@ -307,6 +307,9 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
     if not diagnosis.ranked:
         raise ValueError("expected at least one ranked hypothesis, got none")
     best, fit = diagnosis.best.faults, diagnosis.fit
+    probability = diagnosis.probability.values()
+    if min(probability, default=0.0) < 0 or sum(probability) > 1 + 1e-9:
+        raise ValueError(f"expected probabilities of at most 1 together, got {[*probability]}")
     complete = (sorted({*best, *one.faults}) for one in diagnosis.undetectable)
     # Both are null without healthy trials; null beside a number is infinite.
     if fit is not None and (fit.healthy_loss is None) != (fit.excess is None):

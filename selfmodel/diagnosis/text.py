@@ -59,7 +59,11 @@ def in_words(hypothesis: Hypothesis) -> str:
 
 def _alternatives(diagnosis: Diagnosis) -> str:
     """Returns the faults that all alternatives have, then those in which they differ."""
-    alike, probability = [diagnosis.best, *diagnosis.indistinguishable], diagnosis.probability
+    probability = diagnosis.probability
+    alike = sorted(
+        [diagnosis.best, *diagnosis.indistinguishable],
+        key=lambda one: -probability.get(str(one), 0.0),
+    )
     clauses = [[fault.words for fault in one.faults] for one in alike]
     shared = [one for one in alike[0].faults if all(one.words in each for each in clauses)]
     common = Hypothesis(tuple(shared))
@@ -101,7 +105,8 @@ def _advice(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"Check this; to be surer, {surer}."
         case "ambiguous":
-            return f"Check the most probable first; to tell the causes apart, {surer}."
+            these = "the most probable first" if diagnosis.probability else "these"
+            return f"Check {these}; to tell the causes apart, {surer}."
         case "unexplained":
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":

@@ -101,7 +101,7 @@ def diagnosis_of(
     accused = explained if unsearched is None else unsearched.hypothesis
     doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
     probability: dict[str, float] = {}
-    if problem.has_test and doubt is None:
+    if problem.has_test and doubt is None and fit.healthy_loss is not None:
         nearest = best_severities([*alike, *sorted(leads, key=lambda one: leads[one])])
         misses = unsearched is not None or bool(fit.joints)
         some = {one: leads[one] for one in nearest}
@@ -420,9 +420,8 @@ def _nominal(
     fault: Fault, best: Hypothesis, space: HypothesisSpace, losses: LossFunction
 ) -> float | None:
     """Returns the severity at which a fault has no effect; None if the kind has none."""
-    known = [value for value, to in fault.kind.degenerates_to.items() if to is None]
-    if known or fault.part != ENVIRONMENT:
-        return known[0] if known else None
+    if fault.kind.nominal is not None or fault.part != ENVIRONMENT:
+        return fault.kind.nominal
     levels = space.levels(fault)
     rows = losses([space.canonical([*best.faults, replace(fault, severity=s)]) for s in levels])
     return levels[int(np.argmin(rows.sum(axis=1)))]

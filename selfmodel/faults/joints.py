@@ -255,7 +255,7 @@ DAMPED_JOINT = DampedJoint(
     levels=(3.0, 10.0, 30.0),
     degenerates_to={1.0: None},
     unit="times",
-    words="the joint {part} is hard to move, with {severity:.3g} times its damping",
+    words="the damping of the joint {part} is too {side}, {severity:.3g} times that of its model",
     is_of_joint=True,
 )
 JOINT_FRICTION = JointFriction(

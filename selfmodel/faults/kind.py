@@ -41,8 +41,9 @@ class FaultKind:
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
         words: Clause about a fault in plain words, a format with ``part``, ``severity``, its
-            ``amount`` without the sign, ``side`` ("high" or "low") and ``at`` (" at the " and the
-            part, empty without one), such as "the joint {part} is stuck"; "" for the notation.
+            ``amount`` without the sign, ``side`` ("high" or "low", against the nominal one) and
+            ``at`` (" at the " and the part, empty without one), such as "the joint {part} is
+            stuck"; "" for the notation.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
@@ -152,6 +153,11 @@ class FaultKind:
         return type(self).adapt_to_contacts is not FaultKind.adapt_to_contacts
 
     @property
+    def nominal(self) -> float | None:
+        """The severity at which a fault has no effect; None if there is none, or it is unknown."""
+        return next((value for value, to in self.degenerates_to.items() if to is None), None)
+
+    @property
     def degenerate_kinds(self) -> tuple["FaultKind", ...]:
         """Kinds that a fault of this kind degenerates to."""
         kinds = (*self.degenerates_to.values(), *self.degenerates_alone_to.values())
@@ -195,7 +201,8 @@ class Fault:
         """A clause about the fault; see ``FaultKind.words``."""
         if not self.kind.words:
             return f"there is the fault {self}"
-        side, amount = "high" if self.severity > 0 else "low", abs(self.severity)
+        amount, nominal = abs(self.severity), self.kind.nominal or 0.0
+        side = "high" if self.severity > nominal else "low"
         named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
         at = f" at the {self.part}" if self.part else ""
         return self.kind.words.format(**named, at=at).replace("%", " %")

@@ -105,6 +105,8 @@ def test_the_fit_the_change_and_the_limits_survive_json(
     [
         ("fit", {"loss": "much"}),
         ("fit", {"loss": 0.1}),
+        ("probability", {BEST: 7.0}),
+        ("probability", {BEST: -0.1}),
         ("change", {**to_json(CHANGE), "before": "break:nose"}),
         ("change", {**to_json(CHANGE), "time": "late"}),
         ("detectable", [{"kind": "motor", "part": "", "below": "none", "above": None}]),

@@ -214,15 +214,22 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {
                 "verdict": "ambiguous",
-                "indistinguishable": (OTHER,),
-                "probability": {str(JAM): 0.6, str(OTHER): 0.35},
-                "fit": None,
+                "indistinguishable": (INTACT, OTHER),
+                "probability": {str(JAM): 0.6, str(OTHER): 0.3, "intact": 0.05},
             },
             (
                 "One of these is true: the joint front_left_knee is stuck (60 %), or the joint "
-                "back_left_knee is stuck (35 %), or something not named here (5 %). Check the "
-                "most probable first; to tell the causes apart, give a trial of the healthy robot "
-                "to compare with (--healthy)."
+                "back_left_knee is stuck (30 %), or nothing is wrong (5 %), or something not named "
+                "here (5 %). Check the most probable first; to tell the causes apart, record a "
+                "longer trial, or one with other movements (such as another gait)."
+            ),
+        ),
+        (
+            {"verdict": "ambiguous", "indistinguishable": (OTHER,), "fit": None},
+            (
+                "One of these is true: the joint front_left_knee is stuck, or the joint "
+                "back_left_knee is stuck. Check these; to tell the causes apart, give a trial of "
+                "the healthy robot to compare with (--healthy)."
             ),
         ),
         (
@@ -295,7 +302,8 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
         ("sensor:front_left_touch=bias-0.2", "reads 20 % of its range too low"),
         ("payload:front=0.2", "a load of 20 % of its mass at the front"),
         ("payload=0.2", "a load of 20 % of its mass"),
-        ("damping:front_left_knee=100.0", "with 100 times its damping"),
+        ("damping:front_left_knee=100.0", "is too high, 100 times that of its model"),
+        ("damping:front_left_knee=0.5", "is too low, 0.5 times that of its model"),
     ],
 )
 def test_the_words_of_a_fault_say_its_direction_its_place_and_its_amount_without_a_power(

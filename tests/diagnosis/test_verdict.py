@@ -327,6 +327,16 @@ def test_each_hypothesis_that_is_said_to_be_alike_has_a_probability(
 
     assert found.indistinguishable == (one,)
     assert set(found.probability) == {LAME, str(one), "intact"}
+    alone = Problem(
+        lame.table,
+        lame.space,
+        lame.trials,
+        surrogate=lame.surrogate,
+        healthy_trials=(),
+        names=lame.names,
+        settings=lame.settings,
+    )
+    assert diagnosis_of(alone, [best], best).probability == {}, "nothing tells what is right"
 
 
 def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(

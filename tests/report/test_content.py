@@ -66,7 +66,7 @@ def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subje
     assert "or something not named here (" in found
     without = {"indistinguishable": others, "probability": {}}
     found = headline(with_verdict(subject, verdict="ambiguous", **without))
-    assert "or one of 2 others. Check the most probable" in found
+    assert "or one of 2 others. Check these; " in found
 
 
 def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: tuple[Shot, ...]):
