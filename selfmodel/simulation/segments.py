@@ -30,8 +30,8 @@ from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
 
 MAX_SEGMENTS, MAX_FOLLOWING = 40, 100
-"""Largest numbers of segments of a trial in which the base was observed, and of one in which it was
-not, so that segments follow each other."""
+"""Largest numbers of segments of a trial that was observed completely, and of one in which the base
+or a hinge was not, so that segments follow each other."""
 
 HORIZON = 10
 """Length of a segment, control steps."""
@@ -122,7 +122,8 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
 def _spread(trajectory: Trajectory) -> ObservedSegments | None:
     """Returns segments of the whole state, spread over the trial; None if there are too few.
 
-    With unknown hinges, which continue from the segment before, they follow each other.
+    With unknown hinges, which continue from the segment before, they follow each other; of a long
+    trial, those of two parts.
     """
     last = trajectory.steps - 1 - HORIZON
     if last < LEAD:
@@ -138,8 +139,7 @@ def _spread(trajectory: Trajectory) -> ObservedSegments | None:
     if any(np.isnan(states[signal][known]).any() for signal in estimation.JOINTS):
         begins = np.arange(LEAD, last + 1, HORIZON)
         whole = _all_known(known, begins)
-        if not whole.any():
-            return None
+        return _chained(trajectory, states, begins[whole], estimation.STATE)
     return _cut(trajectory, states, begins[whole], HORIZON, estimation.STATE)
 
 
@@ -155,13 +155,23 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     states = estimation.estimated_states(trajectory, estimation.ONBOARD)
     commanded = _all_known(_complete(trajectory["commands"]), begins)
     starts = begins[_known(states)[begins] & commanded]
+    cut = _chained(trajectory, states, starts, estimation.ONBOARD)
+    return cut if cut is not None and cut.valid.sum() >= HORIZON else None
+
+
+def _chained(
+    trajectory: Trajectory,
+    states: Mapping[Signal, FloatArray],
+    starts: IndexArray,
+    compared: tuple[Signal, ...],
+) -> ObservedSegments | None:
+    """Returns segments that follow each other, at most ``MAX_FOLLOWING``; None without any."""
     if not len(starts):
         return None
     rows, counted, chains = chained(len(starts), MAX_FOLLOWING)
-    cut = _cut(trajectory, states, starts[rows], HORIZON, estimation.ONBOARD)
+    cut = _cut(trajectory, states, starts[rows], HORIZON, compared)
     segments = replace(cut.segments, chains=chains)
-    cut = replace(cut, segments=segments, valid=cut.valid & counted[:, np.newaxis])
-    return cut if cut.valid.sum() >= HORIZON else None
+    return replace(cut, segments=segments, valid=cut.valid & counted[:, np.newaxis])
 
 
 def _consecutive(measured: Trajectory) -> ObservedSegments | str:

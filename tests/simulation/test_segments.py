@@ -71,15 +71,19 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[S
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
 
 
-def test_of_a_long_trial_without_the_base_two_parts_are_used_after_they_have_warmed_up():
+@pytest.mark.parametrize("without", ["base", "encoder"])
+def test_of_a_long_trial_without_the_base_two_parts_are_used_after_they_have_warmed_up(
+    without: str,
+):
     run = WHOLE.trajectory
     long = {signal: np.tile(values, (8, 1)) for signal, values in run.signals.items()}
     time = 0.01 * np.arange(8 * STEPS)
-    tried = replace(lacking(WHOLE, BASE), trajectory=replace(run, time=time, signals=long))
-    found = observed_segments(QUADRUPED, lacking(tried, BASE))
+    tried = replace(WHOLE, trajectory=replace(run, time=time, signals=long))
+    tried = lacking(tried, BASE) if without == "base" else without_encoders(tried, [3])
+    found = observed_segments(QUADRUPED, tried)
 
     assert (found.segments.chains, len(found.segments.starts)) == (2, MAX_FOLLOWING)
-    assert found.segments.starts[-1] == 8 * STEPS - 1 - HORIZON - (8 * STEPS - 1) % HORIZON
+    assert 8 * STEPS - 2 * HORIZON <= found.segments.starts[-1] < 8 * STEPS - HORIZON
     half = MAX_FOLLOWING // 2
     assert not found.valid[half : half + WARM_UP].any()
     assert found.valid.sum() == (MAX_FOLLOWING - WARM_UP) * HORIZON
