@@ -116,7 +116,8 @@ def read_settings(path: Path, extra: Mapping[str, Any] | None = None) -> MjcfSet
             loaded["assets"] = _folder_of(file, loaded["assets"])
         return checked_settings({**loaded, **(extra or {})})
     except InputError as error:
-        raise InputError(f"{file}: {error}") if loaded else error from None
+        advice = f": {file.name} has settings of {path.name}; give another file another name"
+        raise InputError(f"{file}: {error}{advice}") if loaded else error from None
 
 
 def _folder_of(file: Path, assets: object) -> str:

@@ -170,6 +170,7 @@ def test_the_settings_choose_the_sensors(tmp_path: Path):
         ("touch = 'left'", "needs a list of names"),
         ("ctrlrange = [1, -1]", "lower end first"),
         ("keyframe = 3", "name of a keyframe"),
+        ("[joints]", "another name"),
         ("forward", "in TOML"),
     ],
 )
