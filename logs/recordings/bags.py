@@ -238,14 +238,15 @@ def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
             f"transaction overwrote: roll it back with `sqlite3 {shlex.quote(str(file))} "
             f"'PRAGMA user_version=0'`, if the bag is from a source that you trust"
         )
-    files = [file, log] if _has_data(log) else [file]
-    # SQLite reads from many places.
-    found.digests.update({path.name: file_digest(path) for path in files})
-    if len(files) == 1:
+    if not _has_data(log):
+        found.digests[file.name] = file_digest(file)  # SQLite reads from many places
         yield from _rows(file)
         return
     with tempfile.TemporaryDirectory() as folder:
-        copy, *_ = [Path(shutil.copyfile(path, Path(folder, path.name))) for path in files]
+        # The recorder may still write: the digests are those of what is read.
+        copies = [Path(shutil.copyfile(path, Path(folder, path.name))) for path in (file, log)]
+        found.digests.update({path.name: file_digest(path) for path in copies})
+        copy = copies[0]
         with closing(sqlite3.connect(copy)) as database:
             database.execute("PRAGMA journal_mode=DELETE").fetchone()  # merges the log
         yield from _rows(copy)

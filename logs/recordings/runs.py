@@ -74,20 +74,23 @@ def _restarts_of(times: IntArray) -> Iterator[int]:
         return
     forward = np.diff(times) >= 0
     in_order = np.asarray(np.all(sliding_window_view(forward, _SUCCESSION - 1), axis=1))
-    start = 0
+    latest_after = np.maximum.accumulate(times[::-1])[::-1]
+    start = seen = 0
+    earliest = latest = times[0]
     candidates = np.flatnonzero(~forward[: len(in_order) - 1] & in_order[1:]) + 1
     for place in candidates.tolist():
         # Without the sample before it, which may be a single wrong one.
-        before = times[start : place - 1]
-        if not len(before):
+        before, seen = times[seen : place - 1], place - 1
+        if seen <= start:
             continue
-        latest = before.max()
-        back = min(_MIN_RETURN, (latest - before.min()) // 2)
+        earliest, latest = min(earliest, before.min()), max(latest, before.max())
+        back = min(_MIN_RETURN, (latest - earliest) // 2)
         returns = times[place] < latest - back and times[place + _SUCCESSION - 1] < latest
         # Parts in the wrong order, of which the second ends as the first begins, are sorted.
-        if returns and not -_MIN_RETURN < times[place:].max() - before.min() < 0:
+        if returns and not -_MIN_RETURN < latest_after[place] - earliest < 0:
             yield place
-            start = place
+            start = seen = place
+            earliest = latest = times[place]
 
 
 def _part(series: Series, start: int, end: int) -> Series:
