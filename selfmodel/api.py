@@ -22,6 +22,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.progress import ignore
 from selfmodel.recovery import recover as recovery_loop
 from selfmodel.recovery.measurable import check_measurable, observed_of
 from selfmodel.recovery.repair import RepairSearch
@@ -39,10 +40,6 @@ from selfmodel.trials.trajectory import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
-def _ignore(_event: object) -> None:
-    """Default callback, which ignores the event."""
-
-
 def evolve_controller(
     robot: RobotSource,
     hypothesis: Hypothesis | str = INTACT,
@@ -53,7 +50,7 @@ def evolve_controller(
     score: Score = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
-    on_event: Callable[[Event], None] = _ignore,
+    on_event: Callable[[Event], None] = ignore,
 ) -> Controller:
     """Returns the controller with the largest score that the repair EA finds.
 
@@ -238,7 +235,7 @@ def diagnose(
     calibrate: bool = True,
     seed: int | None = None,
     threads: int = 0,
-    on_event: Callable[[Event], None] = _ignore,
+    on_event: Callable[[Event], None] = ignore,
 ) -> Diagnosis:
     """Returns the hypotheses that explain logged trials, ranked, with a verdict.
 
@@ -298,6 +295,7 @@ def diagnose(
         seed=seed,
         calibrate=calibrate,
         threads=threads,
+        on_event=on_event,
     ).run(on_event)
 
 
@@ -319,7 +317,7 @@ def recover(
     repertoire: Repertoire | str | Path | None = None,
     seed: int = 0,
     threads: int = 0,
-    on_event: Callable[[Event], None] = _ignore,
+    on_event: Callable[[Event], None] = ignore,
 ) -> Recovery:
     """Runs a recovery: the robot walks, fails, is diagnosed from its logs, and walks again.
 
@@ -384,7 +382,9 @@ def recover(
         on_event=on_event,
         design=drawn,
         kinds=searched,
-        calibrate=partial(arguments.fitted, robot, threads=count) if calibrate else None,
+        calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event)
+        if calibrate
+        else None,
         next_trial=next_trial,
         score=score,
         make_repair=make_repair,
@@ -439,10 +439,7 @@ class LogDiagnosis:
     seed: int
 
     def run(self, on_event: Callable[[Event], None]) -> Diagnosis:
-        """Returns the diagnosis of the trials; the events begin with the inputs."""
-        on_event(self.comparator)
-        if self.calibration is not None:
-            on_event(self.calibration)
+        """Returns the diagnosis of the trials."""
         return recovery_loop.diagnose_trials(self.damaged, self.search, self.seed, on_event)
 
 
@@ -457,6 +454,7 @@ def set_up_diagnosis(
     seed: int | None,
     calibrate: bool,
     threads: int,
+    on_event: Callable[[Event], None],
 ) -> LogDiagnosis:
     """Returns the inputs of a diagnosis: chooses the comparator, then calibrates.
 
@@ -466,14 +464,18 @@ def set_up_diagnosis(
         InputError: As for ``diagnose``.
     """
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
-    fit = arguments.fitted(robot, healthy, count) if calibrate and healthy else None
+    on_event(chosen)
+    fitted = partial(arguments.fitted, robot, threads=count, observer=on_event)
+    fit = fitted(healthy) if calibrate and healthy else None
+    if fit is not None:
+        on_event(fit)
     search = DiagnosticSearch(
         Simulator(fit.robot if fit else robot, count),
         chosen.comparator,
         settings,
         kinds,
         healthy_trials=healthy,
-        calibrate=partial(arguments.fitted, robot, threads=count) if fit else None,
+        calibrate=fitted if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
     return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn)

@@ -21,6 +21,7 @@ from selfmodel.files import encodable, file_digest, read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
+from selfmodel.progress import Observer, ignore
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import check_compiles, load_mjcf
@@ -210,14 +211,16 @@ def repertoire_of(
     return found
 
 
-def fitted(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+def fitted(
+    robot: Robot, trials: Sequence[Trial], threads: int, observer: Observer = ignore
+) -> Calibration:
     """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
     Raises:
         InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
-        return calibrate(robot, trials, threads)
+        return calibrate(robot, trials, threads, observer)
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

@@ -19,7 +19,9 @@ ROOMS = (
 """The rooms, in the order in which data flows: each may import itself and the rooms before it. Some
 are a file: plug-ins, arguments, the public functions, and contract checks."""
 
-VOCABULARY = ("arrays", "errors", "files", "isolation", "settings", "evolution", "version")
+VOCABULARY = (
+    *("arrays", "errors", "files", "isolation", "settings", "evolution", "progress", "version"),
+)
 """The files beside the rooms, which every room may import."""
 
 WITHOUT_SIMULATOR = (

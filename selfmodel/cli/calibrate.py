@@ -8,6 +8,7 @@ from selfmodel import arguments
 from selfmodel.cli.commands import Calibrate
 from selfmodel.cli.inputs import check_new_file
 from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.progress import display
 from selfmodel.cli.tables import show
 from selfmodel.errors import InputError
 from selfmodel.logs.files import create_file
@@ -30,7 +31,9 @@ def calibrate(options: Calibrate) -> None:
             f"--robot a model without them, or give these logs to diagnose, which calibrates by "
             f"itself"
         )
-    fit = fit_to(before, [log.trial for log in logs], thread_count(options.threads))
+    with display() as observer:
+        trials = [log.trial for log in logs]
+        fit = fit_to(before, trials, thread_count(options.threads), observer)
     with create_file(options.out) as file:
         file.write(fit.robot.mjcf.encode())
     result: dict[str, Any] = {

@@ -97,19 +97,20 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
         settings = dataclasses.replace(settings, generations=options.generations)
     if options.population is not None:
         settings = settings.scaled(options.population)
-    inputs = set_up_diagnosis(
-        failed,
-        healthy,
-        robot=robot,
-        choose_comparator=comparator,
-        kinds=kinds,
-        settings=settings,
-        seed=options.seed,
-        calibrate=options.calibrate,
-        threads=options.threads,
-    )
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
+        inputs = set_up_diagnosis(
+            failed,
+            healthy,
+            robot=robot,
+            choose_comparator=comparator,
+            kinds=kinds,
+            settings=settings,
+            seed=options.seed,
+            calibrate=options.calibrate,
+            threads=options.threads,
+            on_event=on_event,
+        )
         diagnosis = inputs.run(on_event)
     return DiagnosedLogs(tuple(explained), robot, inputs, diagnosis)
 

@@ -1,4 +1,4 @@
-"""Progress on standard error: lines of what is finished, and a bar on a terminal."""
+"""Progress on standard error: a bar on a terminal, and lines of what is finished."""
 
 import math
 import sys
@@ -13,6 +13,7 @@ from selfmodel.cli.tables import text_console
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
+from selfmodel.progress import Progress
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.studies.grid import CellEnds, GridBegins
@@ -20,6 +21,9 @@ from selfmodel.trials.trial import Trial
 
 _SEARCHES = {"repair": "repair", "diagnostic": "diagnostic EA"}
 """Text of each kind of search."""
+
+QUIET = 10.0
+"""Time between two lines of the progress of a stage where standard error is no terminal, s."""
 
 
 def displacement_text(trial: Trial) -> str:
@@ -40,12 +44,13 @@ class Display:
 
 
 @contextmanager
-def _bar(*columns: bars.ProgressColumn) -> Iterator[bars.Progress | None]:
+def _bar(*columns: bars.ProgressColumn, transient: bool = False) -> Iterator[bars.Progress | None]:
     """Yields a progress bar on standard error; None where that is no terminal."""
     if not sys.stderr.isatty():
         yield None
         return
-    with bars.Progress(*columns, console=text_console(stderr=True), expand=True) as progress:
+    console = text_console(stderr=True)
+    with bars.Progress(*columns, console=console, transient=transient, expand=True) as progress:
         yield progress
 
 
@@ -57,9 +62,9 @@ def display(
 
     ``describe`` returns the result of a trial as text.
     """
-    names = ("{task.description}", "best {task.fields[best]}", "{task.fields[rate]}/s")
-    text, best, rate = map(bars.TextColumn, names)
-    with _bar(text, bars.BarColumn(bar_width=None), bars.MofNCompleteColumn(), best, rate) as bar:
+    names = ("{task.description}", "{task.percentage:.0f} %", "{task.fields[detail]}")
+    text, share, detail = map(bars.TextColumn, names)
+    with _bar(text, bars.BarColumn(bar_width=None), share, detail, transient=True) as bar:
         yield _Events(bar, describe)
 
 
@@ -67,53 +72,88 @@ class _Events(Display):
     def __init__(self, bar: bars.Progress | None, describe: Callable[[Trial], str]) -> None:
         super().__init__(bar)
         self._describe = describe
-        self._search = ""
-        self._task: bars.TaskID | None = None
+        self._search = self._kind = self._stage = ""
+        self._start = self._told = monotonic()
 
     def __call__(self, event: Event) -> None:
         match event:
             case SearchBegins(kind, hypothesis):
                 purpose = "" if hypothesis is None else f" for {hypothesis}"
-                self._search = f"{_SEARCHES[kind]}{purpose}"
-                if self.bar:
-                    # Without the hypothesis, the bar fits a narrow terminal.
-                    self._task = self.bar.add_task(_SEARCHES[kind], total=None, best="-", rate="-")
+                # Without the hypothesis, the bar fits a narrow terminal.
+                self._kind, self._search = _SEARCHES[kind], f"{_SEARCHES[kind]}{purpose}"
+                self._show(Progress(self._kind, 0, 1))
             case Generation():
+                best = f"best {event.best:.3f}, {_rate(event)}/s"
+                self._show(Progress(self._kind, event.number, event.total), best)
+                if event.number == event.total:
+                    self.print_line(f"{self._search}: {_end(event)}")
+            case Progress():
                 self._show(event)
-            case ChosenComparator():
-                self.print_line(f"comparator {event.comparator.name}: {event.reason}")
-            case Calibration():
-                for line in _fit_lines(event):
+            case _:
+                for line in self._lines(event):
                     self.print_line(line)
+
+    def _lines(self, event: Event) -> list[str]:
+        """Returns the lines of an event other than the progress of a stage."""
+        match event:
+            case ChosenComparator():
+                return [f"comparator {event.comparator.name}: {event.reason}"]
+            case Calibration():
+                return _fit_lines(event)
             case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
-                self.print_line(f"the next trial discriminates between: {apart}")
+                return [f"the next trial discriminates between: {apart}"]
             case Trial():
-                self.print_line(f"trial {event.plan.name}: {self._describe(event)}")
+                return [f"trial {event.plan.name}: {self._describe(event)}"]
             case Diagnosis():
                 best = event.ranked[0]
                 finite = math.isfinite(best.distance)
                 distance = f"distance {best.distance:.4f}" if finite else "diverged"
-                self.print_line(
-                    f"diagnosis from {counted(event.trials, 'trial')}: "
-                    f"{best.hypothesis} ({distance}), {event.verdict}"
-                )
+                trials = counted(event.trials, "trial")
+                return [f"diagnosis from {trials}: {best.hypothesis} ({distance}), {event.verdict}"]
+        return []
 
-    def _show(self, now: Generation) -> None:
-        rate = f"{now.evaluations / now.seconds:.0f}" if now.seconds else "-"
-        ends = now.number == now.total
-        if self.bar and self._task is not None:
-            self.bar.update(self._task, total=now.total, completed=now.number)
-            self.bar.update(self._task, best=f"{now.best:.3f}", rate=rate)
-            if ends:
-                self.bar.remove_task(self._task)
-        if ends:
-            diverged = now.best == -math.inf
-            self.print_line(
-                f"{self._search}: {counted(now.number, 'generation')}, "
-                f"{counted(now.evaluations, 'evaluation')}, {rate}/s, "
-                f"{'every simulation diverged' if diverged else f'best {now.best:.4f}'}"
-            )
+    def _show(self, now: Progress, detail: str = "") -> None:
+        """Shows a stage, on one bar for all, or by a line now and then."""
+        time, share = monotonic(), now.done / now.total
+        if now.stage != self._stage or not share:
+            self._stage, self._start = now.stage, time
+        left = time_left(share, time - self._start)
+        if self.bar:
+            for task in self.bar.task_ids:
+                self.bar.remove_task(task)
+            if share < 1:
+                words = ", ".join(filter(None, (detail, left)))
+                self.bar.add_task(now.stage, total=100, completed=round(100 * share), detail=words)
+        elif left and time - self._told >= QUIET:
+            self._told = time
+            self.print_line(f"{now.stage}: {share:.0%}, {left}")
+
+
+def time_left(share: float, seconds: float) -> str:
+    """Returns the time left as text, of a stage of which a share is done; nothing if unknown.
+
+    Examples:
+        >>> time_left(0.25, 20.0)
+        'about 1 min 00 s left'
+    """
+    if not 0 < share < 1:
+        return ""
+    minutes, left = divmod(max(round(seconds * (1 - share) / share), 1), 60)
+    return f"about {minutes} min {left:02d} s left" if minutes else f"about {left} s left"
+
+
+def _rate(now: Generation) -> str:
+    return f"{now.evaluations / now.seconds:.0f}" if now.seconds else "-"
+
+
+def _end(last: Generation) -> str:
+    diverged = last.best == -math.inf
+    return (
+        f"{counted(last.number, 'generation')}, {counted(last.evaluations, 'evaluation')}, "
+        f"{_rate(last)}/s, "
+        f"{'every simulation diverged' if diverged else f'best {last.best:.4f}'}"
+    )
 
 
 def _fit_lines(fit: Calibration) -> list[str]:

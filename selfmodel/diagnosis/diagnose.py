@@ -8,7 +8,7 @@ Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulat
 differences of two hypotheses' losses, over all times afterwards.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -23,11 +23,12 @@ from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import Calibrate, LossFunction, LossTable, Problem, Timeline
 from selfmodel.diagnosis.search import LocalSearch, evolved
 from selfmodel.diagnosis.verdict import diagnosis_of
-from selfmodel.evolution import GenerationCallback
+from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.progress import Progress
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, trial_names
@@ -86,11 +87,12 @@ class DiagnosticSearch:
         trials: Sequence[Trial],
         seeds: Sequence[Hypothesis],
         rng: np.random.Generator,
-        on_generation: GenerationCallback,
+        observer: Callable[[Generation | Progress], None],
     ) -> Diagnosis:
         """Returns the diagnosis of at least one trial.
 
-        ``seeds`` are hypotheses of the initial population, in addition to random ones.
+        ``seeds`` are hypotheses of the initial population, in addition to random ones. The
+        ``observer`` is called after each generation, and with the progress of each later stage.
         """
         table, coarse_trials = surrogate = self.losses.surrogate(trials)
         problem = Problem(
@@ -102,10 +104,11 @@ class DiagnosticSearch:
             names=trial_names(trials),
             settings=self._settings,
             calibrate=self._calibrate,
+            observer=observer,
         )
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
-            distances, self._space, self._settings, seeds, rng, on_generation=on_generation
+            distances, self._space, self._settings, seeds, rng, on_generation=observer
         )
         self.evaluations += evaluations
         self._proposed.update(ranked)

@@ -28,6 +28,10 @@ from selfmodel.diagnosis.losses import Problem
 from selfmodel.diagnosis.search import LocalSearch, with_fitted_severity
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import Fault
+from selfmodel.progress import followed
+
+STAGE = "faults of joints"
+"""Name of this search in its progress."""
 
 JOINTS_TRIED, KINDS_FITTED = 3, 3
 """Joints that are tried for an addition, and kinds whose severities are fitted, best first."""
@@ -40,7 +44,8 @@ def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
     """
     joints = _JointSearch(best, search)
     current = best
-    for joint in _joints_of(best.faults, search.problem):
+    faulty = _joints_of(best.faults, search.problem)
+    for joint in followed(faulty, STAGE, search.problem.observer):
         current = joints.replaced(current, joint)
     while len(current) < search.problem.settings.genes:
         added = joints.with_one_more(current)
@@ -114,7 +119,7 @@ class _JointSearch:
             for name, z in excess.items()
             if z >= significance.MIN_EXCESS_OF_JOINT and name not in faulty
         ]
-        for joint in suspects[:JOINTS_TRIED]:
+        for joint in followed(suspects[:JOINTS_TRIED], STAGE, self._problem.observer):
             levels = self._best_levels(current, joint)
             # A level near the true severity is much better already: fits cost most of this search.
             if not levels or not self._is_better_at(joint, levels[0], current):

@@ -23,6 +23,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault
+from selfmodel.progress import Observer, ignore
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -310,6 +311,7 @@ class Problem:
         settings: Parameters of the search.
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
+        observer: Called with the progress of each stage.
 
     Attributes:
         healthy_motions: Healthy trials, and healthy parts of the trials to explain.
@@ -328,9 +330,10 @@ class Problem:
         settings: Settings,
         calibrate: Calibrate | None = None,
         healthy_parts: Parts = (),
+        observer: Observer = ignore,
     ) -> None:
         self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
-        self.calibrate = calibrate
+        self.calibrate, self.observer = calibrate, observer
         self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
         self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
@@ -362,6 +365,7 @@ class Problem:
             settings=self.settings,
             calibrate=self.calibrate,
             healthy_parts=healthy_trials,
+            observer=self.observer,
         )
 
     @cached_property

@@ -42,6 +42,7 @@ from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace
 from selfmodel.faults.kind import Fault
+from selfmodel.progress import followed
 from selfmodel.settings import Settings
 
 Neighbours = Callable[[Hypothesis], list[Hypothesis]]
@@ -134,9 +135,15 @@ class LocalSearch:
         fitted = partial(with_fitted_severities, space=self._space)
         levels = partial(fitted, losses=self.coarse, zooms=0)
         proposed = dict.fromkeys([*known, INTACT, *self.best_single_faults[:STARTS]])
-        starts = dict.fromkeys(self.pruned(levels(start)) for start in proposed)
-        local_optima = {optimum for start in starts for optimum in self.local_optima(start)}
-        refits = {self.pruned(fitted(optimum, losses=self.coarse)) for optimum in local_optima}
+        step = partial(followed, stage="refinement", observer=self.problem.observer, parts=3)
+        starts = dict.fromkeys(self.pruned(levels(start)) for start in step([*proposed], before=0))
+        local_optima = {
+            optimum for start in step([*starts], before=1) for optimum in self.local_optima(start)
+        }
+        refits = {
+            self.pruned(fitted(optimum, losses=self.coarse))
+            for optimum in step([*local_optima], before=2)
+        }
         chosen = INTACT
         for hypothesis in sorted(refits, key=lambda one: (len(one), self.total_loss(one), one)):
             if significance.is_better(*self.losses([hypothesis, chosen])):

@@ -29,6 +29,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.faults.registry import ALL_KINDS
+from selfmodel.progress import Observer, followed, ignore
 from selfmodel.trials.trial import have_one_gait
 
 EQUAL_DISTANCES = "equal distances"
@@ -108,7 +109,9 @@ def diagnosis_of(
         probability = probabilities(best, some, fit, misses=misses)
     has_severities = problem.has_test and not best and doubt is None
     severities = (
-        detectable_severities(best, problem.space, problem.losses) if has_severities else []
+        detectable_severities(best, problem.space, problem.losses, problem.observer)
+        if has_severities
+        else []
     )
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in order[:kept]),
@@ -239,7 +242,10 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     )
     smaller = [one for one in neighbours if len(one) <= len(best) and not _has_more(one, best)]
     few = best_severities(by_total_loss(smaller, problem.coarse))[: search.SHORTLIST_SIZE]
-    fitted = [_with_fitted_others(one, best, problem) for one in few]
+    fitted = [
+        _with_fitted_others(one, best, problem)
+        for one in followed(few, "alternatives", problem.observer)
+    ]
     others = [one for one in dict.fromkeys([*few, *fitted, INTACT]) if not _has_more(one, best)]
     leads = {}
     for one in by_total_loss(others, problem.losses):
@@ -368,7 +374,7 @@ def _largest_gains(
 
 
 def detectable_severities(
-    best: Hypothesis, space: HypothesisSpace, losses: LossFunction
+    best: Hypothesis, space: HypothesisSpace, losses: LossFunction, observer: Observer = ignore
 ) -> list[DetectableSeverity]:
     """Returns the smallest detectable severities of every kind with a nominal severity.
 
@@ -399,7 +405,9 @@ def detectable_severities(
                 (fault, [(nominal + side[0]) / 2, *side] if side else []) for side in (below, above)
             ]
     low, high = [0 for _ in sides], [len(severities) for _, severities in sides]
-    while undecided := [i for i in range(len(sides)) if low[i] < high[i]]:
+    rounds = range(max(high, default=0).bit_length())
+    for _ in followed(rounds, "detectable severities", observer):
+        undecided = [i for i in range(len(sides)) if low[i] < high[i]]
         middles = {i: (low[i] + high[i]) // 2 for i in undecided}
         tried = [replace(sides[i][0], severity=sides[i][1][k]) for i, k in middles.items()]
         candidates = [space.canonical([*best.faults, fault]) for fault in tried]

@@ -10,6 +10,7 @@ from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.progress import Progress
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
@@ -33,6 +34,7 @@ class DiscriminatingTrial:
 Event = (
     SearchBegins
     | Generation
+    | Progress
     | ChosenComparator
     | Calibration
     | DiscriminatingTrial
@@ -40,7 +42,8 @@ Event = (
     | Diagnosis
 )
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
-a search, the chosen comparator, the calibration, a finished trial, a diagnosis."""
+a search, the progress of another stage, the chosen comparator, the calibration, a finished trial, a
+diagnosis."""
 
 
 @dataclass(frozen=True, eq=False)

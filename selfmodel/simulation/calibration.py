@@ -3,7 +3,7 @@
 See ``fit`` for the sets of parameters, their fit and its test.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,9 +12,10 @@ from threadpoolctl import threadpool_limits
 
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
+from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
-from selfmodel.simulation.fit import NOMINAL, Fit, is_determined, nested_fits
+from selfmodel.simulation.fit import NOMINAL, Fit, expected_models, is_determined, nested_fits
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
 from selfmodel.simulation.segments import SegmentErrors, observed_segments, root_mean_square
@@ -23,6 +24,9 @@ from selfmodel.trials.trial import Trial
 EXACT_ERROR = 0.01
 """Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model counts as
 exact."""
+
+STAGE = "calibration"
+"""Name of the calibration in its progress."""
 
 UNDETERMINED = "not determined by these trials"
 """Mark of a factor whose deviation is not clearly below that of its prior."""
@@ -127,7 +131,9 @@ class Calibration:
         return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibration:
+def calibrate(
+    robot: Robot, trials: Sequence[Trial], threads: int, observer: Observer = ignore
+) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
     The result does not depend on the number of threads. A set of parameters is kept only if it
@@ -141,6 +147,8 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
 
     With a fixed base, gain, damping, dry friction and armature are fitted to joint positions.
 
+    The ``observer`` is called with the progress of the fit.
+
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
             diverged.
@@ -148,7 +156,10 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
     if not trials:
         raise InputError("expected at least one trial of the healthy robot, got none")
     with threadpool_limits(1, "blas"):  # several round sums differently
-        segments = _segment_errors(robot, trials, threads)
+        most = expected_models(robot)
+        segments = _segment_errors(
+            *(robot, trials, threads), lambda done: observer(Progress(STAGE, min(done, most), most))
+        )
         before = segments.of([nominal(robot)])[:, 0]
         prior = model_factors.prior_deviations(robot)
         first = Fit(NOMINAL, nominal(robot), prior, before, before)
@@ -164,6 +175,7 @@ def calibrate(robot: Robot, trials: Sequence[Trial], threads: int) -> Calibratio
             np.concatenate([own[quantity] for quantity in (*model_factors.SHARED, "motor_gains")])
             for own in (best.deviations, prior)
         )
+        observer(Progress(STAGE, most, most))
         loss, loss_before = (segments.losses(own.held_out).mean() for own in (best, first))
         is_fixed, parameters = robot.has_fixed_base, best.parameters
         return Calibration(
@@ -193,8 +205,14 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     return float(root_mean_square(errors))
 
 
-def _segment_errors(robot: Robot, trials: Sequence[Trial], threads: int) -> SegmentErrors:
-    return SegmentErrors(robot, [observed_segments(robot, trial) for trial in trials], threads)
+def _segment_errors(
+    robot: Robot,
+    trials: Sequence[Trial],
+    threads: int,
+    on_models: Callable[[int], None] = lambda _: None,
+) -> SegmentErrors:
+    data = [observed_segments(robot, trial) for trial in trials]
+    return SegmentErrors(robot, data, threads, on_models)
 
 
 def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:

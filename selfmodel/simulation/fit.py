@@ -21,6 +21,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY, as_delay
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import Basis, Parameters, bases, prior_deviations
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
 
@@ -144,6 +145,29 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
     return chosen
 
 
+def expected_models(robot: Robot) -> int:
+    """Returns about how many models a calibration simulates, for its progress."""
+    delays, count = MAX_CONTROL_DELAY + 1, 1
+    if robot.has_fixed_base:
+        method, parts = FIXED, delay_parts(robot)
+        tried = delays + 2 * parts.bit_length()
+    else:
+        method, tried = FLOATING, 0
+        count += delays + len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS)
+    for _, basis in bases(robot):
+        width = len(basis.prior)
+        slopes = 2 * width if method.is_central else width
+        count += (method.iterations + tried * method.delay_iterations) * (slopes + 2)
+        count += 2 * width + FOLDS + 2
+        tried = 2  # neighbouring delays of a set after the first
+    return count
+
+
+def delay_parts(robot: Robot) -> int:
+    """Returns the parts of a control step of which a delay is a multiple."""
+    return 1 if robot.model.na else robot.substeps
+
+
 def _cost(errors: FloatArray) -> float:
     return float(np.sum(pseudo_huber(errors) ** 2))
 
@@ -215,18 +239,12 @@ class _Fitter:
         x = np.asarray(fitted.ravel())
         return basis.applied(start, x), x
 
-    @property
-    def _delay_parts(self) -> int:
-        """Parts of a control step of which a delay is a multiple."""
-        robot = self.segments.robot
-        return 1 if robot.model.na else robot.substeps
-
     def with_best_delay(self, start: Parameters) -> Parameters:
         """Returns the fit with the best delay: of whole control steps, then of parts of one.
 
         A wrong gain or damping looks like a wrong delay, so each is tried with a short fit.
         """
-        parts, solved = self._delay_parts, dict[int, tuple[float, Parameters]]()
+        parts, solved = delay_parts(self.segments.robot), dict[int, tuple[float, Parameters]]()
 
         def cost(delay: int) -> float:
             if delay not in solved:
@@ -248,7 +266,7 @@ class _Fitter:
 
         The delay moves by a physics step at a time, as long as the fit improves.
         """
-        iterations, parts = self.method.delay_iterations, self._delay_parts
+        iterations, parts = self.method.delay_iterations, delay_parts(self.segments.robot)
         best, delays = (start, x), range(MAX_CONTROL_DELAY * parts + 1)
         least = _cost(self.segments.of([start])) if iterations else 0.0
         for direction in (-1, 1) if iterations else ():

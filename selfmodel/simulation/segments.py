@@ -6,7 +6,7 @@ servos hold them to the commands, and in a second the commands move the joints t
 shows gains, friction and inertia.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -268,11 +268,15 @@ def pseudo_huber(errors: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SegmentErrors:
-    """Errors of predictions of the segments of healthy trials with models of a robot."""
+    """Errors of predictions of the segments of healthy trials with models of a robot.
+
+    ``on_models`` is called with the number of models so far, after each batch.
+    """
 
     robot: Robot
     data: Sequence[ObservedSegments]
     threads: int
+    on_models: Callable[[int], None] = lambda _: None
     stats: SimulationStats = field(default_factory=SimulationStats)
 
     @cached_property
@@ -357,6 +361,7 @@ class SegmentErrors:
                 with np.errstate(over="ignore", invalid="ignore"):  # bounded below
                     error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
                     rows.append((error / CALIBRATION_ERROR_SCALES[signal])[:, mask])
+        self.on_models(self.stats.runs // len(self.data))
         errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
         return np.clip(errors, -MAX_ERROR, MAX_ERROR)
 

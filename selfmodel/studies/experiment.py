@@ -128,7 +128,9 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         gait=experiment.gait,
         design=experiment.design,
         kinds=experiment.kinds,
-        calibrate=partial(fitted, robot, threads=threads) if experiment.calibrated else None,
+        calibrate=partial(fitted, robot, threads=threads, observer=on_event)
+        if experiment.calibrated
+        else None,
         next_trial=plugins.NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
         make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),

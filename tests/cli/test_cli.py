@@ -119,7 +119,7 @@ def test_the_same_seed_gives_the_same_in_another_process(short: tuple[Path, dict
 
 def test_progress_goes_to_standard_error_in_plain_lines_when_piped(recovery: tuple[Path, Done]):
     _, done = recovery
-    lines = done.stderr.splitlines()
+    lines = [line for line in done.stderr.splitlines() if not line.endswith(" left")]  # if slow
     begins = [
         *("repair for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
         *("comparator segment-prediction: ", "diagnostic EA:"),

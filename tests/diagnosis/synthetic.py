@@ -8,6 +8,7 @@ import numpy as np
 from selfmodel.diagnosis.losses import LossFunction, Problem
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.progress import ignore
 from selfmodel.settings import Settings
 
 HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
@@ -39,7 +40,7 @@ class Synthetic(Problem):
     ) -> None:
         self.space, self.settings, self.has_test = space, Settings(genes=most), True
         self.trials, self.healthy_trials, self._observed_comparable = ["damaged"], [], ["healthy"]
-        self.losses = losses
+        self.losses, self.observer = losses, ignore
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
         self.table = SimpleNamespace(by_hinge=self._by_hinge)

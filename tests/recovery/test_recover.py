@@ -30,6 +30,7 @@ from selfmodel.logs.journal import create_journal
 from selfmodel.logs.log_file import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.progress import Progress
 from selfmodel.recovery import recover as module
 from selfmodel.recovery.next_trial import discriminating_controller
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, diagnose_trials
@@ -142,7 +143,7 @@ def test_a_recovery_follows_the_paper_and_simulates_nothing_twice(watched: Simpl
     order = [
         event.kind if isinstance(event, SearchBegins) else type(event).__name__
         for event in events
-        if not isinstance(event, Generation)
+        if not isinstance(event, Generation | Progress)
     ]
 
     first, once = ["repair", "Trial", "Trial", "ChosenComparator"], ["diagnostic", "Diagnosis"]
