@@ -49,6 +49,7 @@ class _Offer:
         touches: Lines of the table of a touch sensor, by names that may be of one.
         known: All names of a table.
         notes: Warnings about the recording.
+        period: Usual time between two commands, s; 0 if unknown.
     """
 
     what: str
@@ -57,6 +58,7 @@ class _Offer:
     touches: Mapping[str, Sequence[str]]
     known: Sequence[str] = field(default=())
     notes: Sequence[str] = field(default=())
+    period: float = 0.0
 
 
 def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
@@ -69,12 +71,13 @@ def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
         with_timestep: Whether the mapping must contain the control time step.
     """
     offer = _in_table(path, robot) if is_table(path) else _in_bag(read_bag(path), robot)
-    step = repr(robot.control_timestep)
+    physics = float(robot.model.opt.timestep)
+    step = max(robot.control_timestep, round(physics * round(offer.period / physics), 9))
     lines = [
         "# A suggestion. CHECK marks a guess; CHANGE must be filled in before it can be used.",
         *(f"# Note: {escaped(note)}." for note in offer.notes),
         f"robot = {quoted(name)}",
-        *[f"control_timestep = {step}  # s; CHECK: how often the robot is commanded"]
+        *[f"control_timestep = {step!r}  # s; CHECK: how often the robot is commanded"]
         * with_timestep,
         '# controller = "gait.npz"  # controller of the robot, if known',
         '# stage = "before"  # of the healthy robot',
@@ -217,9 +220,11 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
     for topic in tables:
         vectors = classified(series[topic].names).vectors["imu"]
         of_imu = of_imu or [_topic([topic]), *_vectors(vectors)] if vectors else of_imu
+    sent = [series[topic].logged for topic in commands[:1] if series[topic].count > 1]
     return _Offer(
         what="bag",
         notes=bag.notes,
+        period=float(np.median(np.diff(sent[0]))) / 1e9 if sent else 0.0,
         heads={
             "": ['clock = "header"  # or "log", if the time stamps are of another clock'],
             "joints": [_topic(joints), unit],

@@ -51,6 +51,14 @@ def test_commands_without_names_get_an_order_to_check(biped: Robot, bag: Path):
     assert imported(bag, biped, text).trajectory.steps == 99
 
 
+def test_the_control_time_step_is_that_of_the_commands(biped: Robot, tmp_path: Path):
+    items = recorded()
+    commands = [item for item in items if item[0] == "/commands"][::3]
+    others = [item for item in items if item[0] != "/commands"]
+    bag = write_bag(tmp_path / "bag", [*others, *commands])
+    assert "control_timestep = 0.03" in suggest(bag, biped, "biped.xml", with_timestep=True)
+
+
 def test_names_that_hold_anything_stay_names(biped: Robot, tmp_path: Path):
     names = ['LHX\n"', "left\x1b[31m_hip_y\\", "right hip é x", "RHY"]
     items = [("/joints", T0, joint_state(T0, names, [0.0] * 4))]
