@@ -1,4 +1,4 @@
-"""``python -m benchmarks.other_engine``: recoveries of robots in PyBullet, and their table.
+"""``python -m benchmarks.other_engine``: recoveries and recordings of robots in PyBullet.
 
 It needs PyBullet: ``pip install --group other-engine``.
 """
@@ -35,6 +35,11 @@ def main() -> None:
     transfer.add_argument("robot", choices=tuple(ROBOTS))
     transfer.add_argument("gaits", type=Path, nargs="+", help="files of controllers")
     transfer.add_argument("--seeds", type=int, default=3, help="number of robots in PyBullet")
+    record = add("record", help="write recordings of an A1, for `benchmarks.foreign score`")
+    record.add_argument("out", type=Path, help="folder of the recordings")
+    record.add_argument("--cases", nargs="*", help="names [all]")
+    record.add_argument("--seeds", type=int, nargs="*", default=[0])
+    record.add_argument("--own-gait", action="store_true", help="another than healthy trials")
     options = parser.parse_args()
     try:
         _run(options)
@@ -48,7 +53,7 @@ def main() -> None:
 
 def _run(options: argparse.Namespace) -> None:
     # Here, so that --help needs no PyBullet.
-    from benchmarks.other_engine import recovery  # noqa: PLC0415  # see above
+    from benchmarks.other_engine import recordings, recovery  # noqa: PLC0415  # see above
 
     match options.command:
         case "recover":
@@ -70,6 +75,11 @@ def _run(options: argparse.Namespace) -> None:
             robot = ROBOTS[options.robot].robot()
             for line in recovery.transfer_lines(robot, options.gaits, range(options.seeds)):
                 print(line, flush=True)
+        case "record":
+            for seed in options.seeds:
+                for case in options.cases or recordings.RECORDED:
+                    plan = recordings.Plan(case, seed, options.own_gait)
+                    print(recordings.record(options.out, plan), flush=True)
 
 
 if __name__ == "__main__":

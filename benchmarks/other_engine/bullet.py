@@ -12,6 +12,7 @@ import pybullet
 from scipy.spatial.transform import Rotation
 
 from benchmarks.other_engine.reality import SUBSTEP, Damage, Reality
+from benchmarks.other_engine.urdf import fix, part, scale
 from selfmodel.errors import InputError
 from selfmodel.logs.viewers import urdf as exported_urdf
 from selfmodel.robot.robot import Robot
@@ -201,10 +202,10 @@ def damaged_urdf(robot: Robot, reality: Reality, damage: Damage) -> str:
     joints = {joint.get("name"): joint for joint in tree.findall("joint")}
     links = {link.get("name"): link for link in tree.findall("link")}
     for hinge in damage.lost:
-        tree.remove(links[_part(joints[hinge], "child").get("link")])
+        tree.remove(links[part(joints[hinge], "child").get("link")])
         tree.remove(joints[hinge])
     for hinge, angle in damage.fixed.items():
-        _fix(joints[hinge], angle)
+        fix(joints[hinge], angle)
     return ET.tostring(tree, encoding="unicode")
 
 
@@ -220,9 +221,7 @@ def _complete(link: ET.Element, model: mujoco.MjModel, reality: Reality) -> None
         ET.SubElement(inertial, "inertia", axes, ixy="0", ixz="0", iyz="0")
         return
     body = model.body(link.get("name")).id
-    for element in inertial.findall("mass") + inertial.findall("inertia"):
-        for name, value in element.attrib.items():
-            element.set(name, repr(float(value) * reality.masses[body]))
+    scale(link, reality.masses[body])
     first = int(model.body_geomadr[body])
     for geom in range(first, first + int(model.body_geomnum[body])):
         if model.geom_contype[geom] or model.geom_conaffinity[geom]:
@@ -247,28 +246,6 @@ def _add_collision(link: ET.Element, model: mujoco.MjModel, geom: int) -> None:
     turn = Rotation.from_quat(model.geom_quat[geom], scalar_first=True).as_euler("xyz")
     ET.SubElement(collision, "origin", xyz=_text(model.geom_pos[geom]), rpy=_text(turn))
     ET.SubElement(collision, "geometry").append(shape)
-
-
-def _fix(joint: ET.Element, angle: float) -> None:
-    """Makes a hinge a fixed joint at an angle, rad."""
-    origin, axis = _part(joint, "origin"), _part(joint, "axis")
-    turn = Rotation.from_euler("xyz", _numbers(origin, "rpy"))  # URDF's are about fixed axes
-    turn *= Rotation.from_rotvec(angle * _numbers(axis, "xyz"))
-    origin.set("rpy", _text(turn.as_euler("xyz")))
-    joint.set("type", "fixed")
-    for element in joint.findall("axis") + joint.findall("limit"):
-        joint.remove(element)
-
-
-def _part(element: ET.Element, name: str) -> ET.Element:
-    found = element.find(name)
-    if found is None:
-        raise ValueError(f"{element.get('name')} has no {name}")
-    return found
-
-
-def _numbers(element: ET.Element, name: str) -> np.ndarray:
-    return np.array([float(value) for value in element.get(name, "").split()])
 
 
 def _text(values: np.ndarray) -> str:
