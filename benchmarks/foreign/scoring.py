@@ -197,12 +197,12 @@ def judged(row: Row) -> Judgement:
     onset = (answer.get("change") or {}).get("time")
     if healthy:
         verdict_right = not best and verdict in ("explained", "intact")
-    elif expressible:
+    elif verdict == "unexplained":
+        verdict_right = not expressible
+    else:
         named = [best, *(terms(rival.split("+")) for rival in _rivals(answer))]
         among = any(agrees(one, real) for one in named)
         verdict_right = right if verdict == "explained" else verdict == "ambiguous" and among
-    else:
-        verdict_right = verdict == "unexplained"
     return Judgement(
         right=right if expressible else None,
         verdict_right=verdict_right,

@@ -27,7 +27,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
 from selfmodel.progress import Progress
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -51,6 +51,8 @@ class DiagnosticSearch:
         comparator: Distance between simulations and a trial.
         settings: Parameters of the EA.
         kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
+            If they include the default ones, unsearched kinds that predict the trials better are
+            searched too.
         healthy_trials: Trials of the healthy robot, which measure the loss of a correct model;
             without any, no verdict is ``unexplained``.
         calibrate: Fits the self-model to some trials, by which an accusation is checked
@@ -77,6 +79,7 @@ class DiagnosticSearch:
         self._calibrate = calibrate
         self._settings = settings
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
+        self._is_extended = set(kinds).issuperset(DEFAULT_KINDS)
         self._healthy_trials = tuple(healthy_trials)
         self._proposed: set[Hypothesis] = set()
         self.losses = LossTable(simulator, comparator)
@@ -95,10 +98,10 @@ class DiagnosticSearch:
         ``observer`` is called after each generation, and with the progress of each later stage.
         """
         table, coarse_trials = surrogate = self.losses.surrogate(trials)
-        problem = Problem(
+        problem_of = partial(
+            Problem,
             self.losses,
-            self._space,
-            trials,
+            trials=trials,
             surrogate=surrogate,
             healthy_trials=self._healthy_trials,
             names=trial_names(trials),
@@ -106,15 +109,27 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
+        space = self._space.including(seeds)
+        problem = problem_of(space)
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
-            distances, self._space, self._settings, seeds, rng, on_generation=observer
+            distances, space, self._settings, seeds, rng, on_generation=observer
         )
         self.evaluations += evaluations
         self._proposed.update(ranked)
         if not problem.has_test:
             return diagnosis_of(problem, ranked)
         starts = ranked[:REFINEMENT_STARTS]
+        diagnosis = self._refined_diagnosis(starts, trials, problem)
+        if diagnosis.unsearched is None or not self._is_extended:
+            return diagnosis
+        named = diagnosis.unsearched.named
+        wider = problem_of(space.including(named))
+        return self._refined_diagnosis([*named, *starts], trials, wider)
+
+    def _refined_diagnosis(
+        self, starts: Sequence[Hypothesis], trials: Sequence[Trial], problem: Problem
+    ) -> Diagnosis:
         best, compared = self._refined(starts, problem)
         after = self._after_change(best, starts, trials, problem)
         return after or diagnosis_of(problem, compared, best)

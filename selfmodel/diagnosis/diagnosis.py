@@ -49,6 +49,11 @@ class UnsearchedFault:
     kind: str
     others: Mapping[str, Hypothesis] = field(default_factory=dict)
 
+    @property
+    def named(self) -> tuple[Hypothesis, ...]:
+        """The hypothesis and the others."""
+        return (self.hypothesis, *self.others.values())
+
 
 @dataclass(frozen=True)
 class Fit:

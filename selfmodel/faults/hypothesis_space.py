@@ -1,8 +1,7 @@
 """Search space: hypotheses about one robot, their genomes, candidates and neighbours."""
 
-import dataclasses
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -66,6 +65,12 @@ class HypothesisSpace:
                 f"and sensors"
             )
         return cls(anatomy, applicable)
+
+    def including(self, hypotheses: Iterable[Hypothesis]) -> "HypothesisSpace":
+        """Returns the space with the kinds of the faults of some hypotheses as well."""
+        kinds = [fault.kind for one in hypotheses for fault in one.faults]
+        implied = [other for kind in kinds for other in kind.degenerate_kinds]
+        return replace(self, kinds=tuple(dict.fromkeys((*self.kinds, *kinds, *implied))))
 
     def parse(self, text: str) -> Hypothesis:
         """Returns the hypothesis of a notation; it may name ``kinds`` and all built-in kinds."""
@@ -146,7 +151,7 @@ class HypothesisSpace:
     def with_severity(self, hypothesis: Hypothesis, index: int, severity: float) -> Hypothesis:
         """Returns a hypothesis with another severity of the fault at an index."""
         faults = list(hypothesis.faults)
-        faults[index] = dataclasses.replace(faults[index], severity=severity)
+        faults[index] = replace(faults[index], severity=severity)
         return self.canonical(faults)
 
     def with_one_more(self, hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -166,7 +171,7 @@ class HypothesisSpace:
         faults = hypothesis.faults
         fewer = [faults[:i] + faults[i + 1 :] for i in range(len(faults))]
         simpler = [
-            (*faults[:i], dataclasses.replace(fault, severity=severity), *faults[i + 1 :])
+            (*faults[:i], replace(fault, severity=severity), *faults[i + 1 :])
             for i, fault in enumerate(faults)
             if fault.severity not in fault.kind.degenerates_alone_to
             for severity in (*fault.kind.degenerates_to, *fault.kind.degenerates_alone_to)

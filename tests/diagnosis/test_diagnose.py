@@ -13,12 +13,14 @@ from selfmodel.comparators import (
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.diagnosis.diagnosis import diagnosis_from_dict
+from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.text import verdict_sentences
 from selfmodel.errors import InputError
 from selfmodel.faults.joints import BROKEN
+from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -26,9 +28,10 @@ from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared
-from tests.helpers.drivers import random_controllers
+from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable, with_value
 from tests.helpers.memory import in_memory
+from tests.helpers.robots.arms import arm
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=200)
 
@@ -122,3 +125,36 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
 
     with pytest.raises(InputError, match=r"is 1e\+300 at step 7, expected at"):
         evidence.check([trial])
+
+
+@pytest.mark.parametrize(
+    ("truth", "kind"),
+    [
+        ("delay=2.8", "delay"),
+        ("joint-friction:joint1=0.5", "joint-friction"),
+        ("encoder-offset:joint1=0.2", "encoder-offset"),
+    ],
+)
+def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds(
+    truth: str, kind: str
+):
+    robot = arm()
+    (controller,) = random_cpgs(robot, 1)
+    before, after = (logged(robot, faults, controller, 200) for faults in ("intact", truth))
+
+    def found(kinds: tuple[FaultKind, ...]) -> Diagnosis:
+        search = DiagnosticSearch(
+            Simulator(robot, 1), SEGMENT_PREDICTION, SMALL, kinds, healthy_trials=[before]
+        )
+        first, seeds = search([after], [], np.random.default_rng(0), lambda _: None), []
+        seeds += [candidate.hypothesis for candidate in first.ranked]
+        assert search([after], seeds, np.random.default_rng(1), lambda _: None).best == first.best
+        return first
+
+    default, paper = found(DEFAULT_KINDS), found(PAPER_KINDS)
+
+    assert (str(default.best), default.verdict) == (truth, "explained")
+    assert default.unsearched is None
+    assert paper.verdict == "unexplained"
+    assert paper.unsearched is not None
+    assert paper.unsearched.kind == kind
