@@ -24,7 +24,7 @@ the EA decides alone. The local search:
    are fitted by the comparator itself, and it is pruned again.
 7. **Mean severities** (``with_mean_severities``), unless they make a fault prunable.
 
-The surrogate comparator simulates a third of the segments of a short trial, and as many of a longer
+The surrogate comparator simulates a third of the segments of a short trial, and as much of a longer
 one (a tenth from three trials on), or the first third of each trial. No ablation of ``STARTS`` and
 ``SHORTLIST_SIZE`` is on record.
 """

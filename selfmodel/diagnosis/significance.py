@@ -139,6 +139,15 @@ def paired_z(larger: FloatArray, smaller: FloatArray) -> float:
     return float(difference.mean() / error) if error > 0 else 0.0
 
 
+def is_gain(one: FloatArray, other: FloatArray) -> bool:
+    """Returns whether the first losses are smaller by ``MIN_Z_ACROSS_TRIALS`` standard errors."""
+    return (
+        bool(np.isfinite([one, other]).all())
+        and (other - one).mean() > NEGLIGIBLE_LOSS
+        and paired_z(other, one) >= MIN_Z_ACROSS_TRIALS
+    )
+
+
 def gain_exceeds_healthy_gain(
     one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> bool:
@@ -153,14 +162,10 @@ def gain_exceeds_healthy_gain(
         healthy_one: As ``one``, on the healthy trials, ``(healthy pieces,)``.
         healthy_other: As ``other``, on the healthy trials.
     """
-    if not _are_comparable(one, other, healthy_one, healthy_other):
+    if not (is_gain(one, other) and _are_comparable(healthy_one, healthy_other)):
         return False
-    gain, more, error = _gains(one, other, healthy_one, healthy_other)
-    return (
-        gain > NEGLIGIBLE_LOSS
-        and paired_z(other, one) >= MIN_Z_ACROSS_TRIALS
-        and more >= MIN_Z_ACROSS_TRIALS * error
-    )
+    _, more, error = _gains(one, other, healthy_one, healthy_other)
+    return more >= MIN_Z_ACROSS_TRIALS * error
 
 
 def gain_is_model_error(

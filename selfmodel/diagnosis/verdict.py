@@ -324,16 +324,17 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
     faults = _with_unsearched(best, problem.space)
     better: dict[str, Hypothesis] = {}
     for candidate in _largest_gains(best, list(faults), problem):
-        fault = faults[candidate]
+        fault, losses = faults[candidate], problem.losses([candidate])[0]
+        # Most are no gain: what they do to the healthy trials is not needed.
+        if fault.kind.name in better or not significance.is_gain(losses, best_losses):
+            continue
         healthy = problem.healthy([problem.space.canonical([fault]), INTACT])
-        if healthy is None or fault.kind.name in better:
+        if healthy is None:
             continue
         # A reading that healthy trials predict better with the fault is predicted badly as such.
         if not fault.kind.affects_dynamics and significance.is_better(*healthy):
             continue
-        if significance.gain_exceeds_healthy_gain(
-            problem.losses([candidate])[0], best_losses, *healthy
-        ):
+        if significance.gain_exceeds_healthy_gain(losses, best_losses, *healthy):
             better[fault.kind.name] = candidate
     if not better:
         return None

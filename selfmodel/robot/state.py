@@ -22,10 +22,11 @@ from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 Bind = Callable[[str], FloatArray]
-"""Returns the array of a field of MuJoCo's state of many robots, ``(n, width)``, by name."""
+"""Returns the array of a field of MuJoCo's state of many robots, ``(n, width)``, by name; to be
+read, also that at several steps, ``(steps, n, width)``."""
 
 Reader = Callable[[], FloatArray]
-"""Returns the current value of a signal, ``(n, width)``; the value may be a view of the state."""
+"""Returns the current value of a signal, ``(..., n, width)``; it may be a view of the state."""
 
 SignalSource = Callable[[Bind], Reader]
 """Returns a function that reads a signal from the bound state."""
@@ -51,8 +52,8 @@ def _field(name: str, chosen: Columns, shift: FloatArray | None = None) -> Signa
     def bound(bind: Bind) -> Reader:
         values = bind(name)
         if shift is None:
-            return lambda: values[:, chosen]
-        return lambda: values[:, chosen] + shift
+            return lambda: values[..., chosen]
+        return lambda: values[..., chosen] + shift
 
     return bound
 
@@ -110,7 +111,7 @@ class FixedBase:
 
 
 def _constant(rows: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    return lambda qpos, _qvel: np.broadcast_to(rows, (len(qpos), rows.shape[1]))
+    return lambda qpos, _qvel: np.broadcast_to(rows, (*qpos.shape[:-1], rows.shape[-1]))
 
 
 class SlidingBase:
@@ -172,43 +173,44 @@ class SlidingBase:
     def _positions(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
         translation = self._origin_shift(qpos, qvel)[0]
         for (q, _, reference), axis in zip(self._slides, self._axes, strict=True):
-            translation = translation + (qpos[:, q, np.newaxis] - reference) * axis
+            translation = translation + (qpos[..., q, np.newaxis] - reference) * axis
         return np.asarray(self._position + rotated(translation, self._orientation))
 
     def _velocities(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
         velocity = self._origin_shift(qpos, qvel)[1]
         for (_, v, _), axis in zip(self._slides, self._axes, strict=True):
-            velocity = velocity + qvel[:, v, np.newaxis] * axis
+            velocity = velocity + qvel[..., v, np.newaxis] * axis
         return rotated(velocity, self._orientation)
 
     def _orientations(self, qpos: FloatArray, _qvel: FloatArray) -> FloatArray:
         half = self._angles(qpos) / 2
-        return product(self._orientation, np.hstack([np.cos(half), np.sin(half) * self._axis]))
+        turned = np.concatenate([np.cos(half), np.sin(half) * self._axis], axis=-1)
+        return product(self._orientation, turned)
 
     def _rates(self, _qpos: FloatArray, qvel: FloatArray) -> FloatArray:
         if self._hinge is None:
-            return np.zeros((len(qvel), 3))
-        return np.asarray(qvel[:, self._hinge[1], np.newaxis] * self._axis)
+            return np.zeros((*qvel.shape[:-1], 3))
+        return np.asarray(qvel[..., self._hinge[1], np.newaxis] * self._axis)
 
     def _angles(self, qpos: FloatArray) -> FloatArray:
-        """Returns the angle of the hinge from its reference, ``(n, 1)`` rad."""
+        """Returns the angle of the hinge from its reference, ``(..., n, 1)`` rad."""
         if self._hinge is None:
-            return np.zeros((len(qpos), 1))
+            return np.zeros((*qpos.shape[:-1], 1))
         q, _, reference = self._hinge
-        return np.asarray(qpos[:, q, np.newaxis] - reference)
+        return np.asarray(qpos[..., q, np.newaxis] - reference)
 
     def _origin_shift(self, qpos: FloatArray, qvel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns displacement and velocity of the body's origin due to the hinge.
 
-        Both are ``(n, 3)``, m and m/s, in the body's reference frame.
+        Both are ``(..., n, 3)``, m and m/s, in the body's reference frame.
         """
         angle = self._angles(qpos)
         if self._hinge is None or not self._anchor.any():
-            return np.zeros((len(angle), 3)), np.zeros((len(angle), 3))
+            return np.zeros((*angle.shape[:-1], 3)), np.zeros((*angle.shape[:-1], 3))
         outward = self._anchor - self._axis * (self._axis @ self._anchor)
         across = np.cross(self._axis, self._anchor)
         cosine, sine = np.cos(angle), np.sin(angle)
-        rate = qvel[:, self._hinge[1], np.newaxis]
+        rate = qvel[..., self._hinge[1], np.newaxis]
         return (
             outward * (1 - cosine) - across * sine,
             rate * (outward * sine - across * cosine),
@@ -390,23 +392,24 @@ class SensorReader:
         self._noise = SensorNoise(variants, copies)
 
     def read(self, sensordata: FloatArray, qpos: FloatArray, readings: FloatArray) -> None:
-        """Writes the readings of the next control step.
+        """Writes the readings of the next control step, or of several.
 
         Args:
-            sensordata: ``(n, nsensordata)``, which contains the touch forces, N.
-            qpos: ``(n, nq)``, which contains the joint angles, rad.
-            readings: ``(n, sensors)``, written.
+            sensordata: ``(..., n, nsensordata)``, which contains the touch forces, N.
+            qpos: ``(..., n, nq)``, which contains the joint angles, rad.
+            readings: ``(..., n, sensors)``, written.
         """
         np.greater(
-            sensordata[:, self._touch], 0, out=readings[:, : self._touches], casting="unsafe"
+            sensordata[..., self._touch], 0, out=readings[..., : self._touches], casting="unsafe"
         )
-        angles = readings[:, self._touches :]
-        np.subtract(qpos[:, self._angle], self._centre, out=angles)
+        angles = readings[..., self._touches :]
+        np.subtract(qpos[..., self._angle], self._centre, out=angles)
         np.multiply(angles, self._scale, out=angles)
         if self._faulty:
             readings *= self._gain
             readings += self._offset
-        self._noise.add(readings)
+        for step in readings.reshape(-1, *readings.shape[-2:]):
+            self._noise.add(step)
 
 
 class SensorNoise:

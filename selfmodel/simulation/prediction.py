@@ -67,7 +67,6 @@ def predict(
     qpos, sensordata = loop.bind("qpos"), loop.bind("sensordata")
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
     reader = SensorReader(robot.model, robot.anatomy, variants, together)
-    readings = np.empty((n * together, len(robot.anatomy.sensors)))
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
     live = live_signals(robot, loop.bind, loop.models, segments.record)
@@ -75,12 +74,15 @@ def predict(
     kept = {
         signal: np.empty((n, count, horizon + 1, names.width(signal))) for signal in segments.record
     }
-    for stage, k in loop.steps():
+    for stage, steps, rows in loop.steps():
+        read_now = {signal: read()[rows][:, batch_rows] for signal, read in live.items()}
         if "sensors" in kept:
-            reader.read(sensordata[batch_rows], qpos[batch_rows], readings)
-            kept["sensors"][:, stage, k] = readings.reshape(n, together, -1)
-        for signal, read in live.items():
-            kept[signal][:, stage, k] = read()[batch_rows].reshape(n, together, -1)
+            readings = np.empty((rows.stop - rows.start, n * together, kept["sensors"].shape[-1]))
+            reader.read(sensordata[rows][:, batch_rows], qpos[rows][:, batch_rows], readings)
+            read_now["sensors"] = readings
+        for signal, values in read_now.items():
+            by_variant = values.reshape(len(values), n, together, -1)
+            kept[signal][:, stage, steps] = by_variant.transpose(1, 2, 0, 3)
     diverged = np.any(loop.batch.diverged()[batch_rows].reshape(n, together), axis=1)
     stats.count(n, len(moving) * count * horizon, diverged)
     addresses = [int(robot.model.joint(name).qposadr[0]) for name in hinges]
@@ -117,6 +119,10 @@ class _OpenLoop:
         self.together = count if segments.independent else segments.chains
         self._stages: list[IndexArray] = [*np.arange(count).reshape(self.together, -1).T]
         self.models = [own for own in moving for _ in range(self.together)]
+        model = robot.model
+        step_numbers = self._substeps * (model.nq + 2 * model.nv + model.nsensordata)
+        chunk = CHUNK_BYTES // (8 * len(self.models) * step_numbers)
+        self._chunk = min(max(1, chunk), segments.horizon)
         self.batch = RobotBatch(robot.model, self.models, threads)
         # Before the first step, after which a field that is bound remains zero.
         self._live = {name: self.batch.bind(name) for name in ("qpos", "qvel", "act")}
@@ -140,31 +146,32 @@ class _OpenLoop:
         ]
 
     def bind(self, name: str) -> FloatArray:
-        """Returns the array of a field at the step that ``steps`` yields."""
-        self._live[name] = self.batch.bind(name)
-        return self._fields.setdefault(name, np.zeros_like(self._live[name]))
+        """Returns the array of a field at the steps that ``steps`` yields, in its rows."""
+        self._live[name] = live = self.batch.bind(name)
+        return self._fields.setdefault(name, np.zeros((1 + self._chunk, *live.shape)))
 
-    def steps(self) -> Iterator[tuple[IndexArray, int]]:
-        """Yields the segments and the step within them at which the bound fields are."""
+    def steps(self) -> Iterator[tuple[IndexArray, slice, slice]]:
+        """Yields segments, the steps within them at which the bound fields are, and their rows."""
         self.batch.reset(mujoco.mjtStage.mjSTAGE_POS)
-        row_bytes = sum(values.nbytes for values in self._fields.values())
-        chunk = max(1, CHUNK_BYTES // (self._substeps * row_bytes))
         for stage in self._stages:
             self._write_states(stage)
             with self._stats.physics():
                 self.batch.forward()
             for name, values in self._fields.items():
-                values[:] = self._live[name]
-            yield stage, 0
-            for first in range(0, self._segments.horizon, chunk):
-                steps = np.arange(first, min(first + chunk, self._segments.horizon))
+                values[0] = self._live[name]
+            begin = 0  # row 0, the state before the first step, is of the first chunk
+            for first in range(0, self._segments.horizon, self._chunk):
+                steps = np.arange(first, min(first + self._chunk, self._segments.horizon))
                 commands, running = self._arriving(stage, steps), self.batch.running
                 with self._stats.physics():
                     recorded = self.batch.rollout(commands, list(self._fields))
-                for number, k in enumerate(steps.tolist(), 1):
-                    for name, values in recorded.items():
-                        self._fields[name][running] = values[:, number * self._substeps - 1]
-                    yield stage, k + 1
+                for name, values in recorded.items():
+                    after = values[:, self._substeps - 1 :: self._substeps].swapaxes(0, 1)
+                    rows = self._fields[name]
+                    rows[1:] = rows[-1 if begin else 0]  # of those that are stepped no longer
+                    rows[1 : 1 + len(steps), running] = after
+                yield stage, slice(first + begin, int(steps[-1]) + 2), slice(begin, 1 + len(steps))
+                begin = 1
 
     def _write_states(self, stage: IndexArray) -> None:
         copies = len(self._delays)

@@ -18,14 +18,18 @@ LEAD = MAX_CONTROL_DELAY
 """Steps before a segment whose commands may take effect within it, by any control delay."""
 
 
-WARM_UP = 4
-"""Segments after which the unknown state at the beginning of a chain has no effect. The base of a
+WARM_UP = 0.48
+"""Time after which the unknown state at the beginning of a chain has no effect, s. The base of a
 quadruped and of a hexapod that began at rest, in place of 0.6 and 1.2 m/s, was off by 0.14 and 0.5
 m/s after four segments of 0.12 s (0.10 and 0.14 in the middle of a trial), and the losses were
 those of the middle."""
 
-MAX_CHAIN = 100
-"""Segments of a chain, at most, if all segments of a trial are simulated."""
+MIN_COUNTED = 8
+"""Segments that count of each of two chains, at least: one chain at the end has more that show a
+fault which begins during the trial."""
+
+MAX_CHAIN = 12.0
+"""Length of a chain, at most, if all segments of a trial are simulated, s."""
 
 
 @dataclass(frozen=True)
@@ -103,27 +107,30 @@ def recordable(request: Request) -> tuple[Signal, ...]:
     return SIGNALS
 
 
-def chained(count: int, most: int) -> tuple[IndexArray, BoolArray, int]:
+def chained(count: int, most: int, length: float) -> tuple[IndexArray, BoolArray, int]:
     """Returns which of consecutive segments are simulated in chains, and which of these count.
 
-    Of up to ``most`` segments all are; of more, parts of the trial as long as that: a segment that
-    follows another one tells more than one after a gap, whose base begins in a state of another
-    time. Chains that begin in mid-trial have ``WARM_UP`` segments that do not count.
+    Of up to ``most`` segments, each ``length`` s long, all are; of more, parts of the trial as long
+    as that: a segment that follows another one tells more than one after a gap, whose base begins
+    in a state of another time. In chains that begin in mid-trial, the segments of the first
+    ``WARM_UP`` s do not count.
 
     Returns:
-        Numbers of the segments, ``(chains * length,)``; a mask of those that count, likewise; and
+        Numbers of the segments, ``(chains * size,)``; a mask of those that count, likewise; and
         the number of chains.
     """
+    warm_up = max(1, round(WARM_UP / length))
     if count <= most:
-        chains = max(1, math.ceil((count - WARM_UP) / (MAX_CHAIN - WARM_UP)))
-        length = math.ceil((count + (chains - 1) * WARM_UP) / chains)
+        longest = max(2 * warm_up, round(MAX_CHAIN / length))
+        chains = max(1, math.ceil((count - warm_up) / (longest - warm_up)))
+        size = math.ceil((count + (chains - 1) * warm_up) / chains)
     else:
-        chains = 2 if most >= 4 * WARM_UP else 1
-        length = min(max(most // chains, 2 * WARM_UP), count)
+        chains = 2 if most >= 2 * (warm_up + MIN_COUNTED) else 1
+        size = min(max(most // chains, 2 * warm_up), count)
     # A single part is at the end: a fault may begin during the trial.
-    first = np.floor(np.linspace(0 if chains > 1 else count - length, count - length, chains))
-    rows = first.astype(np.intp)[:, np.newaxis] + np.arange(length)
-    warm = rows[:, :1] + np.where(rows[:, :1] > 0, WARM_UP, 0)
+    first = np.floor(np.linspace(0 if chains > 1 else count - size, count - size, chains))
+    rows = first.astype(np.intp)[:, np.newaxis] + np.arange(size)
+    warm = rows[:, :1] + np.where(rows[:, :1] > 0, warm_up, 0)
     before = np.append(0, rows[:-1, -1] + 1)[:, np.newaxis]
     return rows.ravel(), (rows >= np.maximum(warm, before)).ravel(), chains
 

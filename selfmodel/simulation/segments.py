@@ -29,9 +29,9 @@ from selfmodel.trials.signals import CALIBRATION_ERROR_SCALES, Signal, differenc
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, check_magnitudes
 
-MAX_SEGMENTS, MAX_FOLLOWING = 40, 100
-"""Largest numbers of segments of a trial that was observed completely, and of one in which the base
-or a hinge was not, so that segments follow each other."""
+MAX_SEGMENTS, MAX_FOLLOWING = 40, 10.0
+"""Largest number of segments of a trial that was observed completely; and the longest part of one
+in which the base or a hinge was not, so that segments follow each other, s."""
 
 HORIZON = 10
 """Length of a segment, control steps."""
@@ -165,10 +165,11 @@ def _chained(
     starts: IndexArray,
     compared: tuple[Signal, ...],
 ) -> ObservedSegments | None:
-    """Returns segments that follow each other, at most ``MAX_FOLLOWING``; None without any."""
+    """Returns segments that follow each other, at most for ``MAX_FOLLOWING``; None without any."""
     if not len(starts):
         return None
-    rows, counted, chains = chained(len(starts), MAX_FOLLOWING)
+    length = HORIZON * trajectory.timestep
+    rows, counted, chains = chained(len(starts), round(MAX_FOLLOWING / length), length)
     cut = _cut(trajectory, states, starts[rows], HORIZON, compared)
     segments = replace(cut.segments, chains=chains)
     return replace(cut, segments=segments, valid=cut.valid & counted[:, np.newaxis])

@@ -141,6 +141,11 @@ class Trajectory:
         """Number of recorded control steps."""
         return len(self.time)
 
+    @property
+    def timestep(self) -> float:
+        """Mean duration of a control step, s, of at least two."""
+        return float(self.time[-1] - self.time[0]) / (self.steps - 1)
+
     def with_signals(self, signals: Mapping[Signal, FloatArray]) -> "Trajectory":
         """Returns the trajectory with other, or further, signals."""
         return dataclasses.replace(self, signals={**self.signals, **signals})

@@ -180,22 +180,23 @@ def test_chains_are_predicted_together_as_each_is_alone(quadruped: Robot):
             assert together[signal][:, rows].tobytes() == alone[signal].tobytes(), signal
 
 
+@pytest.mark.parametrize("length", [0.12, 0.24, 2.0])
 @pytest.mark.parametrize(("count", "most"), [(80, 80), (125, 125), (2500, 2500), (125, 26), (9, 8)])
 def test_chains_count_each_segment_once_and_warm_up_where_they_begin_in_mid_trial(
-    count: int, most: int
+    count: int, most: int, length: float
 ):
-    rows, counted, chains = chained(count, most)
-    parts = np.split(rows, chains)
+    rows, counted, chains = chained(count, most, length)
+    parts, warm_up = np.split(rows, chains), max(1, round(WARM_UP / length))
 
-    assert len(rows) <= 1.1 * most
-    assert len(parts[0]) <= MAX_CHAIN
+    assert len(rows) <= 1.25 * most
     assert len(set(rows[counted].tolist())) == counted.sum()
     if count <= most:
+        assert len(parts[0]) * length <= MAX_CHAIN
         np.testing.assert_array_equal(rows[counted], np.arange(count))
     assert rows[-1] == count - 1  # a fault may begin during the trial
     for part, used in zip(parts, np.split(counted, chains), strict=True):
         np.testing.assert_array_equal(np.diff(part), 1)
-        assert part[0] == 0 or not used[:WARM_UP].any()
+        assert part[0] == 0 or not used[:warm_up].any()
 
 
 @pytest.mark.parametrize("signals", [STATE, ONBOARD], ids=["whole", "onboard"])

@@ -71,22 +71,25 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[S
     assert set(found.segments.states) == set(found.observed) == set(ONBOARD)
 
 
-@pytest.mark.parametrize("without", ["base", "encoder"])
+@pytest.mark.parametrize(
+    ("without", "timestep"), [("base", 0.01), ("base", 0.02), ("encoder", 0.01)]
+)
 def test_of_a_long_trial_without_the_base_two_parts_are_used_after_they_have_warmed_up(
-    without: str,
+    without: str, timestep: float
 ):
     run = WHOLE.trajectory
     long = {signal: np.tile(values, (8, 1)) for signal, values in run.signals.items()}
-    time = 0.01 * np.arange(8 * STEPS)
+    time = timestep * np.arange(8 * STEPS)
     tried = replace(WHOLE, trajectory=replace(run, time=time, signals=long))
     tried = lacking(tried, BASE) if without == "base" else without_encoders(tried, [3])
     found = observed_segments(QUADRUPED, tried)
 
-    assert (found.segments.chains, len(found.segments.starts)) == (2, MAX_FOLLOWING)
+    length = timestep * HORIZON
+    count, warm_up = round(MAX_FOLLOWING / length), round(WARM_UP / length)
+    assert (found.segments.chains, len(found.segments.starts)) == (2, count)
     assert 8 * STEPS - 2 * HORIZON <= found.segments.starts[-1] < 8 * STEPS - HORIZON
-    half = MAX_FOLLOWING // 2
-    assert not found.valid[half : half + WARM_UP].any()
-    assert found.valid.sum() == (MAX_FOLLOWING - WARM_UP) * HORIZON
+    assert not found.valid[count // 2 : count // 2 + warm_up].any()
+    assert found.valid.sum() == (count - warm_up) * HORIZON
 
 
 @SEEN
