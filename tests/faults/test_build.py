@@ -1,10 +1,11 @@
 """Tests of model edits: a broken joint equals a deleted limb, a jammed joint equals a weld.
 
 The reference model has another layout, so rounding differs and contact amplifies the difference:
-the comparison covers the first 100 control steps (1 s) of a motion of every joint, over which all
-joint angles and the root body's pose agree within TOLERANCE. (Measured: below 1e-13 for broken
-joints, below 3e-9 for jammed ones.)
+the comparison covers the first 100 control steps (1 s) of a motion of every joint of selfmodel's
+robots. (Measured: below 1e-13 for broken joints, below 3e-9 for jammed ones.)
 """
+
+from collections.abc import Callable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -16,11 +17,14 @@ from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_motion
+from tests.helpers.robots.bodies import BODIES, swinging
 
-STEPS = 100
-TOLERANCE = 1e-7
+MADE: Mapping[str, Callable[[], Robot]] = {
+    **{name: entry.robot for name, entry in ROBOTS.items()},
+    **{f"{name} of the suite": made for name, made in BODIES.items()},
+}
 
-JOINTS = [
+OWN = [
     (name, joint.name)
     for name, entry in ROBOTS.items()
     for joint in entry.robot().anatomy.joints[:: 3 if name == "quadruped" else 5]
@@ -28,8 +32,10 @@ JOINTS = [
 """Inner and outer joints, left and right."""
 
 
-def built(robot: Robot, text: str, seed: int = 0) -> mujoco.MjModel:
-    return build(robot, parse(text, robot.anatomy), seed).model
+def of_suite(names: Sequence[str], count: int) -> list[tuple[str, str]]:
+    """The last joints of bodies that slide, or whose motors pull tendons or lag behind."""
+    bodies = [f"{name} of the suite" for name in names]
+    return [(name, one.name) for name in bodies for one in MADE[name]().anatomy.joints[-count:]]
 
 
 def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
@@ -41,67 +47,80 @@ def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
 
 
 def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
-    """The robot's model with the bodies of a joint welded at an angle, without the joint."""
+    """The robot's model with a joint's body welded where the physics has it at an angle."""
+    data = mujoco.MjData(robot.model)
+    for hinge in joint.hinges:
+        data.joint(hinge).qpos[0] = angle
+    mujoco.mj_kinematics(robot.model, data)
+    body = robot.model.body(robot.model.joint(joint.hinges[0]).bodyid[0])
+    parent, back = data.body(int(body.parentid[0])), np.empty(4)
+    mujoco.mju_negQuat(back, parent.xquat)
+    place, turn = np.empty(3), np.empty(4)
+    mujoco.mju_rotVecQuat(place, data.body(body.id).xpos - parent.xpos, back)
+    mujoco.mju_mulQuat(turn, back, data.body(body.id).xquat)
     spec = mujoco.MjSpec.from_string(robot.mjcf)
+    spec.body(body.name).pos, spec.body(body.name).quat = place, turn
     for name in joint.hinges:
-        hinge = spec.joint(name)
-        body = hinge.parent
-        np.testing.assert_array_equal(hinge.pos, 0)  # so rotating the body does not move the pivot
-        turn, frame = np.empty(4), np.empty(4)
-        mujoco.mju_axisAngle2Quat(turn, np.array(hinge.axis), angle)
-        mujoco.mju_mulQuat(frame, np.array(body.quat), turn)
-        body.quat = frame
         users = [motor for motor in spec.actuators if motor.target == name]
         users += [sensor for sensor in spec.sensors if sensor.objname == name]
-        for user in users:
-            spec.delete(user)
-        spec.delete(hinge)
+        for part in (*users, spec.joint(name)):
+            spec.delete(part)
     return spec.compile()
 
 
-def follow(robot: Robot, model: mujoco.MjModel, steps: int) -> dict[str, np.ndarray]:
-    """Returns the trajectories of the root body and of the hinges under given motor targets."""
+def path(
+    robot: Robot, model: mujoco.MjModel, hinges: list[str], commands: np.ndarray
+) -> np.ndarray:
+    """Where the root and some hinges are, step by step."""
     data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    hinges = {model.joint(j).name for j in range(model.njnt)} & set(robot.anatomy.hinges)
-    motors = {model.actuator(m).name for m in range(model.nu)}
-    paths: dict[str, list] = {name: [] for name in (robot.root, *hinges)}
-    for targets in random_motion(robot, steps):
+    left = {model.actuator(m).name: m for m in range(model.nu)}
+    rows = []
+    for targets in commands:
         for motor, target in zip(robot.anatomy.motors, targets, strict=True):
-            if motor in motors:
-                data.actuator(motor).ctrl = target
+            if motor in left:
+                data.ctrl[left[motor]] = target
         mujoco.mj_step(model, data, robot.substeps)
-        paths[robot.root].append(data.qpos[:7].copy())
-        for hinge in hinges:
-            paths[hinge].append(float(data.joint(hinge).qpos[0]))
-    return {name: np.array(path) for name, path in paths.items()}
+        angles = [data.joint(hinge).qpos[0] for hinge in hinges]
+        rows.append([*data.body(robot.root).xpos, *data.body(robot.root).xquat, *angles])
+    return np.array(rows)
 
 
-def assert_same_paths(edited: dict[str, np.ndarray], truth: dict[str, np.ndarray]):
-    assert len(truth) > 1
-    for name, path in truth.items():
-        np.testing.assert_allclose(edited[name], path, atol=TOLERANCE, rtol=0, err_msg=name)
+def assert_same_paths(name: str, text: str, truth: mujoco.MjModel, steps: int, tolerance: float):
+    robot = MADE[name]()
+    edited = build(robot, parse(text, robot.anatomy)).model
+    kept = {truth.joint(j).name for j in range(truth.njnt)}
+    hinges = [hinge for hinge in robot.anatomy.hinges if hinge in kept]
+    commands = random_motion(robot, 100) if name in ROBOTS else swinging(robot, steps)
+    paths = [path(robot, model, hinges, commands) for model in (edited, truth)]
+
+    assert hinges
+    assert truth.nv < edited.nv == robot.model.nv
+    np.testing.assert_allclose(*paths, atol=1e-7 if name in ROBOTS else tolerance, rtol=0)
 
 
-@pytest.mark.parametrize(("name", "joint"), JOINTS)
+@pytest.mark.parametrize(
+    ("name", "joint"), [*OWN, *of_suite(("walker", "swimmer", "quadruped", "ant"), 2)]
+)
 def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: str):
-    robot = ROBOTS[name].robot()
-    edited = build(robot, parse(f"break:{joint}", robot.anatomy)).model
-    truth = without_limb(robot, robot.anatomy.joint(joint))
+    robot = MADE[name]()
+    broken = robot.anatomy.joint(joint)
+    truth = without_limb(robot, broken)
+    left = {truth.actuator(m).name for m in range(truth.nu)}
 
-    assert truth.nv < edited.nv == robot.model.nv
-    assert_same_paths(follow(robot, edited, STEPS), follow(robot, truth, STEPS))
+    assert_same_paths(name, f"break:{joint}", truth, 40, 1e-7)
+    assert broken.motors_lost_if_broken == set(robot.anatomy.motors) - left
 
 
-@pytest.mark.parametrize(("name", "joint"), JOINTS)
+@pytest.mark.parametrize(
+    ("name", "joint"), [*OWN, *of_suite(("walker", "swimmer", "ant", "humanoid"), 1)]
+)
 def test_a_jammed_joint_moves_like_a_welded_one(name: str, joint: str):
-    angle = 0.3 if "left" in joint else -0.5
-    robot = ROBOTS[name].robot()
-    edited = build(robot, parse(f"jam:{joint}={angle}", robot.anatomy)).model
-    truth = with_weld(robot, robot.anatomy.joint(joint), angle)
+    robot = MADE[name]()
+    held = robot.anatomy.joint(joint)
+    low, high = held.limits[0]
+    angle = low + (0.3 if "left" in joint else 0.8) * (high - low)
 
-    assert truth.nv < edited.nv == robot.model.nv
-    assert_same_paths(follow(robot, edited, STEPS), follow(robot, truth, STEPS))
+    assert_same_paths(name, f"jam:{joint}={angle}", with_weld(robot, held, angle), 20, 1e-6)
 
 
 def test_lost_and_failed_sensors_read_zero_and_jammed_ones_their_angle(quadruped: Robot):

@@ -6,13 +6,11 @@ motors pull tendons or lag behind their commands, and whose hinges bend to one s
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
 from selfmodel.comparators.segment_prediction import SEGMENT_PREDICTION
 from selfmodel.diagnosis.losses import LossTable
-from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log
@@ -22,7 +20,6 @@ from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.recovery.scores import first_falls
-from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
@@ -195,97 +192,3 @@ def test_nobody_has_fallen_at_the_start_and_a_swimmer_never_does(body: Robot):
     assert first_falls(run, UP, body.standing_height) > 0
     if body.name == "swimmer":
         assert first_falls(run, UP, body.standing_height) == STEPS
-
-
-def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(robot.mjcf)
-    first = next(b for b in joint.bodies if spec.body(b).parent.name not in joint.bodies)
-    spec.delete(spec.body(first))
-    return spec.compile()
-
-
-def path(robot: Robot, model: mujoco.MjModel, hinges: list[str], steps: int) -> np.ndarray:
-    """Where the root and some hinges are, step by step."""
-    data = mujoco.MjData(model)
-    left = {model.actuator(m).name: m for m in range(model.nu)}
-    rows = []
-    for commands in swinging(robot, steps):
-        for motor, command in zip(robot.anatomy.motors, commands, strict=True):
-            if motor in left:
-                data.ctrl[left[motor]] = command
-        mujoco.mj_step(model, data, robot.substeps)
-        angles = [data.joint(hinge).qpos[0] for hinge in hinges]
-        rows.append([*data.body(robot.root).xpos, *data.body(robot.root).xquat, *angles])
-    return np.array(rows)
-
-
-DELETED = [
-    (name, joint.name)
-    for name in ("walker", "swimmer", "quadruped", "ant")
-    for joint in BODIES[name]().anatomy.joints[-2:]
-]
-
-
-@pytest.mark.parametrize(("name", "joint"), DELETED)
-def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: str):
-    robot = BODIES[name]()
-    broken = robot.anatomy.joint(joint)
-    edited = build(robot, parse(f"break:{joint}", robot.anatomy)).model
-    truth = without_limb(robot, broken)
-    hinges = [
-        h
-        for h in robot.anatomy.hinges
-        if edited.body(edited.jnt_bodyid[edited.joint(h).id]).name not in broken.bodies
-    ]
-    left = {truth.actuator(m).name for m in range(truth.nu)}
-
-    assert truth.nv < edited.nv == robot.model.nv
-    assert broken.motors_lost_if_broken == set(robot.anatomy.motors) - left
-    np.testing.assert_allclose(
-        path(robot, edited, hinges, 40), path(robot, truth, hinges, 40), atol=1e-7, rtol=0
-    )
-
-
-def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
-    """The robot's model with a joint's body welded where the physics has it at an angle."""
-    data = mujoco.MjData(robot.model)
-    for hinge in joint.hinges:
-        data.joint(hinge).qpos[0] = angle
-    mujoco.mj_kinematics(robot.model, data)
-    body = robot.model.body(robot.model.joint(joint.hinges[0]).bodyid[0])
-    parent, back = data.body(int(body.parentid[0])), np.empty(4)
-    mujoco.mju_negQuat(back, parent.xquat)
-    place, turn = np.empty(3), np.empty(4)
-    mujoco.mju_rotVecQuat(place, data.body(body.id).xpos - parent.xpos, back)
-    mujoco.mju_mulQuat(turn, back, data.body(body.id).xquat)
-    spec = mujoco.MjSpec.from_string(robot.mjcf)
-    spec.body(body.name).pos, spec.body(body.name).quat = place, turn
-    for name in joint.hinges:
-        users = [motor for motor in spec.actuators if motor.target == name]
-        users += [sensor for sensor in spec.sensors if sensor.objname == name]
-        for part in (*users, spec.joint(name)):
-            spec.delete(part)
-    return spec.compile()
-
-
-HELD = [
-    (name, joint.name)
-    for name in ("walker", "swimmer", "ant", "humanoid")
-    for joint in BODIES[name]().anatomy.joints[-1:]
-]
-
-
-@pytest.mark.parametrize(("name", "joint"), HELD)
-def test_a_jammed_joint_moves_like_a_welded_one(name: str, joint: str):
-    robot = BODIES[name]()
-    held = robot.anatomy.joint(joint)
-    low, high = held.limits[0]
-    angle = low + 0.3 * (high - low)
-    edited = build(robot, parse(f"jam:{joint}={angle}", robot.anatomy)).model
-    truth = with_weld(robot, held, angle)
-    hinges = [hinge for hinge in robot.anatomy.hinges if hinge not in held.hinges]
-
-    assert truth.nv < edited.nv == robot.model.nv
-    np.testing.assert_allclose(
-        path(robot, edited, hinges, 20), path(robot, truth, hinges, 20), atol=1e-6, rtol=0
-    )
