@@ -1,6 +1,7 @@
 """Array types for signatures, functions on arrays, and arrays as a data frame."""
 
 import importlib
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,11 @@ def frozen(values: FloatArray) -> FloatArray:
     copy = np.array(values, dtype=np.float64, order="C")
     copy.flags.writeable = False
     return copy
+
+
+def finite_or_none(value: float) -> float | None:
+    """Returns a number as JSON has it: None for NaN and infinities, which it has not."""
+    return value if math.isfinite(value) else None
 
 
 def columns(indices: list[int]) -> slice | list[int]:

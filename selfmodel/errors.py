@@ -1,4 +1,4 @@
-"""The errors of selfmodel, and the message for an unknown name."""
+"""The errors of selfmodel, and the parts of their sentences."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -54,3 +54,14 @@ def listed(names: Sequence[str], most: int = 200) -> str:
     """Returns names as part of a sentence: separated by commas, and the number beyond the most."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return (", ".join(names[:most]) or "none") + more
+
+
+def counted(number: float, noun: str) -> str:
+    """Returns a number and its noun in the singular or plural.
+
+    Examples:
+        >>> counted(1, "log"), counted(2, "batch")
+        ('1 log', '2 batches')
+    """
+    ending = "" if number == 1 else "es" if noun.endswith("ch") else "s"
+    return f"{number} {noun}{ending}"

@@ -7,10 +7,10 @@ from typing import Any
 from selfmodel import arguments
 from selfmodel.cli.commands import Calibrate
 from selfmodel.cli.inputs import check_new_file
-from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import show
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.logs.files import create_file
 from selfmodel.simulation.calibration import EXACT_ERROR, UNDETERMINED, calibrate as fit_to
 from selfmodel.simulation.fit import NOMINAL

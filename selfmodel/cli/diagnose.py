@@ -9,13 +9,14 @@ from time import perf_counter
 from selfmodel import arguments, plugins
 from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
 from selfmodel.cli.commands import Diagnose, FromLogs
-from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import print_tables, ranking_table
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis import text
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
 from selfmodel.diagnosis.direct_evidence import direct_evidence
+from selfmodel.errors import counted
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.results import LogsResult, as_json as values_of

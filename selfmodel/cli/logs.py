@@ -1,18 +1,18 @@
 """``selfmodel logs``: commands that read log files, without MuJoCo."""
 
 import dataclasses
-import math
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from selfmodel.arrays import finite_or_none
 from selfmodel.cli.commands import LogInfo, SalvageLog, Verify
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.output import counted, print_json, print_lines
+from selfmodel.cli.output import print_json, print_lines
 from selfmodel.cli.tables import show
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.logs import LogError, inspection, salvage as salvaging
 
 _TRUTH = {
@@ -68,7 +68,7 @@ def _info(path: Path) -> dict[str, Any]:
         "planned_steps": trial.plan.steps,
         "control_timestep": log.control_timestep,
         "seed": trial.plan.seed,
-        "displacement": trial.displacement if math.isfinite(trial.displacement) else None,
+        "displacement": finite_or_none(trial.displacement),
         "driver": found.driver,
         "software": dict(log.software),
         "topics": {

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import typer
 
-from selfmodel.errors import WorkError
+from selfmodel.errors import WorkError, counted
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -40,17 +40,6 @@ def plain(text: str) -> str:
 def figure_text(text: str) -> str:
     """Returns ``plain`` text for matplotlib, which reads a formula between two ``$``."""
     return plain(text).replace("$", r"\$")
-
-
-def counted(number: float, noun: str) -> str:
-    """Returns a number and its noun in the singular or plural.
-
-    Examples:
-        >>> counted(1, "log"), counted(2, "batch")
-        ('1 log', '2 batches')
-    """
-    ending = "" if number == 1 else "es" if noun.endswith("ch") else "s"
-    return f"{number} {noun}{ending}"
 
 
 def print_lines(*lines: str) -> None:

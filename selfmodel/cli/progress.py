@@ -8,10 +8,11 @@ from time import monotonic
 
 import rich.progress as bars
 
-from selfmodel.cli.output import counted, plain
+from selfmodel.cli.output import plain
 from selfmodel.cli.tables import text_console
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.errors import counted
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins

@@ -5,9 +5,9 @@ from pathlib import Path
 from selfmodel import arguments
 from selfmodel.cli.commands import ExportTable, ImportRecording
 from selfmodel.cli.inputs import check_log_name
-from selfmodel.cli.output import counted, print_json, print_lines
+from selfmodel.cli.output import print_json, print_lines
 from selfmodel.cli.tables import show
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.recordings import suggest, tables
 from selfmodel.logs.recordings.importer import ImportedTrial, import_recording, write_recording

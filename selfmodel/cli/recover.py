@@ -1,7 +1,6 @@
 """``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
 
 import dataclasses
-import math
 from datetime import datetime
 from functools import partial
 from os.path import relpath
@@ -9,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel import arguments, plugins
+from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import Recover, settings_of
-from selfmodel.cli.output import counted, print_json, print_lines, print_notes
+from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import displacement_text, display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
+from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
@@ -160,7 +161,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
                 steps=trial.trajectory.steps,
                 ended_early=trial.early_end != "",
                 score=score,
-                predicted_score=predicted if math.isfinite(predicted) else None,
+                predicted_score=finite_or_none(predicted),
                 fell_at_step=fall,
                 hypothesis=str(tried),
             )

@@ -18,9 +18,9 @@ from rich.progress import track
 
 from selfmodel.cli.commands import Render
 from selfmodel.cli.inputs import check_new_file
-from selfmodel.cli.output import counted, plain, print_json, print_lines, print_notes
+from selfmodel.cli.output import plain, print_json, print_lines, print_notes
 from selfmodel.cli.tables import text_console
-from selfmodel.errors import InputError, WorkError
+from selfmodel.errors import InputError, WorkError, counted
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.results import best_hypothesis
 

@@ -9,11 +9,12 @@ import mujoco
 import numpy as np
 
 from selfmodel import arguments, plugins
+from selfmodel.arrays import finite_or_none
 from selfmodel.cli.commands import ReplayTrial, Simulated
 from selfmodel.cli.inputs import check_new_file
-from selfmodel.cli.output import counted, figure_text, print_json, print_lines
+from selfmodel.cli.output import figure_text, print_json, print_lines
 from selfmodel.cli.tables import show
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import TrialLog
@@ -102,7 +103,7 @@ def replay(options: ReplayTrial) -> None:
         "steps": log.trial.trajectory.steps,
         "identical": found.identical,
         "first_divergence_step": found.first_divergence_step,
-        "rms": {key: one if math.isfinite(one) else None for key, one in errors.items()},
+        "rms": {key: finite_or_none(one) for key, one in errors.items()},
         "tolerance": tolerance,
         "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},

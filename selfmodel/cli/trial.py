@@ -1,11 +1,11 @@
 """``selfmodel trial``: one logged trial of the simulated physical robot."""
 
-import math
 from pathlib import Path
 
 import numpy as np
 
 from selfmodel import arguments, plugins
+from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import RunTrial
 from selfmodel.cli.output import print_json, print_lines
@@ -53,7 +53,7 @@ def trial(options: RunTrial) -> None:
         "structure": False,  # readers of 0.1 expect the key
         "seed": options.seed,
         "steps": logged.trajectory.steps,
-        "displacement": logged.displacement if math.isfinite(logged.displacement) else None,
+        "displacement": finite_or_none(logged.displacement),
     }
     if options.as_json:
         print_json(facts)

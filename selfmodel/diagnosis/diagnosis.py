@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from selfmodel.arrays import data_frame
+from selfmodel.arrays import data_frame, finite_or_none
+from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.trials.trial import Trial, TrialPart, whole
 
@@ -239,8 +240,7 @@ class Diagnosis:
         return [whole(part).rows for part in self.change.since(trials)]
 
     def __repr__(self) -> str:
-        count = f"{self.trials} {'trial' if self.trials == 1 else 'trials'}"
-        lines = [f"<Diagnosis of {count}: {self.best}, {self.verdict}"]
+        lines = [f"<Diagnosis of {counted(self.trials, 'trial')}: {self.best}, {self.verdict}"]
         lines += [f"  {one.distance:10.4f}  {one.hypothesis}" for one in self.ranked]
         for name in ("indistinguishable", "undetectable"):
             others = ", ".join(map(str, getattr(self, name)))
@@ -335,8 +335,7 @@ def to_json(value: object) -> Any:  # noqa: ANN401  # JSON values
         case tuple():
             return [to_json(one) for one in value]
         case float():
-            # JSON has no infinity, which is the distance of a simulation that diverged.
-            return value if math.isfinite(value) else None
+            return finite_or_none(value)  # infinite if a simulation diverged
     if dataclasses.is_dataclass(value):
         return {one.name: to_json(getattr(value, one.name)) for one in dataclasses.fields(value)}
     return value

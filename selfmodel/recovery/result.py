@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from selfmodel.arrays import data_frame
+from selfmodel.arrays import data_frame, finite_or_none
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -158,9 +158,9 @@ class Recovery:
         return {
             "trials": self._rows(),
             "displacement": {
-                "before": _observed(self.before),
-                "after": _observed(self.after),
-                "recovered": _observed(self.recovered),
+                "before": finite_or_none(self.before),
+                "after": finite_or_none(self.after),
+                "recovered": finite_or_none(self.recovered),
             },
             "diagnosis": self.diagnosis.to_dict(),
             "evaluations": {
@@ -185,15 +185,10 @@ class Recovery:
                 "trial": trial.plan.name,
                 "stage": trial.plan.stage,
                 "hypothesis": str(tried),
-                "displacement": _observed(trial.displacement),
-                "score": _observed(score),
-                "predicted_score": _observed(predicted),
+                "displacement": finite_or_none(trial.displacement),
+                "score": finite_or_none(score),
+                "predicted_score": finite_or_none(predicted),
                 "log": trial.path,
             }
             for trial, tried, score, predicted in columns
         ]
-
-
-def _observed(value: float) -> float | None:
-    """JSON has no NaN, which is the displacement of an unobserved base."""
-    return value if math.isfinite(value) else None

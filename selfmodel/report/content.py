@@ -15,6 +15,7 @@ from selfmodel.diagnosis.text import (
     verdict_sentences,
     what_is_wrong,
 )
+from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
@@ -76,7 +77,7 @@ def headline(subject: Subject) -> str:
     """Returns what happened, in one sentence."""
     result = subject.result
     if result is None:
-        trials = _counted(len(subject.damaged))
+        trials = counted(len(subject.damaged), "trial")
         return f"{trials} of the {subject.robot.name}. {summary(subject.diagnosis)}"
     score = result.score
     before, after, recovered = (
@@ -89,12 +90,8 @@ def headline(subject: Subject) -> str:
     return (
         f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
         f"it; {what_is_wrong(subject.diagnosis)}. It {achieved} {recovered} at best in "
-        f"{_counted(result.physical_trials)} since{fall}."
+        f"{counted(result.physical_trials, 'trial')} since{fall}."
     )
-
-
-def _counted(trials: int) -> str:
-    return f"{trials} {'trial' if trials == 1 else 'trials'}"
 
 
 def details(subject: Subject) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, data_frame
+from selfmodel.arrays import FloatArray, data_frame, finite_or_none
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -63,7 +63,7 @@ class Replay:
             "identical": self.identical,
             "first_divergence_step": self.first_divergence_step,
             "diverged": self.diverged,
-            "rms": {signal: rms if np.isfinite(rms) else None for signal, rms in rms_values},
+            "rms": {signal: finite_or_none(rms) for signal, rms in rms_values},
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional

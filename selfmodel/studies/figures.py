@@ -17,9 +17,10 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
+from selfmodel.errors import counted
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
-from selfmodel.studies.rows import counted_trials, failure_of, whole
+from selfmodel.studies.rows import failure_of, whole
 from selfmodel.studies.study import Row, grouped
 
 STYLE = Path(__file__).with_name("figures.mplstyle")
@@ -105,7 +106,7 @@ def by_gap(scores: Sequence[Row]) -> Figure:
             if points:
                 label = f"{name} ({counts_text(one['runs'] for one in own)})"
                 _errorbars(axes, points, number, label=label)
-        axes.set(title=f"{robot}, {counted_trials(trials)}", ylim=(-0.03, 1.03), xticks=gaps)
+        axes.set(title=f"{robot}, {counted(trials, 'trial')}", ylim=(-0.03, 1.03), xticks=gaps)
         axes.grid(axis="y")
     for axes in panels[-len(ends) :]:
         axes.set_xlabel("reality gap")
@@ -147,7 +148,7 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
         axes.set_yticks(range(len(comparators)), labels)
         axes.spines[:].set_visible(False)
         axes.set(title=f"gap {gap:g}", xlabel="case")
-    figure.suptitle(f"{robot}, {counted_trials(trials)}: right diagnoses, %")
+    figure.suptitle(f"{robot}, {counted(trials, 'trial')}: right diagnoses, %")
     return figure
 
 

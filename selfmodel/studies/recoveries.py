@@ -16,6 +16,7 @@ from typing import Any
 
 from selfmodel import plugins
 from selfmodel.arguments import comparator_choice, is_model, read_controller, robot_entry
+from selfmodel.arrays import finite_or_none
 from selfmodel.controllers.controller import Controller, check_silent_neurons
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -317,7 +318,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
             "hypothesis": str(tried),
             "displacement": trial.displacement,
             "upright": UPRIGHT.of_trial(robot, tried, trial),
-            "predicted": _finite(predicted),
+            "predicted": finite_or_none(predicted),
             "fell_at_step": fall,
         }
         for number, (trial, tried, predicted, fall) in enumerate(zip(*columns, strict=True))
@@ -390,8 +391,8 @@ class _DiagnosisWatch:
                 "correct": experiments.is_correct(
                     found.best, truth, trials[: found.trials], simulator
                 ),
-                "distance": _finite(found.ranked[0].distance),
-                "intact_distance": _finite(found.intact_distance),
+                "distance": finite_or_none(found.ranked[0].distance),
+                "intact_distance": finite_or_none(found.intact_distance),
                 "verdict": found.verdict,
                 "rivals": len(found.indistinguishable),
                 **cost,
@@ -401,7 +402,3 @@ class _DiagnosisWatch:
             }
             for found, cost in self._costs
         ]
-
-
-def _finite(distance: float) -> float | None:
-    return float(distance) if math.isfinite(distance) else None

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.files import read_file
 from selfmodel.studies import comparisons
 from selfmodel.studies.study import Row, rows_in, study_in
@@ -70,7 +70,7 @@ def _of_ablation(rows: pd.DataFrame) -> OutcomeRows:
     for gap in [None, *gaps] if len(gaps) > 1 else [None]:
         alone = () if gap is None else (f"gap {gap:g}",)
         for row in (rows if gap is None else rows[rows["gap"] == gap]).itertuples():
-            table = row.robot, counted_trials(row.trials), *alone
+            table = row.robot, counted(row.trials, "trial"), *alone
             cell = f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial
             yield table, row.comparator, cell, row.seed, float(row.correct), "share"
 
@@ -98,7 +98,7 @@ def _of_methods(rows: pd.DataFrame) -> OutcomeRows:
             value = method_value(row, trials)
             bound = bounds.get((row.robot, row.case, row.gap, row.seed), 0.0)
             run = row.method, (f"gap {row.gap:g}", f"{row.case:2d}"), row.seed
-            table = row.robot, f"after {counted_trials(trials)}"
+            table = row.robot, f"after {counted(trials, 'trial')}"
             yield (*table, "m"), *run, value, "number"
             if bound > 0:
                 yield (*table, "÷ oracle"), *run, value / bound, "number"
@@ -304,8 +304,3 @@ def whole(tables: pd.DataFrame) -> pd.DataFrame:
 def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number, or pandas' NA
     """Returns the name of a failure: its number in Table I, or its notation."""
     return truth if pd.isna(case) else f"{case:2d}"
-
-
-def counted_trials(trials: int) -> str:
-    """Returns a number of trials with its noun."""
-    return f"{trials} {'trial' if trials == 1 else 'trials'}"

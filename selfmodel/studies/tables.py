@@ -3,7 +3,6 @@
 import dataclasses
 import io
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import pandas as pd
 
+from selfmodel.arrays import finite_or_none
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.studies.comparisons import ends
@@ -119,7 +119,7 @@ def as_json(value: Any) -> Any:  # noqa: ANN401  # JSON
             return {key: as_json(inner) for key, inner in value.items()}
         case list() | tuple():
             return [as_json(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return finite_or_none(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)

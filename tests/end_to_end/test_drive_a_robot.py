@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.cli.output import counted
+from selfmodel.errors import counted
 from selfmodel.logs.inspection import verify
 from selfmodel.tasks.walking import environment, motion_capture
 from tests.helpers.code_blocks import blocks
