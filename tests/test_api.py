@@ -1,12 +1,10 @@
 """Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
 
-import dataclasses
 import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 import selfmodel
@@ -18,6 +16,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults import BROKEN, JAMMED
 from selfmodel.trials.trial import Trial
 from tests.helpers.command import selfmodel as command
+from tests.helpers.hostile import lacking
 
 LOGS = Path(__file__).parent / "data" / "logs-0.1" / "recovery" / "trials"
 BEFORE, AFTER = LOGS / "00-before.mcap", LOGS / "01-after.mcap"
@@ -180,11 +179,7 @@ def test_a_replay_of_wrong_notation_is_refused():
 @pytest.fixture
 def blind() -> Trial:
     """A failing trial without the base's position."""
-    trial = selfmodel.read_log(AFTER).trial
-    run = trial.trajectory
-    lost = {"base_position": np.full_like(run["base_position"], np.nan)}
-    trajectory = dataclasses.replace(run, signals={**run.signals, **lost})
-    return dataclasses.replace(trial, trajectory=trajectory)
+    return lacking(selfmodel.read_log(AFTER).trial, ("base_position",))
 
 
 def test_a_comparator_that_cannot_judge_is_refused_before_the_calibration(

@@ -30,35 +30,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("form", ["csv", "npz", "parquet"])
-def test_an_exported_trial_is_imported_as_the_same_trial(form: str, folder: Path):
-    table = f"after.{form}"
+def test_an_exported_trial_is_imported_as_the_same_trial(folder: Path):
+    table = "after.csv"
     done = selfmodel("logs", "export", "after.mcap", "-o", table, "--json", cwd=folder)
     assert json.loads(done.stdout)["rows"] == 200
     done = selfmodel("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=folder)
     assert done.returncode == 0, done.stderr
     (folder / "map.toml").write_text(done.stdout)
-    imported = ("logs", "import", table, "--mapping", "map.toml", "--out", f"{form}.mcap")
+    imported = ("logs", "import", table, "--mapping", "map.toml", "--out", "again.mcap")
     done = selfmodel(*imported, cwd=folder)
     assert done.returncode == 0, done.stderr
 
     original, again = (
-        read_log(folder / name).trial.trajectory for name in ("after.mcap", f"{form}.mcap")
+        read_log(folder / name).trial.trajectory for name in ("after.mcap", "again.mcap")
     )
     for signal, values in original.signals.items():
         assert values.tobytes() == again[signal].tobytes(), signal
-
-
-def test_an_existing_table_and_an_unknown_format_are_refused(folder: Path):
-    (folder / "mine.csv").write_text("mine")
-    for name, message in (
-        ("mine.csv", "exists, and is not overwritten"),
-        ("t.xls", "ends in .csv"),
-    ):
-        done = selfmodel("logs", "export", "after.mcap", "-o", name, cwd=folder)
-        assert done.returncode == 2
-        assert message in done.stderr
-    assert (folder / "mine.csv").read_text() == "mine"
 
 
 @recorded

@@ -24,7 +24,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import shown
 from selfmodel.trials.estimation import JOINTS
-from selfmodel.trials.signals import PREDICTION_ERROR_SCALES, SIGNALS
+from selfmodel.trials.signals import PREDICTION_ERROR_SCALES
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
@@ -120,11 +120,7 @@ def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
 
 
 def with_signals(one: Trial, **signals: np.ndarray) -> Trial:
-    trajectory = one.trajectory
-    changed = {**{signal: trajectory[signal] for signal in SIGNALS}, **signals}
-    return dataclasses.replace(
-        one, trajectory=Trajectory(trajectory.names, trajectory.time, changed)
-    )
+    return dataclasses.replace(one, trajectory=changed(one.trajectory, **signals))
 
 
 @pytest.mark.parametrize("truth", ["intact", "break:front_left_knee", "sensor:front_left_angle"])

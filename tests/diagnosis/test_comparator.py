@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 
-import numpy as np
 import pytest
 
 from selfmodel.comparators import COMPARATORS, PREFERENCE
@@ -16,6 +15,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers
+from tests.helpers.hostile import lacking
 from tests.helpers.memory import in_memory
 
 SEGMENTS, ONBOARD, NOISY, SERIES = (comparator.name for comparator in PREFERENCE)
@@ -40,10 +40,7 @@ def trial(robot: Robot) -> Trial:
 
 
 def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Trial:
-    run = trial.trajectory
-    lost = {signal: np.full_like(run[signal], np.nan) for signal in signals}
-    trajectory = dataclasses.replace(run, signals={**run.signals, **lost})
-    return dataclasses.replace(trial, trajectory=trajectory, path=path)
+    return dataclasses.replace(lacking(trial, signals), path=path)
 
 
 @pytest.mark.parametrize(

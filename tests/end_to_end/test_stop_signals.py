@@ -1,7 +1,6 @@
-"""Drivers and commands that a stop signal ends: in order, completely, and with its exit status."""
+"""Commands that a stop signal ends: completely, and with its exit status."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -13,48 +12,13 @@ import pytest
 from typer.core import TyperGroup
 
 from selfmodel.controllers.controller import CommandSource
-from selfmodel.logs.inspection import verify
 from selfmodel.physical.safety import STOP_SIGNALS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.trials.trajectory import Sample
 from tests.helpers.command import SMALL, selfmodel
-from tests.helpers.signalled_driver import PHASES, STEPS
 
 ROOT = Path(__file__).parents[2]
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("watchdog", [None, 5.0])
-@pytest.mark.parametrize("number", STOP_SIGNALS)
-def test_whenever_a_signal_comes_the_robot_is_stopped_last_and_the_log_verifies(
-    number: signal.Signals, watchdog: float | None, tmp_path: Path
-):
-    rng = random.Random(number)  # noqa: S311  # moments, not secrets
-    for phase in rng.sample(list(PHASES)[:-1], 2):
-        folder = tmp_path / phase
-        folder.mkdir()
-        count = rng.randrange(1, STEPS) if phase in ("step", "between") else 1
-        moment = (number.value, phase, count, rng.uniform(0.0, PHASES[phase]))
-        limit = () if watchdog is None else (watchdog,)
-        done = subprocess.run(
-            [
-                *(sys.executable, "-m", "tests.helpers.signalled_driver"),
-                *map(str, (folder, *moment, *limit)),
-            ],
-            cwd=ROOT,
-            env={**os.environ, "MUJOCO_GL": "disable"},
-            check=False,
-            timeout=120,
-        )
-        sent = (folder / "sent").read_text().split()
-        logs = [path.name for path in folder.glob("trial*")]
-
-        assert sent[-2:] in ([], ["stop", "stopped"]), "the safe command is the last, and whole"
-        assert logs == ["trial.mcap"] if logs or "step" in sent else logs == []
-        assert all(verify(folder / log).log.status for log in logs)
-        # The same for a shell: the signal itself, before the trial and for SIGINT, or its status.
-        assert done.returncode in (0, -number, 128 + number)
 
 
 @pytest.mark.parametrize("number", STOP_SIGNALS)

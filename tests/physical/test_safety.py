@@ -192,28 +192,31 @@ def at_line(place: int, act: Callable[[], None]) -> Callable[[], int]:
     return end
 
 
-def interrupted_at(place: int, number: signal.Signals, folder: Path) -> tuple[int, list[str]]:
+def interrupted_at(
+    place: int, number: signal.Signals, folder: Path, watchdog: float | None
+) -> tuple[int, list[str]]:
     """Runs a trial with a signal at a line; returns the number of lines, and what was executed."""
     bench = Bench()
     with suppress(KeyboardInterrupt), handle_stop_signals():
         end = at_line(place, lambda: signal.raise_signal(number))
         try:
-            logged(bench, folder, steps=3)
+            logged(bench, folder, steps=3, watchdog=watchdog)
         finally:
             lines = end()
     return lines, bench.done
 
 
+@pytest.mark.parametrize("watchdog", [None, 5.0])
 @pytest.mark.parametrize("cases", [6, pytest.param(40, marks=pytest.mark.process)])
 def test_at_whatever_line_a_signal_comes_the_robot_is_stopped_last_and_the_log_is_whole(
-    tmp_path: Path, cases: int
+    tmp_path: Path, cases: int, watchdog: float | None
 ):
     (tmp_path / "whole").mkdir()
-    lines, _ = interrupted_at(-1, signal.SIGTERM, tmp_path / "whole")
+    lines, _ = interrupted_at(-1, signal.SIGTERM, tmp_path / "whole", watchdog)
     rng = random.Random(5)  # noqa: S311  # moments, not secrets
     for case, place in enumerate(sorted(rng.sample(range(lines), min(cases, lines)))):
         (folder := tmp_path / str(case)).mkdir()
-        _, executed = interrupted_at(place, STOP_SIGNALS[case % 3], folder)
+        _, executed = interrupted_at(place, STOP_SIGNALS[case % 3], folder, watchdog)
         files = [path.name for path in folder.iterdir()]
         assert not executed or executed[-1] == "stop", f"at line {place} of {lines}"
         assert files in ([], ["trial.mcap"]), f"at line {place} of {lines}: {executed}"
