@@ -2,9 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import get_args
 
@@ -19,9 +16,10 @@ from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.journal import FolderJournal
 from selfmodel.logs.results import read_result, versions
+from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
 from tests.cli.conftest import SHORT
-from tests.helpers.command import DIAGNOSIS, SMALL, Done, selfmodel, selfmodel_process
+from tests.helpers.command import DIAGNOSIS, SMALL, Done, refused, selfmodel, selfmodel_process
 from tests.helpers.drivers import random_controllers
 
 ROOT = Path(__file__).parents[2]
@@ -135,10 +133,8 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(recovery: tup
 def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[Path, dict]):
     folder, _ = short
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    refused = selfmodel("recover", "hexapod", "--case", "1", "--out", "run", cwd=folder)
-
-    assert refused.returncode == 2
-    assert "run holds another run or other files" in refused.stderr
+    said = "run holds another run or other files"
+    refused("recover", "hexapod", "--case", "1", "--out", "run", said=said, cwd=folder)
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
@@ -172,12 +168,7 @@ def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[
 )
 def test_bad_input_is_one_sentence_and_status_2(tmp_path: Path, arguments: list[str], said: str):
     (tmp_path / "bad.mcap").write_bytes(b"not a log")
-    done = selfmodel(*arguments, cwd=tmp_path, COLUMNS="200")
-
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
+    refused(*arguments, said=said, cwd=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["bad.mcap"]
 
 
@@ -212,37 +203,26 @@ def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, qu
     assert read_log(tmp_path / "b.mcap").trial.plan.controller == controller
     assert a["displacement"] == b["displacement"] != c["displacement"]
     assert (a["truth"], c["truth"]) == ("intact", "break:front_left_knee")
-    refused = selfmodel(
-        *("trial", "hexapod", "--controller", "a.mcap", "--out", "d.mcap"), cwd=tmp_path
-    )
-    assert refused.returncode == 2
-    assert "give a controller of this robot" in refused.stderr
+    other = ("trial", "hexapod", "--controller", "a.mcap", "--out", "d.mcap")
+    refused(*other, said="give a controller of this robot", cwd=tmp_path)
 
 
-@pytest.mark.process
-@pytest.mark.search
-def test_an_interrupted_recovery_keeps_its_finished_trials(tmp_path: Path):
-    running = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "selfmodel", "recover", "quadruped", "--case", "1"),
-            *(*SMALL, "--kinds", "paper", "--steps", "200", "--trials", "90", "--out", "run"),
-        ],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    trials = tmp_path / "run" / "trials"
-    deadline = time.monotonic() + 120
-    while not (trials / "01-after.mcap").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    running.send_signal(signal.SIGINT)
-    _, told = running.communicate(timeout=60)
+def test_an_interrupted_recovery_keeps_its_finished_trials(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def interrupted(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
 
-    assert running.returncode == 130
-    assert "interrupted: the finished trials are in run" in told
-    assert "Traceback" not in told
+    monkeypatch.setattr(RecoveryLoop, "_choose_comparator", interrupted)
+    run = ("recover", "quadruped", "--case", "1", *SMALL, "--kinds", "paper", "--no-calibrate")
+    done = selfmodel(*run, "--steps", "40", "--out", "run", cwd=tmp_path)
+
+    assert done.returncode == 130
+    assert "interrupted: the finished trials are in run" in done.stderr
+    assert "Traceback" not in done.stderr
     for name in ("00-before", "01-after"):
-        assert read_log(trials / f"{name}.mcap").trial.trajectory.steps == 200
+        log = read_log(tmp_path / "run" / "trials" / f"{name}.mcap")
+        assert log.trial.trajectory.steps == 40
 
 
 def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):

@@ -12,7 +12,7 @@ import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
-from tests.helpers.command import DIAGNOSIS, SMALL, selfmodel
+from tests.helpers.command import DIAGNOSIS, SMALL, refused, selfmodel
 
 PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
@@ -313,10 +313,5 @@ def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
     folder: Path, arguments: list[str], said: str
 ):
     before = sorted(path.name for path in folder.iterdir())
-    done = selfmodel(*arguments, cwd=folder, COLUMNS="200")
-
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
+    refused(*arguments, said=said, cwd=folder)
     assert sorted(path.name for path in folder.iterdir()) == before

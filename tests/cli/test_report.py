@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.report.charts import Report, html_of
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, refused, selfmodel
 
 BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"
 
@@ -57,12 +57,9 @@ def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
     shutil.copy(logs / "before.mcap", logs / "moved" / "after.mcap")
 
     for given in (("after.mcap",), ("after.mcap", "moved/after.mcap", "before.mcap")):
-        done = selfmodel(
-            "report", *given, "--diagnosis", diagnosed.name, "-o", "other.html", cwd=logs
-        )
-
-        assert (done.returncode, done.stdout) == (2, "")
-        assert "is a diagnosis of other logs: expected after.mcap, before.mcap" in done.stderr
+        report = ("report", *given, "--diagnosis", diagnosed.name, "-o", "other.html")
+        said = "is a diagnosis of other logs: expected after.mcap, before.mcap"
+        refused(*report, said=said, cwd=logs)
 
 
 def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
@@ -113,7 +110,4 @@ def test_bad_input_is_one_sentence_and_status_2(logs: Path, arguments: tuple[str
     (logs / "empty").mkdir(exist_ok=True)
     (logs / "taken.html").touch()
 
-    done = selfmodel("report", *arguments, cwd=logs)
-
-    assert (done.returncode, done.stdout) == (2, "")
-    assert said in done.stderr
+    refused("report", *arguments, said=said, cwd=logs)

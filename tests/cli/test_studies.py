@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.studies import figures
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, refused, selfmodel
 
 ROOT = Path(__file__).parents[2]
 TINY = (*SMALL, "--steps", "60", "--trials", "1", "--workers", "1", "--out", "out")
@@ -62,7 +62,8 @@ def test_bodies_of_the_suite_and_of_the_user_fail_and_recover_once(tmp_path: Pat
     assert first.returncode == 0, first.stderr
     logs = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.mcap")}
     again = selfmodel(*SUITE, "--json", "--table", "csv", cwd=tmp_path)
-    other = selfmodel(*SUITE, "--controller", "cpg", cwd=tmp_path)
+    said = "contains a study with other settings (controller is"
+    refused(*SUITE, "--controller", "cpg", said=said, cwd=tmp_path)
     told = json.loads(first.stdout)
     rows = told["rows"]
 
@@ -80,8 +81,6 @@ def test_bodies_of_the_suite_and_of_the_user_fail_and_recover_once(tmp_path: Pat
         shares = [float(row["correct_high"]) for row in csv.DictReader(file)]
     assert shares == [row["correct"]["high"] for row in told["summaries"]]
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.mcap")} == logs
-    assert other.returncode == 2
-    assert "contains a study with other settings (controller is" in other.stderr
 
 
 @pytest.mark.process
@@ -138,10 +137,7 @@ def test_the_papers_experiment_ends_with_tables_and_figures_and_is_continued(tmp
 def test_wrong_input_is_refused_before_anything_is_written(
     tmp_path: Path, command: tuple[str, ...], message: str
 ):
-    done = selfmodel(*command, cwd=tmp_path)
-
-    assert done.returncode == 2
-    assert message in done.stderr
+    refused(*command, said=message, cwd=tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 

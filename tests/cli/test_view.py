@@ -22,7 +22,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.robot.motion import shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
-from tests.helpers.command import selfmodel
+from tests.helpers.command import refused, selfmodel
 
 pytest.importorskip("rerun", reason="the extra rerun is not installed")
 
@@ -125,10 +125,7 @@ def test_a_wrong_request_is_an_error_before_any_work(
     folder: Path, arguments: tuple[str, ...], message: str
 ):
     (folder / "taken.rrd").touch()
-    told = selfmodel("view", "a.mcap", *arguments, cwd=folder)
-
-    assert told.returncode == 2
-    assert message in told.stderr
+    refused("view", "a.mcap", *arguments, said=message, cwd=folder)
     assert (folder / "taken.rrd").read_bytes() == b""
 
 

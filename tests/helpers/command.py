@@ -56,6 +56,15 @@ def selfmodel_process(*arguments: str, cwd: Path, **environment: str) -> Done:
     )
 
 
+def refused(*arguments: str, said: str, cwd: Path, **environment: str) -> Done:
+    """Runs a command with wrong input, which ends with status 2, one sentence, and no result."""
+    done = selfmodel(*arguments, cwd=cwd, **environment)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+    return done
+
+
 @contextmanager
 def _as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -> Iterator[None]:
     """Sets what a new process would have, and restores it; modules in the folder are forgotten."""
