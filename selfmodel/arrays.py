@@ -53,15 +53,15 @@ def median_of_known(columns: FloatArray) -> FloatArray:
     return np.array([np.median(own) if len(own) else np.nan for own in known], dtype=np.float64)
 
 
-def held(values: FloatArray) -> FloatArray:
-    """Returns rows in which each NaN is the last number before it; a first NaN remains.
+def held(values: FloatArray, axis: int = 0) -> FloatArray:
+    """Returns an array with each NaN or infinity the last number before it along an axis.
 
-    Args:
-        values: ``(rows, columns)``.
+    A first one remains.
     """
-    rows = np.arange(len(values))[:, np.newaxis]
-    last = np.maximum.accumulate(np.where(np.isnan(values), 0, rows), axis=0)
-    return np.asarray(np.take_along_axis(values, last, axis=0))
+    rows = np.moveaxis(values, axis, -1)
+    last = np.where(np.isfinite(rows), np.arange(rows.shape[-1]), 0)
+    found = np.take_along_axis(rows, np.maximum.accumulate(last, axis=-1), axis=-1)
+    return np.ascontiguousarray(np.moveaxis(found, -1, axis))
 
 
 def data_frame(

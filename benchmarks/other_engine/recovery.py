@@ -17,8 +17,8 @@ from selfmodel.errors import WorkError, describe
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import load_controller
+from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.result import Recovery
-from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator

@@ -14,9 +14,9 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import InputError, TrialError
 from selfmodel.evolution import Evolution, reproduce
 from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.recovery.falls import first_falls, held_at_the_end
 from selfmodel.recovery.map_elites import Evaluate
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.scores import first_falls, held_at_the_end
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.trajectory import Sample, collect

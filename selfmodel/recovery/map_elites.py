@@ -16,8 +16,8 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
-from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -17,10 +17,10 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.falls import first_falls
 from selfmodel.recovery.recover import RecoveryLoop, by_repair
 from selfmodel.recovery.repair import mutants, untried_mutants
 from selfmodel.recovery.result import DiscriminatingTrial
-from selfmodel.recovery.scores import first_falls
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Cache, Simulator

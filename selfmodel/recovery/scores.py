@@ -1,4 +1,4 @@
-"""Scores of rollouts and trials: the fitness of a repair; and the falls that end a score.
+"""Scores of rollouts and trials: the fitness of a repair.
 
 ``SCORES`` has those that need no argument; ``upright_within`` limits returns another, and so does
 ``tracking``. Any other ``Score`` works as well.
@@ -13,28 +13,17 @@ from types import MappingProxyType
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, held
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.falls import falls_of, first_lasting, steps_in
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.rollout import SimulationResult
-from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
-
-FALLEN_HEIGHT = 0.5
-"""Height below which a base has fallen, as a fraction of its standing height. A base that starts on
-the ground, as a swimmer's, cannot fall by this rule."""
-
-FALLEN_TILT = np.radians(60)
-"""Tilt above which a base has fallen, relative to its initial orientation, rad."""
-
-FALLEN_TIME = 0.25
-"""Time over which a fall is judged, s: a base that has fallen is low or tilted in more than half of
-the measurements. A low stride or a wrong measurement is shorter."""
 
 COLLISION_TIME = 0.05
 """Time over which a self-collision is judged, s: two bodies are too deep in each other in more than
@@ -107,97 +96,6 @@ def scores_of(
     return scores
 
 
-def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> IndexArray:
-    """Returns the first step at which each run has fallen; see ``first_falls``.
-
-    The hypothesis matters because a slope tilts the ground.
-    """
-    return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
-
-
-def first_falls(trajectory: Trajectory, normals: FloatArray, standing_height: float) -> IndexArray:
-    """Returns the first step at which the robot has fallen, or the number of steps without a fall.
-
-    At that step the base is low or tilted, and so it is for most of ``FALLEN_TIME``; see
-    ``first_lasting``.
-
-    Args:
-        trajectory: Position and orientation of the base, ``(..., steps, width)`` each; NaN where
-            not observed.
-        normals: Unit normals of the ground, ``(..., 3)``, broadcast to the shape of the runs. The
-            ground passes through the origin.
-        standing_height: Height of the base in the initial pose, m.
-    """
-    height = np.einsum("...sk,...k->...s", trajectory["base_position"], normals)
-    # The world's upward direction in the frame of the base, against the first one that is known.
-    upward = directions(trajectory["base_orientation"])[..., 2:]
-    first = np.isfinite(upward).all(axis=-1).argmax(axis=-1)
-    reference = np.take_along_axis(upward, first[..., np.newaxis, np.newaxis], axis=-2)
-    cosine = (upward * reference).sum(axis=-1)
-    low = (height < FALLEN_HEIGHT * standing_height) & (standing_height > 0)
-    down = low | (cosine < np.cos(FALLEN_TILT))
-    up = ~down & (np.isfinite(height) | np.isfinite(cosine))
-    return first_lasting(down, up, _steps_in(FALLEN_TIME, trajectory))
-
-
-def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
-    """Returns the step at which the robot fell in a trial; None if it did not, or cannot fall.
-
-    A fixed base cannot fall, and a base that was not observed is not known to have fallen. A trial
-    that ended early may have ended by a fall: its last pose counts as if it remained.
-    """
-    if robot.has_fixed_base:
-        return None
-    logged = trial.trajectory
-    whole = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
-    fall = int(falls_of(robot, hypothesis, whole))
-    return fall if fall < logged.steps else None
-
-
-def held_at_the_end(trajectory: Trajectory) -> Trajectory:
-    """Returns the signals of a run that ended early as if the last ones remained.
-
-    A robot that is stopped as it falls has few measurements of the fall.
-    """
-    more, time = _steps_in(FALLEN_TIME, trajectory), trajectory.time
-    step = time[-1] - time[-2] if trajectory.steps > 1 else FALLEN_TIME
-    signals = {
-        name: np.pad(values, ((0, more), (0, 0)), mode="edge")
-        for name, values in trajectory.signals.items()
-    }
-    later = time[-1] + step * np.arange(1, more + 1)
-    return Trajectory(trajectory.names, np.concatenate([time, later]), signals)
-
-
-def first_lasting(state: BoolArray, other: BoolArray, steps: int) -> IndexArray:
-    """Returns the first step of a state that lasts, or the number of steps without one, ``(...)``.
-
-    Args:
-        state: Steps of the state, ``(..., steps)``; it lasts if it is more frequent than the other
-            in the window of the step.
-        other: Steps of the other state; a step of neither is not known.
-        steps: Length of a window, which begins at the step itself. The end of the run cuts no
-            window: near it, the window is that of the last ``steps``, or the whole of a run that is
-            shorter.
-    """
-    run = state.shape[-1]
-    first = np.minimum(np.arange(run), max(run - steps, 0))
-    last = np.minimum(first + steps, run) - 1
-
-    def in_window(one: BoolArray) -> IndexArray:
-        total = np.cumsum(one, axis=-1)
-        return np.asarray(total[..., last] - total[..., first] + one[..., first])
-
-    lasting = state & (in_window(state) > in_window(other))
-    return np.asarray(np.where(lasting.any(axis=-1), lasting.argmax(axis=-1), run))
-
-
-def _steps_in(duration: float, trajectory: Trajectory) -> int:
-    """Returns the control steps in a time, s, at least 1."""
-    time = trajectory.time
-    return max(1, round(duration / (time[1] - time[0]))) if len(time) > 1 else 1
-
-
 def _displacement(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     return forward_displacement(trajectory)
 
@@ -218,11 +116,11 @@ def _upright_less_work(robot: Robot, hypothesis: Hypothesis, trajectory: Traject
 
 def _steps(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     feet = [k for k, one in enumerate(robot.anatomy.sensors) if one.kind == "touch"]
-    touch = _held(trajectory["sensors"][..., feet].swapaxes(-1, -2))
-    window = _steps_in(STEP_TIME, trajectory)
+    touch = held(trajectory["sensors"][..., feet].swapaxes(-1, -2), axis=-1)
+    window = steps_in(STEP_TIME, trajectory)
     total = np.cumsum(np.nan_to_num(touch), axis=-1)
     share = (total[..., window:] - total[..., :-window]) / window
-    stands = _held(np.where(share > STANDS, 1.0, np.where(share < SWINGS, 0.0, np.nan)))
+    stands = held(np.where(share > STANDS, 1.0, np.where(share < SWINGS, 0.0, np.nan)), axis=-1)
     landings = np.count_nonzero((stands[..., 1:] == 1) & (stands[..., :-1] == 0), axis=-2)
     end = falls_of(robot, hypothesis, trajectory)
     before = np.arange(landings.shape[-1]) + window + 1 < end[..., np.newaxis]
@@ -326,7 +224,7 @@ def upright_within(
     compares_bodies = math.isfinite(max_self_collision)
 
     def of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
-        moved = np.diff(_held(trajectory["base_position"][..., 0]), axis=-1)
+        moved = np.diff(held(trajectory["base_position"][..., 0], axis=-1), axis=-1)
         # A joint that has come off lies on the ground, and is not the robot's.
         detached = build(robot, hypothesis).detached
         attached = [j for j, name in enumerate(robot.anatomy.hinges) if name not in detached]
@@ -338,7 +236,7 @@ def upright_within(
         end = falls_of(robot, hypothesis, trajectory)
         if compares_bodies:
             deep = _depths(robot, hypothesis, trajectory) > max_self_collision
-            steps = _steps_in(COLLISION_TIME, trajectory)
+            steps = steps_in(COLLISION_TIME, trajectory)
             end = np.minimum(end, first_lasting(deep, ~deep, steps))
         before = np.arange(1, trajectory.steps) < end[..., np.newaxis]
         return np.asarray(np.where(before, counted, 0.0).sum(axis=-1))
@@ -357,19 +255,13 @@ def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> Flo
     A joint without a measurement is where it was last measured, or else in the initial pose.
     Detached bodies do not count, and encoders have the offsets of the hypothesis.
     """
-    logged = _held(trajectory["joint_positions"].swapaxes(-1, -2)).swapaxes(-1, -2)
+    logged = held(trajectory["joint_positions"], axis=-2)
     angles = logged - build(robot, hypothesis).encoder_offset
     initial = [float(robot.model.joint(name).qpos0[0]) for name in robot.anatomy.hinges]
     poses = np.where(np.isfinite(angles), angles, initial)
     lost = detached_bodies(robot.anatomy, robot.model, hypothesis)
     depths = penetration_depths(robot, poses.reshape(-1, len(initial)), lost)
     return depths.reshape(poses.shape[:-1])
-
-
-def _held(values: FloatArray) -> FloatArray:
-    """Returns values, ``(..., steps)``, with each NaN replaced by the last known value before."""
-    steps = np.where(np.isfinite(values), np.arange(values.shape[-1]), 0)
-    return np.take_along_axis(values, np.maximum.accumulate(steps, axis=-1), axis=-1)
 
 
 def checked(score: Score, name: str) -> Score:

@@ -31,11 +31,12 @@ from selfmodel.logs.files import replace_file
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
+from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import model_digest
 from selfmodel.recovery.result import Event, SearchBegins
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, falls_of
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

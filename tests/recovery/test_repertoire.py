@@ -13,6 +13,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery import map_elites as module
+from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.map_elites import (
     feet_of,
     make_repertoire,
@@ -20,7 +21,6 @@ from selfmodel.recovery.map_elites import (
     simulated_evaluation,
 )
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest, self_model_digest
-from selfmodel.recovery.scores import falls_of
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator

@@ -13,20 +13,16 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.recovery.falls import FALLEN_HEIGHT, FALLEN_TIME, fall_of, falls_of, first_falls
 from selfmodel.recovery.scores import (
     DISPLACEMENT,
     ENERGY,
-    FALLEN_HEIGHT,
-    FALLEN_TIME,
     LARGEST,
     SCORES,
     UPRIGHT,
     WORK_WEIGHT,
     Score,
     checked,
-    fall_of,
-    falls_of,
-    first_falls,
     joint_work,
     upright_within,
 )

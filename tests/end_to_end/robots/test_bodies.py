@@ -19,7 +19,7 @@ from selfmodel.logs.robots import robot_of
 from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.scores import first_falls
+from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
