@@ -263,7 +263,7 @@ def result_bytes(content: Mapping[str, Any]) -> bytes:
     # The digest is that of the values as a reader parses them: JSON's keys are texts.
     given = {**content, MADE_WITH: versions()}
     values = parse_json(json.dumps(given, allow_nan=False).encode())
-    data = json.dumps({**values, DIGEST: _digest(values)}, indent=1, allow_nan=False).encode()
+    data = json.dumps({**values, DIGEST: digest_of(values)}, indent=1, allow_nan=False).encode()
     if len(data) > MAX_BYTES:
         raise ValueError(f"expected a result of at most {MAX_BYTES} bytes as JSON, got {len(data)}")
     return data
@@ -326,14 +326,15 @@ def verified(values: Any) -> Mapping[str, Any]:  # noqa: ANN401  # JSON
     if not values.keys() & {MADE_WITH, DIGEST}:
         return values
     content = {key: value for key, value in values.items() if key != DIGEST}
-    if values.get(DIGEST) != _digest(content):
+    if values.get(DIGEST) != digest_of(content):
         raise ValueError("its digest is missing or wrong, so it was altered or damaged")
     if not isinstance(content.pop(MADE_WITH, None), dict):
         raise ValueError("it lacks the versions that made it")  # noqa: TRY004  # as above
     return content
 
 
-def _digest(values: Mapping[str, Any]) -> str:
+def digest_of(values: object) -> str:
+    """Returns the SHA-256 of JSON values in a canonical form."""
     try:
         text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except RecursionError:

@@ -19,7 +19,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.files import read_file, sync_folder
 from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
+from selfmodel.logs.results import digest_of, versions
 
 CELL, UNFINISHED, ERRORS = "cell.json", "unfinished", "errors"
 """File of a finished cell; folders of the cells that are being computed, and of the failures."""
@@ -177,7 +177,7 @@ def _perform(folder: Path, cell: Cell, unfinished: Path, begin: float) -> str | 
             "seconds": time.perf_counter() - begin,
             "made_with": made_with(cell.function),
         }
-        text = json.dumps({**content, "sha256": _digest(content)}, indent=1, allow_nan=False)
+        text = json.dumps({**content, "sha256": digest_of(content)}, indent=1, allow_nan=False)
     except (OSError, InputError, WorkError, MemoryError) as cause:
         if isinstance(cause, OSError) and is_full(cause):
             raise not_written(cause.filename or unfinished, cause) from cause
@@ -231,7 +231,7 @@ def read_cell(path: Path) -> FinishedCell:
         finished_cell = FinishedCell(
             cell["name"], cell["parameters"], content["result"], path, made, content["files"]
         )
-        is_whole = digest == _digest(content) and path.parent.name == _folder_name(cell, made)
+        is_whole = digest == digest_of(content) and path.parent.name == _folder_name(cell, made)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: expected a cell of a study, got {error!r}; {REMEDY}") from error
     if not is_whole:
@@ -257,17 +257,11 @@ def made_with(function: str) -> dict[str, str]:
     if module is not None and module.origin and not module.name.startswith("selfmodel."):
         code[""] = Path(module.origin).read_bytes()
     digests = {name: hashlib.sha256(content).hexdigest() for name, content in code.items()}
-    versions = {package: version(package) for package in ("selfmodel", "mujoco", "numpy")}
-    return {**versions, "code": _digest(digests)[:16]}
+    return {**versions(), "code": digest_of(digests)[:16]}
 
 
 def _folder_name(definition: Mapping[str, Any], made: Mapping[str, str]) -> str:
-    return f"{definition['name'][:150]}-{_digest([definition, made])[:16]}"
-
-
-def _digest(values: object) -> str:
-    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return f"{definition['name'][:150]}-{digest_of([definition, made])[:16]}"
 
 
 def listed(made: Mapping[str, str]) -> str:

@@ -26,10 +26,10 @@ from tests.logs.recordings.bags import (
     ROS1_FORMS,
     T0,
     array,
-    ros1_payload,
     spoilt,
     storage,
     write_bag,
+    write_mcap,
     write_ros1,
 )
 from tests.logs.recordings.conftest import imported, recorded
@@ -81,21 +81,8 @@ def test_a_ros_1_bag_is_the_same_trial(form: str, biped: Robot, bag: Path, tmp_p
 def test_other_writers_of_mcap_are_read(
     *, encoding: str, chunked: bool, biped: Robot, expected: dict, tmp_path: Path
 ):
-    path = tmp_path / "bag.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.LZ4, use_chunking=chunked)
-        writer.start("another")
-        channels = {}
-        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
-            kind = message.__msgtype__
-            if topic not in channels:
-                # Old recordings leave out the middle of the name.
-                schema = writer.register_schema(kind.replace("/msg/", "/"), "ros2msg", b"")
-                channels[topic] = writer.register_channel(topic, encoding, schema)
-            cdr = encoding == "cdr"
-            data = bytes(ROS.serialize_cdr(message, kind) if cdr else ros1_payload(message))
-            writer.add_message(channels[topic], time, data, time)
-        writer.finish()
+    path, lz4 = tmp_path / "bag.mcap", CompressionType.LZ4
+    write_mcap(path, recorded(), encoding=encoding, compression=lz4, use_chunking=chunked)
     assert signals(path, biped) == expected
 
 
@@ -216,18 +203,7 @@ def test_a_file_that_is_still_growing_is_read_up_to_its_last_whole_message(
     *, chunked: bool, left: float, biped: Robot, tmp_path: Path
 ):
     path = tmp_path / "bag.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=2**12, use_chunking=chunked)
-        writer.start("ros2")
-        channels = {}
-        for topic, time, message in sorted(recorded(), key=lambda item: item[1]):
-            kind = message.__msgtype__
-            if topic not in channels:
-                schema = writer.register_schema(kind, "ros2msg", b"")
-                channels[topic] = writer.register_channel(topic, "cdr", schema)
-            writer.add_message(channels[topic], time, bytes(ROS.serialize_cdr(message, kind)), time)
-        messages = file.tell()
-        writer.finish()
+    messages = write_mcap(path, recorded(), chunk_size=2**12, use_chunking=chunked)
     whole = imported(path, biped).trajectory
     data = path.read_bytes()[: int(left * messages)]
     path.write_bytes(data)
