@@ -19,6 +19,10 @@ from selfmodel.tasks import ROBOTS
 from tests.helpers.drivers import random_motion
 from tests.helpers.robots.bodies import BODIES, swinging
 
+STEPS = 100
+TOLERANCE = 1e-7
+Motion = Callable[[Robot, int], np.ndarray]
+
 MADE: Mapping[str, Callable[[], Robot]] = {
     **{name: entry.robot for name, entry in ROBOTS.items()},
     **{f"{name} of the suite": made for name, made in BODIES.items()},
@@ -36,6 +40,10 @@ def of_suite(names: Sequence[str], count: int) -> list[tuple[str, str]]:
     """The last joints of bodies that slide, or whose motors pull tendons or lag behind."""
     bodies = [f"{name} of the suite" for name in names]
     return [(name, one.name) for name in bodies for one in MADE[name]().anatomy.joints[-count:]]
+
+
+def built(robot: Robot, text: str, seed: int = 0) -> mujoco.MjModel:
+    return build(robot, parse(text, robot.anatomy), seed).model
 
 
 def without_limb(robot: Robot, joint: Joint) -> mujoco.MjModel:
@@ -68,34 +76,42 @@ def with_weld(robot: Robot, joint: Joint, angle: float) -> mujoco.MjModel:
     return spec.compile()
 
 
-def path(
-    robot: Robot, model: mujoco.MjModel, hinges: list[str], commands: np.ndarray
-) -> np.ndarray:
-    """Where the root and some hinges are, step by step."""
+def follow(
+    robot: Robot, model: mujoco.MjModel, steps: int, motion: Motion = random_motion
+) -> dict[str, np.ndarray]:
+    """Returns the paths of the root body and of the hinges under given motor targets."""
     data = mujoco.MjData(model)
-    left = {model.actuator(m).name: m for m in range(model.nu)}
-    rows = []
-    for targets in commands:
+    hinges = {model.joint(j).name for j in range(model.njnt)} & set(robot.anatomy.hinges)
+    motors = {model.actuator(m).name for m in range(model.nu)}
+    paths: dict[str, list] = {name: [] for name in (robot.root, *hinges)}
+    for targets in motion(robot, steps):
         for motor, target in zip(robot.anatomy.motors, targets, strict=True):
-            if motor in left:
-                data.ctrl[left[motor]] = target
+            if motor in motors:
+                data.actuator(motor).ctrl = target
         mujoco.mj_step(model, data, robot.substeps)
-        angles = [data.joint(hinge).qpos[0] for hinge in hinges]
-        rows.append([*data.body(robot.root).xpos, *data.body(robot.root).xquat, *angles])
-    return np.array(rows)
+        root = data.body(robot.root)
+        paths[robot.root].append([*root.xpos, *root.xquat])
+        for hinge in hinges:
+            paths[hinge].append(float(data.joint(hinge).qpos[0]))
+    return {name: np.array(path) for name, path in paths.items()}
 
 
-def assert_same_paths(name: str, text: str, truth: mujoco.MjModel, steps: int, tolerance: float):
+def assert_same_paths(
+    edited: dict[str, np.ndarray], truth: dict[str, np.ndarray], tolerance: float = TOLERANCE
+):
+    assert len(truth) > 1
+    for name, path in truth.items():
+        np.testing.assert_allclose(edited[name], path, atol=tolerance, rtol=0, err_msg=name)
+
+
+def check(name: str, text: str, truth: mujoco.MjModel, steps: int, tolerance: float = TOLERANCE):
+    """Checks that a robot with a fault moves like a model of another layout."""
     robot = MADE[name]()
-    edited = build(robot, parse(text, robot.anatomy)).model
-    kept = {truth.joint(j).name for j in range(truth.njnt)}
-    hinges = [hinge for hinge in robot.anatomy.hinges if hinge in kept]
-    commands = random_motion(robot, 100) if name in ROBOTS else swinging(robot, steps)
-    paths = [path(robot, model, hinges, commands) for model in (edited, truth)]
+    edited = built(robot, text)
+    how = (STEPS, random_motion) if name in ROBOTS else (steps, swinging)
 
-    assert hinges
     assert truth.nv < edited.nv == robot.model.nv
-    np.testing.assert_allclose(*paths, atol=1e-7 if name in ROBOTS else tolerance, rtol=0)
+    assert_same_paths(*(follow(robot, model, *how) for model in (edited, truth)), tolerance)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +123,7 @@ def test_a_broken_joint_moves_like_a_model_without_the_limb(name: str, joint: st
     truth = without_limb(robot, broken)
     left = {truth.actuator(m).name for m in range(truth.nu)}
 
-    assert_same_paths(name, f"break:{joint}", truth, 40, 1e-7)
+    check(name, f"break:{joint}", truth, 40)
     assert broken.motors_lost_if_broken == set(robot.anatomy.motors) - left
 
 
@@ -120,7 +136,7 @@ def test_a_jammed_joint_moves_like_a_welded_one(name: str, joint: str):
     low, high = held.limits[0]
     angle = low + (0.3 if "left" in joint else 0.8) * (high - low)
 
-    assert_same_paths(name, f"jam:{joint}={angle}", with_weld(robot, held, angle), 20, 1e-6)
+    check(name, f"jam:{joint}={angle}", with_weld(robot, held, angle), 20, 1e-6)
 
 
 def test_lost_and_failed_sensors_read_zero_and_jammed_ones_their_angle(quadruped: Robot):
