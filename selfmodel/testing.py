@@ -392,8 +392,7 @@ def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot:
     runs = [(Hypothesis((fault,)), controller) for fault in candidates]
     simulated = Simulator(robot, 1).run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, fault in enumerate(candidates):
-        signals = {signal: values[row] for signal, values in simulated.signals.items()}
-        mask = kind.contradicted(fault, Trajectory(simulated.names, simulated.time, signals))
+        mask = kind.contradicted(fault, simulated.run(row))
         _require(
             np.shape(mask) == (BATCH_STEPS,) and np.asarray(mask).dtype == np.bool_,
             f"{kind.name} must return a mask of the {BATCH_STEPS} steps of a log",

@@ -86,10 +86,7 @@ def replay(
     """
     logged = trial.trajectory
     outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
-    batch = outcome.trajectory
-    simulated = Trajectory(
-        batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS}
-    )
+    simulated = outcome.trajectory.run(0)
     errors, known, same = dict[Signal, FloatArray](), list[bool](), list[bool]()
     differs = np.zeros(logged.steps, np.bool_)
     for signal in SIGNALS:

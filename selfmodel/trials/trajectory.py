@@ -150,6 +150,11 @@ class Trajectory:
         """Returns the trajectory with other, or further, signals."""
         return dataclasses.replace(self, signals={**self.signals, **signals})
 
+    def run(self, number: int) -> "Trajectory":
+        """Returns one of the runs of a batch, as a log has it: which hinges are fixed is not."""
+        signals = {signal: values[number] for signal, values in self.signals.items()}
+        return Trajectory(self.names, self.time, signals)
+
     def first(self, steps: int) -> "Trajectory":
         """Returns the trajectory of the first ``steps`` steps, at most all."""
         return self.rows(slice(steps))

@@ -42,11 +42,8 @@ def both_of(robot: Robot) -> Both:
     controller = random_controllers(robot, 5)[4]
     runs = [(parse(text, robot.anatomy), controller) for text in hypotheses_about(robot)]
     simulated = Simulator(robot, 2).run(runs, 300, SIGNALS).trajectory
-    observed = Trajectory(
-        simulated.names, simulated.time, {signal: simulated[signal][0] for signal in SIGNALS}
-    )
     plan = TrialPlan("00-after", "after", controller, 300, 0)
-    return Trial(plan, robot.name, observed, "nowhere.mcap"), simulated
+    return Trial(plan, robot.name, simulated.run(0), "nowhere.mcap"), simulated
 
 
 def with_the_perfect_one(outcome: Trajectory, perfect: Trajectory) -> Trajectory:

@@ -56,7 +56,7 @@ def test_an_offset_shifts_the_encoder_and_its_sensor_and_nothing_else(quadruped:
 def test_a_prediction_begins_at_the_true_angle(quadruped: Robot, prefix: str):
     text = f"encoder-offset:{JOINT}={prefix}{OFFSET}"
     run = simulated(quadruped, [text])
-    logged = Trajectory(run.names, run.time, {signal: run[signal][0] for signal in SIGNALS})
+    logged = run.run(0)
     starts = np.array([0, 20, 40])
     segments = cut_segments(logged, {s: logged[s] for s in STATES}, starts, 10, STATES)
     hypotheses = [INTACT, parse(text, quadruped.anatomy)]

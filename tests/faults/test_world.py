@@ -16,7 +16,6 @@ from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
-from selfmodel.trials.trajectory import Trajectory
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_motion
 from tests.helpers.robots.arms import arm
@@ -51,8 +50,7 @@ def test_a_grown_delay_is_the_robot_with_that_delay_beside_robots_without_it(
             np.testing.assert_array_equal(runs.trajectory[signal][row], prompt[signal][0])
     assert not np.array_equal(expected["base_position"], prompt["base_position"])
 
-    signals = {signal: expected[signal][0] for signal in SIGNALS}
-    logged = Trajectory(expected.names, expected.time, signals)
+    logged = expected.run(0)
     states = {signal: logged[signal] for signal in STATES}
     segments = cut_segments(logged, states, np.array([0, 10, 30]), 10, STATES)
     predicted = Simulator(robot, 1).predict(hypotheses, segments).trajectory

@@ -29,8 +29,7 @@ STEPS = 12
 
 def moved(robot: Robot) -> Trajectory:
     (controller,) = random_controllers(robot, 1)
-    batch = Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).trajectory
-    return Trajectory(batch.names, batch.time, {signal: batch[signal][0] for signal in POSE})
+    return Simulator(robot, 1).run([(INTACT, controller)], STEPS, POSE).trajectory.run(0)
 
 
 def told(robot: Robot, poses: Poses, signal: Signal) -> np.ndarray:

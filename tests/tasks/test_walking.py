@@ -56,8 +56,6 @@ def test_a_file_that_cannot_walk_is_refused_with_the_reason(tmp_path: Path):
         tasks.load("arm.xml", "wlk")
     with pytest.raises(InputError, match=r"none\.xml"):
         tasks.load(str(tmp_path / "none.xml"), "walk")
-    with pytest.raises(InputError, match="the reward is a speed and has no colours"):
-        tasks.load(str(ANT), "walk", visualize_reward=True)
 
 
 def test_a_gap_has_measurement_noise_and_the_reward_is_true():

@@ -27,6 +27,7 @@ from selfmodel.trials.estimation import (
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.drivers import random_controllers, random_motion
+from tests.helpers.gaits import changed
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 REACH = {"joint_positions": 3, "base_position": 6}
@@ -39,20 +40,13 @@ def runs(
     hypothesis = parse(text, robot.anatomy)
     pairs = [(hypothesis, driver) for driver in drivers]
     batch = Simulator(robot, 1).run(pairs, steps, SIGNALS).trajectory
-    return [
-        Trajectory(batch.names, batch.time, {signal: batch[signal][i] for signal in SIGNALS})
-        for i in range(len(drivers))
-    ]
+    return [batch.run(number) for number in range(len(drivers))]
 
 
 def smooth(robot: Robot, count: int, steps: int = 300) -> list[CommandSource]:
     """Drivers that move every joint once a second."""
     motors = robot.anatomy.motors
     return [played_back(motors, random_motion(robot, steps, seed)) for seed in range(count)]
-
-
-def changed(run: Trajectory, **signals: np.ndarray) -> Trajectory:
-    return Trajectory(run.names, run.time, {**run.signals, **signals})
 
 
 (RUN,) = runs(QUADRUPED, "intact", smooth(QUADRUPED, 1))
