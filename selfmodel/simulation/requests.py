@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.errors import InputError
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
@@ -67,6 +68,11 @@ class Segments:
     horizon: int
     record: tuple[Signal, ...]
     chains: int = 1
+
+    def __post_init__(self) -> None:
+        if self.chains < 1 or len(self.starts) % self.chains:
+            parts = f"{len(self.starts)} segments, {self.chains} chains"
+            raise InputError(f"expected chains of equal length: {parts}")
 
     @property
     def independent(self) -> bool:

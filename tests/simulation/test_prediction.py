@@ -10,6 +10,7 @@ import pytest
 from selfmodel import arguments
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
+from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
 from selfmodel.faults.notation import parse
@@ -44,10 +45,7 @@ def trials(robot: Robot, *hypotheses: Hypothesis) -> list[Trajectory]:
     """One run without noise under each hypothesis."""
     runs = [(hypothesis, moved(robot)) for hypothesis in hypotheses]
     batch = Simulator(robot, 1).run(runs, STEPS, SIGNALS).trajectory
-    return [
-        Trajectory(batch.names, batch.time, {signal: batch[signal][row] for signal in SIGNALS})
-        for row in range(len(runs))
-    ]
+    return [batch.run(number) for number in range(len(runs))]
 
 
 def cut(
@@ -178,6 +176,12 @@ def test_chains_are_predicted_together_as_each_is_alone(quadruped: Robot):
         alone = simulator.predict([INTACT], cut(run, part, ONBOARD)).trajectory
         for signal in RECORD:
             assert together[signal][:, rows].tobytes() == alone[signal].tobytes(), signal
+
+
+@pytest.mark.parametrize("chains", [0, 4])
+def test_segments_that_no_chains_of_equal_length_make_up_are_refused(chains: int):
+    with pytest.raises(InputError, match=f"expected chains of equal length: 3 segments, {chains}"):
+        Segments({}, np.zeros((9, 2)), np.arange(3), 2, JOINTS, chains)
 
 
 @pytest.mark.parametrize("length", [0.12, 0.24, 2.0])
