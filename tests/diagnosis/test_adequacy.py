@@ -36,6 +36,7 @@ GAITS = {"first": (1.0, 0.3), "second": (0.3, 1.0), "third": (0.8, 0.8)}
 
 KNEE = "front_left_knee"
 WEAK = f"motor:{KNEE}=0.5"
+BROKEN = f"break:{KNEE}"
 
 
 @pytest.fixture(scope="module")
@@ -303,13 +304,28 @@ def test_each_fault_is_required_in_the_gait_of_a_healthy_trial(
 def test_a_limb_that_moves_faster_than_in_the_healthy_trials_is_not_accused(
     table: LossTable, real: Robot, healthy: list[Trial]
 ):
-    fault = f"break:{KNEE}"
-    fast = moved(real, "first", pace=2, truth=fault)
+    fast = moved(real, "first", pace=2, truth=f"{BROKEN}+friction=0.3")
 
-    doubt = doubted(problem_of(table, fast, healthy), fault)
+    doubt = doubted(problem_of(table, fast, healthy), BROKEN)
 
     assert doubt is not None
     assert KNEE in doubt.reason
+
+
+def test_a_fault_that_explains_the_whole_loss_has_to_beat_a_refit_in_faster_motions_too(
+    table: LossTable, real: Robot, healthy: list[Trial]
+):
+    def refused(_: Sequence[Trial]) -> Calibration:
+        raise InputError("too short")
+
+    problem = problem_of(table, moved(real, "first", pace=2, truth=BROKEN), healthy)
+
+    assert doubted(problem, BROKEN) is None
+    problem = problem_of(table, moved(real, "first", pace=2, truth=BROKEN), healthy)
+    problem.calibrate = refused
+    doubt = doubted(problem, BROKEN)
+    assert doubt is not None
+    assert "too short for a fit" in doubt.reason
 
 
 def test_the_time_before_a_change_shows_its_gait_as_healthy(
