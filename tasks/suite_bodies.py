@@ -17,6 +17,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.physical.simulated import OWN_SEED
 from selfmodel.recovery.scores import Score
+from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.mjcf.load import adapt_text
 from selfmodel.robot.mjcf.settings import MjcfSettings
@@ -158,7 +159,7 @@ class SuiteTask:
 
     def initialize_episode(self, physics: "Physics") -> None:
         """Starts the delay line."""
-        self._delayed = deque(np.zeros((self._delay, physics.model.nu)))
+        self._delayed = deque([holding_commands(physics.model.ptr)] * self._delay)
 
     def before_step(self, action: FloatArray, physics: "Physics") -> None:
         """Applies the commands of some control steps ago."""

@@ -15,6 +15,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical import simulated
+from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.anatomy import CONTROL_DELAY, added_steps, split_delay
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, current_value, observed_fields
@@ -133,7 +134,7 @@ class Walk(base.Task):
             measured = self._gap.level, self._robot, variant, rng
             self._measurement = simulated.NoisyMeasurement(*measured)
             delay += self._gap.delay
-        self._delayed = deque(np.zeros((delay, variant.model.nu)))
+        self._delayed = deque([holding_commands(self._robot.model)] * delay)
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Sets the initial pose, with its noise, and the position for the reward."""

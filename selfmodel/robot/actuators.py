@@ -5,6 +5,7 @@ from collections import Counter
 import mujoco
 import numpy as np
 
+from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Ranges
 from selfmodel.errors import InputError
 
@@ -68,6 +69,23 @@ def has_feedback(model: mujoco.MjModel, motor: int) -> bool:
     """Returns whether the force of a motor depends on its position, as that of a servo does."""
     is_affine = model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_AFFINE
     return bool(is_affine and model.actuator_biasprm[motor, 1] != 0)
+
+
+def holding_commands(model: mujoco.MjModel) -> FloatArray:
+    """Returns the commands that hold a robot in its initial pose, ``(motors,)``.
+
+    Servos are commanded to the initial pose, and other motors, and those with an activation, to 0.
+    """
+    gain, (constant, slope) = model.actuator_gainprm[:, 0], model.actuator_biasprm[:, :2].T
+    servo = (
+        (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
+        & (model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED)
+        & (model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE)
+        & (slope != 0)
+        & (gain != 0)
+    )
+    force = -slope * model.actuator_length0 - constant
+    return np.asarray(np.divide(force, gain, out=np.zeros(model.nu), where=servo))
 
 
 def length_per_angle(model: mujoco.MjModel, motor: int, hinge: int) -> float:

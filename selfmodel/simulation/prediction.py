@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray, held, median_of_known
+from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
@@ -131,7 +132,7 @@ class _OpenLoop:
         added = [added_steps(lag, float(own.added_delay[0])) for own in moving]
         self._delays = whole + np.array(added, dtype=np.intp)
         # The last row, at -1, is that of every step before the trial.
-        self._commands = np.pad(segments.commands, ((0, 1), (0, 0)))
+        self._commands = np.vstack([segments.commands, holding_commands(robot.model)])
         self._write = state_writer(robot, self.batch.bind, *(own.model for own in self.models))
         since_rest = cache(partial(activations, robot, segments.commands))
         self._activations = np.array(

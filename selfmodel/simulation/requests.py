@@ -53,7 +53,8 @@ class Segments:
             the joints' and the base's positions and velocities. NaN for the hinges whose state is
             unknown.
         commands: Logged commands of the whole trial, ``(steps, motors)``: control delays and the
-            activation of motors depend on those before a segment. Before the trial they are 0.
+            activation of motors depend on those before a segment. Those before the trial hold the
+            robot in its initial pose.
         starts: Step of the trial at which each segment begins, ``(segments,)``.
         horizon: Control steps of a segment.
         record: The signals to record, ``(n, segments, horizon + 1, width)`` each; row 0 is the

@@ -16,6 +16,7 @@ from mujoco.batch import Batch, SimulationError
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.isolation import available_memory
+from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
@@ -206,10 +207,11 @@ class Rollout:
         added = [
             added_steps(robot.control_delay, float(variant.added_delay[0])) for variant in variants
         ]
-        # Delay line of the commands; those of the motors are 0 until the first arrives.
+        # Delay line of the commands; the motors hold the initial pose until the first arrives.
         self._delays = whole + bool(self._part) + added_delay + np.array(added, dtype=np.intp)
         self._motors = batch.bind("ctrl")
-        self._sent = np.zeros((int(self._delays.max()) + 1, *self._motors.shape))
+        line = (int(self._delays.max()) + 1, *self._motors.shape)
+        self._sent = np.broadcast_to(holding_commands(robot.model), line).copy()
         self._commands = np.zeros(self._motors.shape)
         self.live: dict[Signal, Callable[[], FloatArray]] = {
             **live_signals(robot, batch.bind, variants, record),

@@ -2,12 +2,13 @@
 
 import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from selfmodel import arguments
+from selfmodel import arguments, load_robot
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
@@ -155,6 +156,34 @@ def test_a_delay_is_the_same_in_a_run_a_prediction_and_a_physical_robot(quadrupe
     assert prediction_error(slow, None) < EXACT
     assert prediction_error(prompt, delay) < EXACT
     assert prediction_error(prompt, None) > 0.01
+
+
+STOOL = """
+<mujoco model="stool"><worldbody>
+  <geom type="plane" size="0 0 1"/>
+  <body name="seat" pos="0 0 .3"><freejoint/><geom type="box" size=".2 .1 .05" mass="2"/>
+    <body name="front" pos=".15 0 0"><joint name="front" axis="0 1 0" range="-90 90"/>
+      <geom type="box" pos="0 0 -.15" size=".02 .1 .1" mass=".2"/></body>
+    <body name="back" pos="-.15 0 0"><joint name="back" axis="0 1 0" range="-90 90"/>
+      <geom type="box" pos="0 0 -.15" size=".02 .1 .1" mass=".2"/></body></body>
+</worldbody><actuator>
+  <position name="front" joint="front" kp="50" kv="1" ctrlrange="-1.5 1.5"/>
+  <position name="back" joint="back" kp="50" kv="1" ctrlrange="-1.5 1.5"/>
+</actuator><keyframe><key name="stand" qpos="0 0 .28 1 0 0 0 .4 -.4"/></keyframe></mujoco>
+"""
+
+
+def test_until_the_first_command_arrives_servos_hold_the_stance(tmp_path: Path):
+    (tmp_path / "stool.xml").write_text(STOOL)
+    slow = late(load_robot(tmp_path / "stool.xml"), 5)
+    stance = np.tile([0.4, -0.4], (STEPS, 1))
+    still = played_back(slow.anatomy.motors, stance)
+    batch = Simulator(slow, 1).run([(INTACT, still)], STEPS, SIGNALS).trajectory
+    run = Trajectory(batch.names, batch.time, {signal: batch[signal][0] for signal in SIGNALS})
+
+    np.testing.assert_allclose(run["joint_positions"], stance, atol=0.05)
+    predicted = Simulator(slow, 1).predict([INTACT], cut(run)).trajectory
+    assert error(predicted, run) < EXACT
 
 
 def test_without_the_base_a_segment_goes_on_where_the_one_before_it_ended(robot: Robot):
