@@ -84,7 +84,8 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values: factors, control delay, deviations and errors."""
-        parts = (*model_factors.JOINT_FIELDS, "body_mass", "body_inertia")
+        joints = (model_factors.FORCE_LIMITS, *model_factors.JOINT_FIELDS)
+        parts = (*joints, "body_mass", "body_inertia")
         factors = {key: own for key, own in asdict(self.parameters).items() if key not in parts}
         return {
             **({} if self.joints is None else {"joints": self.joints}),
@@ -223,11 +224,14 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
         "dry friction": "dry_friction",
         "armature": "armature",
     }
+    of_motors = ("motor_gains", model_factors.FORCE_LIMITS)
+    if best.parameters.force_limits:
+        quantities["force limit"] = model_factors.FORCE_LIMITS
     for name, quantity in quantities.items():
-        is_gain = quantity == "motor_gains"
+        is_of_motor = quantity in of_motors
         before, values = (
-            np.array(own.parameters.motor_gains)
-            if is_gain
+            np.array(getattr(own.parameters, quantity) or (1.0,) * robot.model.nu)
+            if is_of_motor
             else model_factors.joint_values(robot, own.parameters, quantity)
             for own in (first, best)
         )
@@ -242,7 +246,7 @@ def _joints(segments: SegmentErrors, first: Fit, best: Fit) -> dict[str, Any]:
                 "deviation": float(deviations[k]),
                 "determined": bool(known[k]),
             }
-            for k, part in enumerate(robot.anatomy.motors if is_gain else robot.anatomy.hinges)
+            for k, part in enumerate(robot.anatomy.motors if is_of_motor else robot.anatomy.hinges)
         ]
     sizes = root_mean_square(segments.joint_errors(best.errors))
     worst = int(np.argmax(sizes))

@@ -22,7 +22,14 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY, as_delay
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.model_factors import Basis, Parameters, bases, prior_deviations
+from selfmodel.simulation.model_factors import (
+    FORCE_LIMITS,
+    JOINT_PRIOR_DEVIATIONS,
+    Basis,
+    Parameters,
+    bases,
+    prior_deviations,
+)
 from selfmodel.simulation.segments import SegmentErrors, is_better, pseudo_huber
 
 NOMINAL, DELAY, CONTACTS = "nominal", "delay", "contacts"
@@ -133,7 +140,8 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
         fit = _best_candidate(CONTACTS, segments, contacts, fit)
         if choose(fit, CONTACTS_MIN_Z * np.sqrt(segments.overlap)):
             best = fit.parameters
-    for number, (name, basis) in enumerate(bases(robot)):
+    limited = robot.has_fixed_base and _reaches_limits(segments, best)
+    for number, (name, basis) in enumerate(bases(robot, reaches_limits=limited)):
         fitter = _Fitter(segments, basis, FIXED if robot.has_fixed_base else FLOATING)
         if robot.has_fixed_base and not number:
             best, x = fitter.solved(fitter.with_best_delay(best))
@@ -166,6 +174,17 @@ def expected_models(robot: Robot) -> int:
 def delay_parts(robot: Robot) -> int:
     """Returns the parts of a control step of which a delay is a multiple."""
     return 1 if robot.model.na else robot.substeps
+
+
+def _reaches_limits(segments: SegmentErrors, start: Parameters) -> bool:
+    """Returns whether lower force limits of the motors change any prediction.
+
+    A limit that is not reached has no slope, and no trial determines it.
+    """
+    lower = float(np.exp(-JOINT_PRIOR_DEVIATIONS[FORCE_LIMITS]))
+    limited = replace(start, force_limits=(lower,) * segments.robot.model.nu)
+    own, other = segments.of([start, limited]).T
+    return not np.array_equal(own, other)
 
 
 def _cost(errors: FloatArray) -> float:

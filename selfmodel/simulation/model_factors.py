@@ -45,6 +45,7 @@ class Parameters:
         delay: Control delay, control steps; a multiple of a physics step.
         contact_stiffness: Factor of the stiffness of all contacts.
         contact_damping: Factor of their damping.
+        force_limits: Factor of the largest force of each motor, and of the joints that it drives.
         joint_damping: Factor of the damping of each hinge. A value that is 0 in the model is
             increased by its unit (``JOINT_FIELDS``) times the factor minus one.
         dry_friction: Factor of the dry friction of each hinge, in the same way.
@@ -61,6 +62,7 @@ class Parameters:
     delay: float = 0
     contact_stiffness: float = 1.0
     contact_damping: float = 1.0
+    force_limits: tuple[float, ...] = ()
     joint_damping: tuple[float, ...] = ()
     dry_friction: tuple[float, ...] = ()
     armature: tuple[float, ...] = ()
@@ -120,6 +122,9 @@ def model_with_parameters(
         motor_gains=np.array(parameters.motor_gains),
     )
     scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
+    for motor, factor in enumerate(parameters.force_limits):
+        scaled.actuator_forcerange[motor] *= factor
+        scaled.jnt_actfrcrange[sorted(motor_joints(model, motor))] *= factor
     further = [quantity for quantity in JOINT_FIELDS if getattr(parameters, quantity)]
     for quantity in further:
         values = joint_values(robot, parameters, quantity)
@@ -180,7 +185,9 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
         joint.armature = model.dof_armature[dof]
         joint.frictionloss = model.dof_frictionloss[dof]
+        joint.actfrcrange = model.jnt_actfrcrange[joint.id]
     for motor in spec.actuators:
+        motor.forcerange = model.actuator_forcerange[motor.id]
         motor.gainprm = model.actuator_gainprm[motor.id]
         motor.biasprm = model.actuator_biasprm[motor.id]
     for numeric in spec.numerics:
@@ -279,6 +286,9 @@ def exact(robot: Robot) -> LogNormal:
     return LogNormal(np.zeros(4 + robot.model.nu), np.zeros(robot.model.nbody))
 
 
+FORCE_LIMITS = "force_limits"
+"""Quantity of a robot with a fixed base whose healthy trials reach the limits."""
+
 FACTORS, JOINT_SETS = "factors", ("shared", "kinds", "joints")
 """Names of the set of factors of a robot with a floating base; and of the nested sets of one with a
 fixed base: one factor per quantity, per quantity and kind of joint, per quantity and joint."""
@@ -295,6 +305,7 @@ many models."""
 
 JOINT_PRIOR_DEVIATIONS = {
     "motor_gains": 0.3,
+    FORCE_LIMITS: 0.3,
     "joint_damping": 0.5,
     "dry_friction": 1.0,
     "armature": 1.0,
@@ -308,7 +319,8 @@ armature of a joint, 0.05 to 20."""
 
 def prior_deviations(robot: Robot) -> dict[str, FloatArray]:
     """Returns the standard deviation of the prior of each factor's logarithm, by quantity."""
-    sizes = {"motor_gains": robot.model.nu} | dict.fromkeys(JOINT_FIELDS, len(_dofs(robot)))
+    sizes = dict.fromkeys(("motor_gains", FORCE_LIMITS), robot.model.nu)
+    sizes |= dict.fromkeys(JOINT_FIELDS, len(_dofs(robot)))
     prior = PRIOR_DEVIATIONS | (JOINT_PRIOR_DEVIATIONS if robot.has_fixed_base else {})
     return {name: np.full(sizes.get(name, 1), deviation) for name, deviation in prior.items()}
 
@@ -349,11 +361,11 @@ class Basis:
         return np.asarray(sums / counts)
 
 
-def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
+def bases(robot: Robot, *, reaches_limits: bool = False) -> Iterator[tuple[str, Basis]]:
     """Yields the name and the coordinates of each set of factors of a robot.
 
     Those of a fixed base grow; one that is no larger than the set before, because all joints are of
-    one kind or each is of its own, is left out.
+    one kind or each is of its own, is left out. They have force limits if the trials reach them.
     """
     if not robot.has_fixed_base:
         groups = dict.fromkeys(SHARED, np.arange(1)) | {"motor_gains": np.arange(robot.model.nu)}
@@ -362,7 +374,9 @@ def bases(robot: Robot) -> Iterator[tuple[str, Basis]]:
     hinges, size = np.arange(len(robot.anatomy.hinges)), 0
     kinds = (np.zeros_like(hinges), kinds_of_joints(robot), hinges)
     for name, kind in zip(JOINT_SETS, kinds, strict=True):
-        groups = {"motor_gains": kind[joint_of_motor(robot)]} | dict.fromkeys(JOINT_FIELDS, kind)
+        of_motors = ("motor_gains", *([FORCE_LIMITS] * reaches_limits))
+        groups = dict.fromkeys(of_motors, kind[joint_of_motor(robot)])
+        groups |= dict.fromkeys(JOINT_FIELDS, kind)
         basis = _basis(groups, JOINT_PRIOR_DEVIATIONS)
         if len(basis.prior) > size:
             size = len(basis.prior)
