@@ -6,7 +6,7 @@ The recordings are in ``../shared/samples/xl330-pendulum`` (see its README).
 import argparse
 import json
 import time
-from itertools import permutations, product
+from itertools import product
 from pathlib import Path
 
 from selfmodel import Trial, diagnose
@@ -23,8 +23,8 @@ HEALTHY = ("sin_sin", "up_and_down", "sin_time_square", "lift_and_drop")
 HALF_GAIN = ("sin_sin", "up_and_down")
 """Movements with the firmware's gain 800, and with 400."""
 
-TORQUE_OFF = 2.0
-"""Time of ``lift_and_drop`` at which the torque is switched off, s."""
+TORQUE_OFF = {"lift_and_drop": 2.0}
+"""Time at which the torque is switched off, s."""
 
 MAPPING = """
 robot = "pendulum.xml"
@@ -45,11 +45,11 @@ servo = "goal"
 """
 
 
-def trial_of(robot: Robot, name: str, end: float = float("inf")) -> Trial:
+def trial_of(robot: Robot, name: str, end: float | None = None) -> Trial:
     """Returns a recording, up to a time in s."""
     mapping = parse_mapping(MAPPING, "the mapping")
     found = import_recording(SAMPLE / f"{name}.csv", mapping, robot).trajectory
-    rows = found.time < end
+    rows = found.time < (end or float("inf"))
     return Trial.from_arrays(
         robot,
         found["joint_positions"][rows],
@@ -60,39 +60,44 @@ def trial_of(robot: Robot, name: str, end: float = float("inf")) -> Trial:
 
 
 def main() -> None:
-    """Diagnoses recordings by each healthy one, and prints a row for each pair."""
+    """Diagnoses recordings by each healthy one, and by all others, and prints a row for each."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.servo", description=__doc__)
     groups = ("same", "gain", "off")
     parser.add_argument("--groups", choices=groups, nargs="*", default=groups)
-    parser.add_argument("--kinds", default="default", help="fault kinds to search")
+    parser.add_argument("--healthy", choices=(*HEALTHY, "others"), nargs="*")
     options = parser.parse_args()
     robot = load_mjcf(PENDULUM, checked_settings({"control_timestep": 0.006}))
-    healthy = {name: trial_of(robot, f"kp800_{name}", TORQUE_OFF if name == "lift_and_drop" else 99) for name in HEALTHY}
-    pairs = {
-        "same": [(one, other, healthy[other]) for one, other in permutations(HEALTHY, 2)],
-        "gain": [
-            (one, f"kp400_{other}", trial_of(robot, f"kp400_{other}"))
-            for one, other in product(HEALTHY, HALF_GAIN)
-        ],
-        "off": [
-            (one, "lift_and_drop", trial_of(robot, "kp800_lift_and_drop")) for one in HEALTHY
-        ],
+    healthy = {name: trial_of(robot, f"kp800_{name}", TORQUE_OFF.get(name)) for name in HEALTHY}
+    changed = {
+        "same": list(healthy.items()),
+        "gain": [(name, trial_of(robot, f"kp400_{name}")) for name in HALF_GAIN],
+        "off": [(name, trial_of(robot, f"kp800_{name}")) for name in TORQUE_OFF],
     }
-    for group in options.groups:
-        for one, name, trial in pairs[group]:
+    references = options.healthy or (*HEALTHY, "others")
+    for group, reference in product(options.groups, references):
+        for name, trial in changed[group]:
+            others = [own for other, own in healthy.items() if other != name or group == "gain"]
+            if group != "gain" and reference == name:
+                continue
             start = time.process_time()
             found = diagnose(
-                trial, healthy=healthy[one], robot=robot, kinds=options.kinds, seed=0, threads=1
+                trial,
+                healthy=others if reference == "others" else healthy[reference],
+                robot=robot,
+                seed=0,
+                threads=1,
             )
+            fit = found.fit
             row = {
                 "group": group,
-                "healthy": one,
+                "healthy": reference,
                 "trial": name,
                 "best": str(found.best),
                 "verdict": found.verdict,
                 "since": None if found.change is None else round(found.change.time, 2),
+                "losses": fit
+                and [round(own or 0.0, 3) for own in (fit.loss, fit.intact_loss, fit.healthy_loss)],
                 "seconds": round(time.process_time() - start),
-                "loss": round(found.fit.loss,4) if found.fit else None,"intact": round(found.fit.intact_loss,4) if found.fit else None,"h": round(found.fit.healthy_loss,4) if found.fit else None,
                 "reason": found.doubt.reason if found.doubt else "",
             }
             print(json.dumps(row), flush=True)

@@ -160,7 +160,8 @@ class RunTrial(Robot, Notation):
 class Calibrate(Command):
     """Fit masses, friction, damping, motors, delay and contacts of the self-model to trials.
 
-    Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted.
+    Of a robot with a fixed base, gain, damping, dry friction and armature of each joint are fitted,
+    and the limits of the torque that the trials reach.
 
     Give trials of the healthy robot: a fault in them would become part of the model. Commands
     that read logs take the new model as --robot MODEL.xml.

@@ -111,9 +111,11 @@ class DiagnosticSearch:
         )
         space = self._space.including(seeds)
         problem = problem_of(space)
+        parts = problem.space.parts
+        known = [one for one in seeds if all(own.part in parts(own.kind) for own in one.faults)]
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
-            distances, space, self._settings, seeds, rng, on_generation=observer
+            distances, problem.space, self._settings, known, rng, on_generation=observer
         )
         self.evaluations += evaluations
         self._proposed.update(ranked)

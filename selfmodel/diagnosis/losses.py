@@ -21,7 +21,7 @@ from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.joints import JAMMED_AT_ANGLE
+from selfmodel.faults.joints import JAMMED_AT_ANGLE, OF_MOTORS, SERVO_GAIN, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
 from selfmodel.robot.anatomy import Anatomy
@@ -53,6 +53,9 @@ as one trial by the surrogate."""
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator that a search in a part of the trials needs."""
+
+TOLD_APART = 0.5
+"""Severity at which the gain of a servo is compared with the torque of its motor."""
 
 MAX_JAM_SPREAD = 0.05
 """Largest difference between the angles of the hinges of one jammed joint, rad."""
@@ -299,7 +302,8 @@ def contradiction_losses(
 class Problem:
     """Trials to explain, or parts of them, and the losses of hypotheses about them.
 
-    Jams at the angles at which the encoders end are added to the hypotheses.
+    Jams at the angles at which the encoders end are added to the hypotheses, and gains of servos
+    that equal weak motors in the trials are left out.
 
     Args:
         table: Losses of the comparator.
@@ -337,12 +341,27 @@ class Problem:
         self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
         self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
-        self.space = replace(space, observed=jams)
+        self.space = self._told_apart(replace(space, observed=jams))
         self.has_test = table.is_piecewise([part.trial for part in self.trials])
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
         is_comparable = table.is_piecewise(every) and table.uses_segments(every)
         self._comparable = self.healthy_trials if is_comparable else []
+
+    def _told_apart(self, space: HypothesisSpace) -> HypothesisSpace:
+        """Returns the hypotheses without the gains of servos that the trials cannot tell apart.
+
+        They equal weak motors unless a prediction reaches a limit of the force.
+        """
+        may_be_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
+        if WEAK_MOTOR not in space.kinds or not may_be_asked:
+            return space
+        parts = space.parts(SERVO_GAIN)
+        faults = [Fault(kind, part, TOLD_APART) for part in parts for kind in OF_MOTORS]
+        losses = self.coarse([Hypothesis((fault,)) for fault in faults]) if faults else []
+        pairs = zip(parts, losses[::2], losses[1::2], strict=True)
+        alike = [part for part, one, other in pairs if np.array_equal(one, other)]
+        return space.without(SERVO_GAIN, alike)
 
     def within(
         self, cut: Callable[[Sequence[Trial]], Parts], healthy_trials: Parts = ()

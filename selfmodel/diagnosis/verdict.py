@@ -391,7 +391,7 @@ def detectable_severities(
         Fault(kind, part)
         for kind in space.kinds
         if kind.bounds is not None and not kind.edits_specification
-        for part in kind.parts(space.anatomy)
+        for part in space.parts(kind)
         if part not in faulty
     ]
     sides: list[tuple[Fault, list[float]]] = []

@@ -11,6 +11,7 @@ from .joints import (
     JOINT_FRICTION as JOINT_FRICTION,
     LOADED_LINK as LOADED_LINK,
     LOST_GRIP as LOST_GRIP,
+    SERVO_GAIN as SERVO_GAIN,
     WEAK_MOTOR as WEAK_MOTOR,
 )
 from .kind import (

@@ -34,11 +34,13 @@ class HypothesisSpace:
         kinds: Fault kinds, in the order of the second value of a gene.
         observed: Faults whose severity the trials contain: those of the searched kinds are coarse
             candidates in the place of the levels of the same kind and part.
+        alike: Kinds at parts that are not searched, because they equal another kind in the trials.
     """
 
     anatomy: Anatomy
     kinds: tuple[FaultKind, ...]
     observed: tuple[Fault, ...] = ()
+    alike: frozenset[tuple[FaultKind, str]] = frozenset()
 
     @classmethod
     def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
@@ -80,6 +82,17 @@ class HypothesisSpace:
         """Returns the canonical form of a set of faults; see ``hypothesis.canonical``."""
         return canonical(faults, self.anatomy)
 
+    def parts(self, kind: FaultKind) -> tuple[str, ...]:
+        """Returns the parts of a kind, in the order of the third value of a gene."""
+        parts = kind.parts(self.anatomy)
+        return tuple(part for part in parts if (kind, part) not in self.alike)
+
+    def without(self, kind: FaultKind, parts: Iterable[str]) -> "HypothesisSpace":
+        """Returns the space in which a kind is not searched at some parts; see ``alike``."""
+        space = replace(self, alike=self.alike | {(kind, part) for part in parts})
+        kinds = tuple(one for one in self.kinds if space.parts(one))
+        return replace(space, kinds=kinds)
+
     def levels(self, fault: Fault) -> tuple[float, ...]:
         """Returns the severity levels of a fault's kind at its part."""
         return fault.kind.levels_at(self.anatomy, fault.part)
@@ -98,7 +111,7 @@ class HypothesisSpace:
         spaced = [
             Fault(kind, part, level)
             for kind in self.kinds
-            for part in kind.parts(self.anatomy)
+            for part in self.parts(kind)
             if (kind, part) not in known
             for level in _evenly_spaced(kind.levels_at(self.anatomy, part))
         ]
@@ -110,7 +123,7 @@ class HypothesisSpace:
         for active, kind_value, part_value, severity_value in genome.reshape(-1, GENE_VALUES):
             if active >= 0.5:
                 kind = self.kinds[int(kind_value * len(self.kinds))]
-                parts = kind.parts(self.anatomy)
+                parts = self.parts(kind)
                 part = parts[int(part_value * len(parts))]
                 levels = kind.levels_at(self.anatomy, part)
                 faults.append(Fault(kind, part, levels[int(severity_value * len(levels))]))
@@ -137,7 +150,7 @@ class HypothesisSpace:
                     f"no diagnostic genome can express {fault}: the kinds searched are "
                     f"{', '.join(kind.name for kind in self.kinds)}"
                 )
-            parts, levels = fault.kind.parts(self.anatomy), self.levels(fault)
+            parts, levels = self.parts(fault.kind), self.levels(fault)
             nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
             # The middle of an index's interval of [0, 1) is exact under int(value * count).
             gene[:] = (

@@ -54,7 +54,7 @@ class BrokenJoint(JointFault):
         if other.part == fault.part:
             return other.kind != fault.kind
         broken = anatomy.joint(fault.part)
-        if other.part in broken.descendants or other.kind != WEAK_MOTOR:
+        if other.part in broken.descendants or other.kind not in OF_MOTORS:
             return other.part in broken.descendants
         return broken.motors_lost_if_broken.issuperset(anatomy.joint(other.part).motors)
 
@@ -88,7 +88,7 @@ class JammedAtAngle(JointFault):
 
         The motors of a welded joint have no effect unless they move another joint too.
         """
-        if other.part != fault.part or other.kind != WEAK_MOTOR:
+        if other.part != fault.part or other.kind not in OF_MOTORS:
             return other.part == fault.part and other.kind in (DAMPED_JOINT, JOINT_FRICTION)
         joint = anatomy.joint(fault.part)
         return joint.motors_lost_if_jammed.issuperset(joint.motors)
@@ -138,6 +138,26 @@ class WeakMotor(MotorFault):
         """Scales the forces and the force limits of the motors."""
         motors = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).motors]
         variant.weaken_motors(motors, fault.severity)
+
+    def absorbs(self, fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
+        """Returns whether the other fault is the gain of a servo without any torque."""
+        return not fault.severity and other.part == fault.part and other.kind == SERVO_GAIN
+
+
+class ServoGain(MotorFault):
+    """A joint whose servos have another gain, such as that of a firmware, with the same limits.
+
+    Half of the gain holds half of the load at the same error, and the same largest load. Where no
+    limit is reached, it equals a weak motor. It changes the velocity gain of the servo too.
+    """
+
+    def _fits(self, joint: Joint, _anatomy: Anatomy) -> bool:
+        return bool(joint.servos)
+
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
+        """Scales the forces of the servos before their limits."""
+        servos = [anatomy.motors.index(motor) for motor in anatomy.joint(fault.part).servos]
+        variant.scale_gains(servos, fault.severity)
 
 
 class DampedJoint(JointFault):
@@ -249,6 +269,16 @@ WEAK_MOTOR = WeakMotor(
     words="the motor of the joint {part} has only {severity:.0%} of its torque left",
     is_of_joint=True,
 )
+SERVO_GAIN = ServoGain(
+    name="servo-gain",
+    base="fixed",
+    bounds=(0.1, 10.0),
+    levels=(0.25, 0.5, 2.0, 4.0),
+    degenerates_to={1.0: None},
+    unit="times",
+    words="the servo of the joint {part} has {severity:.2g} times its gain",
+    is_of_joint=True,
+)
 DAMPED_JOINT = DampedJoint(
     name="damping",
     bounds=(0.0, 100.0),
@@ -306,3 +336,5 @@ LOADED_LINK = LoadedLink(
     unit="kg",
     words="the link of the joint {part} carries {severity:.3g} kg more",
 )
+OF_MOTORS = (WEAK_MOTOR, SERVO_GAIN)
+"""Kinds without effect on a motor that moves nothing; equal where no force limit is reached."""

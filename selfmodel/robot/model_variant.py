@@ -150,11 +150,15 @@ class ModelVariant:
         self.model.actuator_gainprm[motor] = 0.0
         self.model.actuator_biasprm[motor] = 0.0
 
+    def scale_gains(self, motors: Sequence[int], factor: float) -> None:
+        """Scales the forces of motors, given by id, before their limits."""
+        self.model.actuator_gainprm[motors] *= factor
+        self.model.actuator_biasprm[motors] *= factor
+
     def weaken_motors(self, motors: Sequence[int], factor: float) -> None:
         """Scales the forces and the force limits of motors, given by id."""
-        model = self.model
-        for forces in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
-            forces[motors] *= factor
+        self.scale_gains(motors, factor)
+        self.model.actuator_forcerange[motors] *= factor
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in actuators.motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor

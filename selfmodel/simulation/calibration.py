@@ -46,10 +46,10 @@ class Calibration:
             units of ``CALIBRATION_ERROR_SCALES``.
         error: Root mean square error with the fitted parameters, in the same units.
         joints: JSON values of the fit of a robot with a fixed base: its set, delay and errors, the
-            hinge with the largest error (rad), and ``parameters``: of the gain of each motor and
-            the damping, dry friction and armature of each hinge (N m s/rad, N m, kg m^2), the value
-            in the model, the fitted value, the standard deviation of its logarithm, and whether the
-            trials determine it. None for other robots.
+            hinge with the largest error (rad), and ``parameters``: of the gain and any fitted force
+            limit of each motor (factors) and the damping, dry friction and armature of each hinge
+            (N m s/rad, N m, kg m^2), the value in the model, the fitted value, the standard
+            deviation of its logarithm, and whether the trials determine it. None for other robots.
         chosen: The chosen set of parameters: ``nominal`` (none), ``delay``, ``contacts`` or
             ``factors``; of a robot with a fixed base, ``nominal``, ``delay``, ``shared``, ``kinds``
             or ``joints``.
@@ -146,7 +146,8 @@ def calibrate(
     there on. After a late step, an unknown command, or an unknown state at the beginning of a
     segment (every tenth step), the rest of such a trial is not used.
 
-    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions.
+    With a fixed base, gain, damping, dry friction and armature are fitted to joint positions, and
+    force limits that the trials reach.
 
     The ``observer`` is called with the progress of the fit.
 

@@ -8,7 +8,8 @@ determine.
 
 A robot with a floating base has one set of factors. With a fixed base, which determines neither
 masses nor the friction of the ground, nor has contacts, there are three: gain, damping, dry
-friction and armature of all joints together, of each kind of joint, and of each joint.
+friction, armature and, if the trials reach any, force limits of all joints together, of each kind
+of joint, and of each joint.
 """
 
 from collections.abc import Mapping

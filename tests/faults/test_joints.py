@@ -67,6 +67,26 @@ def test_a_joint_moves_only_above_its_friction(quadruped: Robot):
     assert angles["stiff", 0.3] > 0.7 * angles["healthy", 0.3]
 
 
+def test_the_gain_of_a_servo_holds_less_at_the_same_error_and_as_much_at_most(quadruped: Robot):
+    # The knee has 60 N m/rad up to 12 N m.
+    forces = {}
+    for fault in ("servo-gain", "motor"):
+        data = mujoco.MjData(model := built(quadruped, f"{fault}:front_left_knee=0.5"))
+        for error in (0.1, 0.6):
+            data.actuator("front_left_knee").ctrl = error
+            mujoco.mj_forward(model, data)
+            forces[fault, error] = float(data.actuator("front_left_knee").force[0])
+
+    assert forces == pytest.approx(
+        {
+            ("servo-gain", 0.1): 3.0,
+            ("servo-gain", 0.6): 12.0,
+            ("motor", 0.1): 3.0,
+            ("motor", 0.6): 6.0,
+        }
+    )
+
+
 def test_the_largest_torque_of_a_motor_without_a_limit_is_that_of_its_largest_command():
     robot = Robot(
         "geared",

@@ -332,6 +332,21 @@ def test_joints_and_delay_of_an_arm_are_found_with_the_same_bits_on_any_number_o
 
 
 @search
+@pytest.mark.parametrize(("limit", "found"), [(1.6, 0.5), (20.0, None)], ids=["reached", "beyond"])
+def test_a_limit_of_the_force_is_fitted_if_the_trials_reach_it(limit: float, found: float | None):
+    nominal_arm = arm_of(ARM.replace("-20 20", f"-{limit} {limit}"), control_timestep=0.01)
+    limits = (0.5, 0.5) if found else ()
+    true = Parameters(**JOINTS_TRUE, force_limits=limits, delay=ARM_DELAY)
+    calibration = calibrate(
+        nominal_arm, [arm_trial(with_parameters(nominal_arm, true), ARM_NOISE)], 1
+    )
+
+    assert calibration.parameters.force_limits == pytest.approx(limits, rel=0.1)
+    rows = [row for row in calibration.joints["parameters"] if row["quantity"] == "force limit"]
+    assert [row["name"] for row in rows] == (["a", "b"] if found else [])
+
+
+@search
 def test_an_arm_whose_truth_is_nominal_stays_nominal_and_as_uncertain_as_before():
     found = calibrate(arm(), [arm_trial(arm(), ARM_NOISE)], 1)
 

@@ -177,6 +177,17 @@ def joints_scaled(robot: Robot, factor: float) -> Parameters:
     return dataclasses.replace(nominal(robot), **parts)
 
 
+def test_the_mjcf_contains_limits_of_force_that_a_gain_does_not_change():
+    robot, count = arm(), arm().model.nu
+    limits = tuple(np.linspace(0.5, 1.5, count).tolist())
+    parameters = Parameters(motor_gains=(0.7,) * count, force_limits=limits)
+    expected = robot.model.actuator_forcerange * np.array(limits)[:, np.newaxis]
+
+    assert robot.model.actuator_forcelimited.all()
+    fitted = with_parameters(robot, parameters).model.actuator_forcerange
+    np.testing.assert_allclose(fitted, expected, rtol=1e-5)
+
+
 def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
     same = model_with_parameters(arm(), joints_scaled(arm(), 1.0))
     for field, _ in JOINT_FIELDS.values():
