@@ -16,13 +16,23 @@ from selfmodel.comparators import (
     SENSOR_SERIES,
 )
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
-from selfmodel.diagnosis.losses import LossTable, contradiction_losses, observed_jams, simulate
+from selfmodel.diagnosis.losses import (
+    LossTable,
+    Problem,
+    contradiction_losses,
+    observed_jams,
+    simulate,
+)
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import SERVO_GAIN
 from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulation import rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
@@ -34,6 +44,7 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
 from tests.helpers.hostile import exploding, lacking
 from tests.helpers.memory import in_memory
+from tests.helpers.robots.arms import arm_mjcf, robot_of
 
 STEPS = 60
 KNEE = "front_left_knee"
@@ -367,3 +378,32 @@ def test_a_jam_is_at_the_median_angle_of_the_last_third_of_the_last_trial(quadru
     assert jam_of(quadruped, moved, np.full(90, -0.1)) == -0.1
     assert jam_of(quadruped, np.full(90, limit + 0.5)) == limit
     assert jam_of(quadruped, np.where(np.arange(90) < 60, 0.2, np.nan)) is None
+
+
+@pytest.mark.parametrize("reached", [(), ("joint2", "joint3")], ids=["beyond", "reached"])
+def test_the_gain_of_a_servo_is_asked_where_a_limit_tells_it_from_a_weak_motor(
+    reached: tuple[str, ...],
+):
+    """Elsewhere the two are equal, and no trial could decide."""
+    arm = robot_of(arm_mjcf())
+    spec = arm.specification()
+    for motor in spec.actuators:
+        is_reached = f"joint{motor.name[-1]}" in reached
+        motor.forcerange = [-3.0, 3.0] if is_reached else [-1e4, 1e4]
+    robot = dataclasses.replace(arm, mjcf=spec.to_xml())
+    motion = 0.3 * np.sin(np.arange(200)[:, np.newaxis] / 9 + np.arange(6))
+    trial = Trial.from_arrays(robot, motion, motion)
+    table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
+    problem = Problem(
+        table,
+        HypothesisSpace.of(DEFAULT_KINDS, robot.anatomy),
+        [trial],
+        surrogate=table.surrogate([trial]),
+        healthy_trials=[],
+        names={trial.path: "arm"},
+        settings=Settings(),
+    )
+
+    asked = {fault.part for fault in problem.space.coarse_candidates if fault.kind == SERVO_GAIN}
+    assert asked == set(reached)
+    assert (SERVO_GAIN in problem.space.kinds) == bool(reached)
