@@ -87,16 +87,14 @@ def main() -> None:
                 seed=0,
                 threads=1,
             )
-            fit = found.fit
             row = {
                 "group": group,
                 "healthy": reference,
                 "trial": name,
                 "best": str(found.best),
                 "verdict": found.verdict,
+                "alike": [str(one) for one in found.indistinguishable],
                 "since": None if found.change is None else round(found.change.time, 2),
-                "losses": fit
-                and [round(own or 0.0, 3) for own in (fit.loss, fit.intact_loss, fit.healthy_loss)],
                 "seconds": round(time.process_time() - start),
                 "reason": found.doubt.reason if found.doubt else "",
             }
