@@ -145,7 +145,7 @@ class WeakMotor(MotorFault):
 
 
 class ServoGain(MotorFault):
-    """A joint whose servos have another gain, such as that of a firmware, with the same limits.
+    """A joint whose servos have a lower gain, such as that of a firmware, with the same limits.
 
     Half of the gain holds half of the load at the same error, and the same largest load. Where no
     limit is reached, it equals a weak motor. It changes the velocity gain of the servo too.
@@ -272,11 +272,11 @@ WEAK_MOTOR = WeakMotor(
 SERVO_GAIN = ServoGain(
     name="servo-gain",
     base="fixed",
-    bounds=(0.1, 10.0),
-    levels=(0.25, 0.5, 2.0, 4.0),
+    bounds=(0.1, 1.0),
+    levels=(0.2, 0.4, 0.6, 0.8),
     degenerates_to={1.0: None},
-    unit="times",
-    words="the servo of the joint {part} has {severity:.2g} times its gain",
+    unit="of its gain",
+    words="the servo of the joint {part} has only {severity:.0%} of its gain",
     is_of_joint=True,
 )
 DAMPED_JOINT = DampedJoint(

@@ -332,7 +332,7 @@ def test_joints_and_delay_of_an_arm_are_found_with_the_same_bits_on_any_number_o
 
 
 @search
-@pytest.mark.parametrize(("limit", "found"), [(1.6, 0.5), (20.0, None)], ids=["reached", "beyond"])
+@pytest.mark.parametrize(("limit", "found"), [(8.0, 0.5), (200.0, None)], ids=["reached", "beyond"])
 def test_a_limit_of_the_force_is_fitted_if_the_trials_reach_it(limit: float, found: float | None):
     nominal_arm = arm_of(ARM.replace("-20 20", f"-{limit} {limit}"), control_timestep=0.01)
     limits = (0.5, 0.5) if found else ()
