@@ -353,10 +353,8 @@ class Problem:
 
         They equal weak motors unless a prediction reaches a limit of the force.
         """
-        may_be_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
-        if WEAK_MOTOR not in space.kinds or not may_be_asked:
-            return space
-        parts = space.parts(SERVO_GAIN)
+        is_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
+        parts = space.parts(SERVO_GAIN) if is_asked and WEAK_MOTOR in space.kinds else ()
         faults = [Fault(kind, part, TOLD_APART) for part in parts for kind in OF_MOTORS]
         losses = self.coarse([Hypothesis((fault,)) for fault in faults]) if faults else []
         pairs = zip(parts, losses[::2], losses[1::2], strict=True)
