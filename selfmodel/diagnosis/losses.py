@@ -356,7 +356,8 @@ class Problem:
         is_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
         parts = space.parts(SERVO_GAIN) if is_asked and WEAK_MOTOR in space.kinds else ()
         faults = [Fault(kind, part, TOLD_APART) for part in parts for kind in OF_MOTORS]
-        losses = self.coarse([Hypothesis((fault,)) for fault in faults]) if faults else []
+        alone = [Hypothesis((fault,)) for fault in faults]
+        losses = self.coarse(alone) if alone else np.empty((0, 0))
         pairs = zip(parts, losses[::2], losses[1::2], strict=True)
         alike = [part for part, one, other in pairs if np.array_equal(one, other)]
         return space.without(SERVO_GAIN, alike)
