@@ -1,7 +1,6 @@
 """Error of short predictions from many logged states."""
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -29,9 +28,6 @@ MIN_SEGMENTS = 4
 
 MIN_COVER = 0.9
 """Share of a trial that segments cover without gaps that matter."""
-
-SURROGATE_SECONDS = 3.2
-"""Length of the surrogate's segments that follow each other, s: of 26 of 12 steps of 10 ms."""
 
 COMPARISONS = 4
 """Steps within a segment at which prediction and log are compared, evenly spread to its end."""
@@ -70,7 +66,6 @@ class SegmentPrediction:
         horizon: Control steps of a segment.
         max_segments: Segments of a short trial, at most, evenly spread over it.
         density: Segments per control step of a longer trial.
-        max_seconds: Length of the segments of a trial that follow each other, together, s.
     """
 
     name: str
@@ -78,14 +73,12 @@ class SegmentPrediction:
     horizon: int = 12
     max_segments: int = 80
     density: float = 0.08
-    max_seconds: float = math.inf
 
     @property
     def surrogate(self) -> "SegmentPrediction":
         """The same comparator with a third of the segments of a short trial, for any trial."""
         fewer = max(self.max_segments // 3, MIN_SEGMENTS)
-        seconds = SURROGATE_SECONDS
-        return dataclasses.replace(self, max_segments=fewer, density=0.0, max_seconds=seconds)
+        return dataclasses.replace(self, max_segments=fewer, density=0.0)
 
     def prepare(self, trial: Trial) -> Prepared:
         """Returns the segments of the trial and the logged values to compare them with.
@@ -167,9 +160,7 @@ class SegmentPrediction:
             )
         starts, steady, chains = starts[usable], steady[usable], 1
         if follow:
-            length = horizon * trajectory.timestep
-            most = int(max(min(most, self.max_seconds / length), 2 * MIN_SEGMENTS))
-            rows, counted, chains = chained(len(starts), most, length)
+            rows, counted, chains = chained(len(starts), most, horizon * trajectory.timestep)
             starts, steady = starts[rows], steady[rows] & counted
         if steady.sum() < MIN_SEGMENTS:
             raise TrialRefusedError(

@@ -25,10 +25,6 @@ quadruped and of a hexapod that began at rest, in place of 0.6 and 1.2 m/s, was 
 m/s after four segments of 0.12 s (0.10 and 0.14 in the middle of a trial), and the losses were
 those of the middle."""
 
-MIN_COUNTED = 8
-"""Segments that count of each of two chains, at least: one chain at the end has more that show a
-fault which begins during the trial."""
-
 MAX_CHAIN = 12.0
 """Length of a chain, at most, if all segments of a trial are simulated, s."""
 
@@ -132,7 +128,7 @@ def chained(count: int, most: int, length: float) -> tuple[IndexArray, BoolArray
         chains = max(1, math.ceil((count - warm_up) / (longest - warm_up)))
         size = math.ceil((count + (chains - 1) * warm_up) / chains)
     else:
-        chains = 2 if most >= 2 * (warm_up + MIN_COUNTED) else 1
+        chains = 2 if most >= 4 * warm_up else 1
         size = min(max(most // chains, 2 * warm_up), count)
     # A single part is at the end: a fault may begin during the trial.
     first = np.floor(np.linspace(0 if chains > 1 else count - size, count - size, chains))
