@@ -111,8 +111,8 @@ def _advice(diagnosis: Diagnosis) -> str:
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
             return (
-                f"What differs from its model may be a fault, or an error of the model in these "
-                f"motions. To decide, {(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the "
+                f"It may have one, or its model may be wrong for such motions. "
+                f"To decide, {(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the "
                 f"diagnosis."
             )
 
@@ -132,7 +132,7 @@ def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> s
         return f"The difference is largest at the joint {joints[0]}: inspect it, then {repeat}"
     if best:
         words = f"{in_words(best)}{_probability(diagnosis, best)}"
-        return f"Of those tried, the most probable is that {words}: check this, then {repeat}"
+        return f"The nearest of them is that {words}: check this; if it is not so, {repeat}"
     return f"{repeat[0].upper()}{repeat[1:]}"
 
 

@@ -269,8 +269,8 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
             (
                 "The robot differs from its model, and none of the faults tried explains it (60 % "
-                "sure). Of those tried, the most probable is that the joint front_left_knee is "
-                "stuck (30 %): check this, then repeat the diagnosis with all kinds of faults "
+                "sure). The nearest of them is that the joint front_left_knee is stuck (30 %): "
+                "check this; if it is not so, repeat the diagnosis with all kinds of faults "
                 "(--kinds all)."
             ),
         ),
@@ -281,9 +281,9 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "not judged", "doubt": DOUBT},
             (
-                "These trials do not show whether the robot has a fault. What differs from its "
-                "model may be a fault, or an error of the model in these motions. To decide, DO "
-                "THIS; then repeat the diagnosis."
+                "These trials do not show whether the robot has a fault. It may have one, or its "
+                "model may be wrong for such motions. To decide, DO THIS; then repeat the "
+                "diagnosis."
             ),
         ),
     ],
