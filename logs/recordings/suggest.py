@@ -220,7 +220,7 @@ def _in_bag(bag: Recording, robot: Robot) -> _Offer:
     for topic in tables:
         vectors = classified(series[topic].names).vectors["imu"]
         of_imu = of_imu or [_topic([topic]), *_vectors(vectors)] if vectors else of_imu
-    sent = [series[topic].logged for topic in commands[:1] if series[topic].count > 1]
+    sent = [series[topic].logged for topic in commands[:1] if len(series[topic].logged) > 1]
     return _Offer(
         what="bag",
         notes=bag.notes,

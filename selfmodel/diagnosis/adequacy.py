@@ -93,7 +93,8 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
     elif is_small:
         joints = {joint.name for joint in problem.space.anatomy.joints}
         parts = [*fit.joints, *(fault.part for fault in accused.faults if fault.part in joints)]
-        if left <= COMPLETE:
+        is_real = loss > worst + significance.LOSS_FLOOR
+        if left <= COMPLETE and is_real:
             reason = refit_reason(accused, problem)
         elif any(joint in faster for joint in parts):
             faster = {joint: speeds for joint, speeds in faster.items() if joint in parts}

@@ -27,7 +27,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, suitable
 from selfmodel.progress import Progress
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
@@ -81,7 +81,8 @@ class DiagnosticSearch:
         self._space = HypothesisSpace.of(kinds, simulator.robot.anatomy)
         # On a real servo on a bench, a load was found in the place of lost torque, and damping in
         # that of half its gain.
-        is_whole = set(kinds).issuperset(DEFAULT_KINDS)
+        anatomy = simulator.robot.anatomy
+        is_whole = set(kinds).issuperset(suitable(DEFAULT_KINDS, anatomy))
         self._is_extended = is_whole and not simulator.robot.has_fixed_base
         self._healthy_trials = tuple(healthy_trials)
         self._proposed: set[Hypothesis] = set()
@@ -112,10 +113,9 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
-        space = self._space.including(seeds)
+        space = self._space.including(seeds[:1])
         problem = problem_of(space)
-        parts = problem.space.parts
-        known = [one for one in seeds if all(own.part in parts(own.kind) for own in one.faults)]
+        known = [one for one in seeds if problem.space.has(one)]
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
             distances, problem.space, self._settings, known, rng, on_generation=observer
@@ -128,7 +128,9 @@ class DiagnosticSearch:
         diagnosis = self._refined_diagnosis(starts, trials, problem)
         if diagnosis.unsearched is None or not self._is_extended:
             return diagnosis
-        named = diagnosis.unsearched.named
+        named = [one for one in diagnosis.unsearched.named if len(one) <= self._settings.genes]
+        if not named:
+            return diagnosis
         wider = problem_of(space.including(named))
         return self._refined_diagnosis([*named, *starts], trials, wider)
 

@@ -74,6 +74,11 @@ class HypothesisSpace:
         implied = [other for kind in kinds for other in kind.degenerate_kinds]
         return replace(self, kinds=tuple(dict.fromkeys((*self.kinds, *kinds, *implied))))
 
+    def has(self, hypothesis: Hypothesis) -> bool:
+        """Returns whether each fault of a hypothesis is of a searched kind, at a searched part."""
+        faults = hypothesis.faults
+        return all(one.kind in self.kinds and one.part in self.parts(one.kind) for one in faults)
+
     def parse(self, text: str) -> Hypothesis:
         """Returns the hypothesis of a notation; it may name ``kinds`` and all built-in kinds."""
         return notation.parse(text, self.anatomy, notation_kinds(self.kinds))

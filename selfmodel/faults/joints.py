@@ -152,7 +152,7 @@ class ServoGain(MotorFault):
     """
 
     def _fits(self, joint: Joint, _anatomy: Anatomy) -> bool:
-        return bool(joint.servos)
+        return bool(joint.motors) and set(joint.servos) == set(joint.motors)
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the forces of the servos before their limits."""

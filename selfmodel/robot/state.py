@@ -395,7 +395,8 @@ class SensorReader:
         """Writes the readings of the next control step, or of several.
 
         Args:
-            sensordata: ``(..., n, nsensordata)``, which contains the touch forces, N.
+            sensordata: ``(n, nsensordata)`` or ``(steps, n, nsensordata)``, which contains the
+                touch forces, N.
             qpos: ``(..., n, nq)``, which contains the joint angles, rad.
             readings: ``(..., n, sensors)``, written.
         """
@@ -408,7 +409,7 @@ class SensorReader:
         if self._faulty:
             readings *= self._gain
             readings += self._offset
-        for step in readings.reshape(-1, *readings.shape[-2:]):
+        for step in readings if readings.ndim > 2 else [readings]:
             self._noise.add(step)
 
 

@@ -122,9 +122,13 @@ def model_with_parameters(
         motor_gains=np.array(parameters.motor_gains),
     )
     scale_contacts(scaled, parameters.contact_stiffness, parameters.contact_damping)
+    of_joints: dict[int, float] = {}
     for motor, factor in enumerate(parameters.force_limits):
         scaled.actuator_forcerange[motor] *= factor
-        scaled.jnt_actfrcrange[sorted(motor_joints(model, motor))] *= factor
+        of_joints |= dict.fromkeys(motor_joints(model, motor), factor)
+    # A joint that several motors drive is scaled once.
+    for joint, factor in of_joints.items():
+        scaled.jnt_actfrcrange[joint] *= factor
     further = [quantity for quantity in JOINT_FIELDS if getattr(parameters, quantity)]
     for quantity in further:
         values = joint_values(robot, parameters, quantity)

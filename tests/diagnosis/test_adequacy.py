@@ -321,6 +321,7 @@ def test_a_fault_that_explains_the_whole_loss_has_to_beat_a_refit_in_faster_moti
     problem = problem_of(table, moved(real, "first", pace=2, truth=BROKEN), healthy)
 
     assert doubted(problem, BROKEN) is None
+    assert doubted(problem, BROKEN, 1.0) is not None  # no loss that a fault could explain
     problem = problem_of(table, moved(real, "first", pace=2, truth=BROKEN), healthy)
     problem.calibrate = refused
     doubt = doubted(problem, BROKEN)
