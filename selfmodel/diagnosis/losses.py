@@ -349,10 +349,7 @@ class Problem:
         self._comparable = self.healthy_trials if is_comparable else []
 
     def _told_apart(self, space: HypothesisSpace) -> HypothesisSpace:
-        """Returns the hypotheses without the gains of servos that the trials cannot tell apart.
-
-        They equal weak motors unless a prediction reaches a limit of the force.
-        """
+        """Returns the hypotheses without gains of servos of which no prediction reaches a limit."""
         is_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
         parts = space.parts(SERVO_GAIN) if is_asked and WEAK_MOTOR in space.kinds else ()
         alike = []
