@@ -24,11 +24,10 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.progress import ignore
 from selfmodel.recovery import recover as recovery_loop
-from selfmodel.recovery.measurable import check_measurable, observed_of
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, check_measurable, observed_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

@@ -29,8 +29,7 @@ from selfmodel.recovery.repair import (
     from_repertoire,
 )
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.scores import DISPLACEMENT, SCORES, UPRIGHT, Score, checked
-from selfmodel.recovery.tracking import TRACKING
+from selfmodel.recovery.scores import DISPLACEMENT, SCORES, TRACKING, UPRIGHT, Score, checked
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry

@@ -23,9 +23,8 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.measurable import check_measurable, observed_in
 from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
-from selfmodel.recovery.scores import UPRIGHT, Score
+from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings

@@ -1,12 +1,13 @@
 """Scores of rollouts and trials: the fitness of a repair.
 
 ``SCORES`` has those that need no argument; ``upright_within`` limits returns another, and so does
-``tracking``. Any other ``Score`` works as well.
+``tracking``. Any other ``Score`` works as well. One that cannot be measured on a physical robot is
+refused before the first trial (``check_measurable``).
 """
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -17,6 +18,7 @@ from selfmodel.arrays import BoolArray, FloatArray, held
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.physical.interface import ObservedRobot, PhysicalRobot
 from selfmodel.recovery.falls import falls_of, first_lasting, steps_in
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
@@ -24,6 +26,9 @@ from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
+
+TRACKING = "tracking"
+"""Name of the score of following a joint trajectory (``recovery.tracking``)."""
 
 COLLISION_TIME = 0.05
 """Time over which a self-collision is judged, s: two bodies are too deep in each other in more than
@@ -316,3 +321,46 @@ def _checked(
             f"all finite; return a number, the lowest for the worst run, from `of` of the score"
         )
     return values
+
+
+def observed_of(*robots: PhysicalRobot) -> frozenset[Signal]:
+    """Returns the signals that all of some physical robots observe, as far as they declare it."""
+    declared = [robot.signals for robot in robots if isinstance(robot, ObservedRobot)]
+    return frozenset(SIGNALS).intersection(*declared)
+
+
+def observed_in(trial: Trial) -> frozenset[Signal]:
+    """Returns the signals of which a trial has some number, and those without a column."""
+    signals = trial.trajectory.signals
+    return frozenset(
+        one for one in SIGNALS if np.isfinite(signals[one]).any() or not signals[one].size
+    )
+
+
+def check_measurable(
+    score: Score, robot: Robot, observed: Collection[Signal] = frozenset(SIGNALS)
+) -> None:
+    """Raises ``InputError``, which names other scores, if a score cannot be measured on a robot.
+
+    Args:
+        score: Fitness of a repair.
+        robot: The robot as its model describes it.
+        observed: Signals that are observed of the physical robot.
+    """
+    if reason := _obstacle(score, robot, observed):
+        others = [name for name, one in SCORES.items() if not _obstacle(one, robot, observed)]
+        if "joint_positions" in observed:
+            others.append(f"{TRACKING} (with --reference FILE, or --controller cpg)")
+        raise InputError(f"{reason}: give --score {' or '.join(others) or 'package.module:object'}")
+
+
+def _obstacle(score: Score, robot: Robot, observed: Collection[Signal]) -> str:
+    """Returns why a score cannot be measured on a robot; "" if it can."""
+    if score.needs_free_base and robot.has_fixed_base:
+        return f"the base of {robot.name} is fixed, and the score {score.name} needs one that moves"
+    if score.needs_touch and all(one.kind != "touch" for one in robot.anatomy.sensors):
+        return f"{robot.name} has no touch sensors, and the score {score.name} needs some"
+    lacking = [one for one in score.record if one not in (*observed, *score.optional)]
+    if not lacking:
+        return ""
+    return f"{robot.name} does not observe {', '.join(lacking)}, which the score {score.name} needs"

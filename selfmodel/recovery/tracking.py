@@ -10,12 +10,9 @@ from selfmodel.arrays import FloatArray, mean_of_known
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.recovery.scores import Score
+from selfmodel.recovery.scores import TRACKING, Score
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
-
-TRACKING = "tracking"
-"""Name of the score."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,12 +25,18 @@ from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.measurable import check_measurable, observed_of
 from selfmodel.recovery.recover import RecoveryLoop, random_stream
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import UPRIGHT, Score, upright_within
-from selfmodel.recovery.tracking import TRACKING, Reference, tracking
+from selfmodel.recovery.scores import (
+    TRACKING,
+    UPRIGHT,
+    Score,
+    check_measurable,
+    observed_of,
+    upright_within,
+)
+from selfmodel.recovery.tracking import Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.model_factors import with_model

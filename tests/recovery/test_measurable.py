@@ -10,8 +10,14 @@ import pytest
 import selfmodel
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.measurable import check_measurable, observed_in, observed_of
-from selfmodel.recovery.scores import STEPS, UPRIGHT, upright_within
+from selfmodel.recovery.scores import (
+    STEPS,
+    UPRIGHT,
+    check_measurable,
+    observed_in,
+    observed_of,
+    upright_within,
+)
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import load
 from selfmodel.trials.signals import SIGNALS, Signal
