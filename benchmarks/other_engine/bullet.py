@@ -12,7 +12,7 @@ import pybullet
 from scipy.spatial.transform import Rotation
 
 from benchmarks.other_engine.reality import SUBSTEP, Damage, Reality
-from benchmarks.other_engine.urdf import fix, part, scale
+from benchmarks.other_engine.urdf import fix, part, root_motion, scale
 from selfmodel.errors import InputError
 from selfmodel.logs.viewers import urdf as exported_urdf
 from selfmodel.robot.robot import Robot
@@ -145,13 +145,8 @@ class Bullet:
 
         Those of the origin of the root body; the angular velocity is in the frame of the base.
         """
-        centre, turn = self._call("getBasePositionAndOrientation", self._body)
-        inverse = pybullet.invertTransform(*self._base_inertial)
-        position, quaternion = pybullet.multiplyTransforms(centre, turn, *inverse)
-        linear, angular = map(np.array, self._call("getBaseVelocity", self._body))
-        orientation = Rotation.from_quat(quaternion)
-        linear = linear + np.cross(angular, np.subtract(position, centre))
-        return np.array(position), orientation, linear, orientation.inv().apply(angular)
+        pose = self._call("getBasePositionAndOrientation", self._body)
+        return root_motion(pose, self._call("getBaseVelocity", self._body), self._base_inertial)
 
     def is_valid(self) -> bool:
         """Returns whether the state is finite: Bullet has no warning of its own."""

@@ -19,14 +19,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pybullet
 import pybullet_data
-from scipy.spatial.transform import Rotation
 
 from benchmarks.foreign.cases import CASES, Fault, Faults, notation, stream
 from benchmarks.foreign.model import LEVELS
 from benchmarks.foreign.motion import TAIL, Gait, Motion, draw_gait
 from benchmarks.foreign.recorder import Noise, encoders_of, mapping, recorded, write_bag
 from benchmarks.foreign.robots import Part, Robot
-from benchmarks.other_engine.urdf import fix, part, scale
+from benchmarks.other_engine.urdf import fix, part, root_motion, scale
 
 FOLDER = Path(pybullet_data.getDataPath(), "a1")
 URDF = FOLDER / "a1.urdf"
@@ -302,13 +301,9 @@ class _Body:
         """Returns a time, and the pose, the twist, the angles and the speeds of a ``Motion``."""
         angles, speeds = self._fixed.copy(), np.zeros(len(self._fixed))
         angles[self._there], speeds[self._there] = self._states()
-        centre, turn = self._call("getBasePositionAndOrientation", self._body)
-        inverse = pybullet.invertTransform(*self._inertial)
-        position, quaternion = pybullet.multiplyTransforms(centre, turn, *inverse)
-        linear, angular = map(np.array, self._call("getBaseVelocity", self._body))
-        orientation = Rotation.from_quat(quaternion)
-        linear = linear + np.cross(angular, np.subtract(position, centre))
-        own = orientation.inv().apply(angular)
+        centre = self._call("getBasePositionAndOrientation", self._body)
+        twist = self._call("getBaseVelocity", self._body)
+        position, orientation, linear, own = root_motion(centre, twist, self._inertial)
         pose = [*position, *orientation.as_quat(scalar_first=True)]
         return np.concatenate([[time], pose, linear, own, angles, speeds])
 

@@ -1,8 +1,10 @@
-"""Changes of a URDF: a joint that is locked, and a link that is heavier."""
+"""Changes of a URDF, a locked joint and a heavier link, and the motion of its root in PyBullet."""
 
+from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
 import numpy as np
+import pybullet
 from scipy.spatial.transform import Rotation
 
 
@@ -31,6 +33,24 @@ def part(element: ET.Element, name: str) -> ET.Element:
     if found is None:
         raise ValueError(f"{element.get('name')} has no {name}")
     return found
+
+
+def root_motion(
+    pose: Sequence[Sequence[float]],
+    twist: Sequence[Sequence[float]],
+    inertial: Sequence[Sequence[float]],
+) -> tuple[np.ndarray, Rotation, np.ndarray, np.ndarray]:
+    """Returns position, m, orientation, velocity, m/s, angular velocity, rad/s, of a root body.
+
+    PyBullet's pose and twist are those of the centre of mass, at ``inertial`` in the body. Those
+    returned are of the origin of the body; the angular velocity is in its frame.
+    """
+    inverse = pybullet.invertTransform(*inertial)
+    position, quaternion = pybullet.multiplyTransforms(*pose, *inverse)
+    linear, angular = map(np.array, twist)
+    orientation = Rotation.from_quat(quaternion)
+    linear = linear + np.cross(angular, np.subtract(position, pose[0]))
+    return np.array(position), orientation, linear, orientation.inv().apply(angular)
 
 
 def _numbers(element: ET.Element, name: str) -> np.ndarray:
