@@ -28,7 +28,7 @@ from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
-from selfmodel.report.progress import Progress
+from selfmodel.report.progress import RunProgress
 from selfmodel.report.subject import subject_of_run
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
@@ -42,7 +42,7 @@ def recover(options: Recover) -> None:
     experiment = experiment_of(options)
     describe = partial(_described, experiment.robot, experiment.score)
     with display(describe) as on_event:
-        progress = Progress(
+        progress = RunProgress(
             experiment.folder,
             experiment.robot,
             on_event,

@@ -22,7 +22,7 @@ from selfmodel.trials.trial import Trial
 
 
 @dataclass(eq=False)
-class Progress:
+class RunProgress:
     """Records the events of a recovery, and hands every event on.
 
     The report is made of what the recovery has in memory, by simulations of its own: the recovery

@@ -12,7 +12,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.results import SEARCHES, read_searches, write_searches
 from selfmodel.recovery.result import SearchBegins
-from selfmodel.report.progress import Progress
+from selfmodel.report.progress import RunProgress
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
@@ -26,8 +26,8 @@ RECOVER = (
 )
 
 
-def recorded(folder: Path, robot: Robot) -> Progress:
-    progress = Progress(folder, robot, reports=True)
+def recorded(folder: Path, robot: Robot) -> RunProgress:
+    progress = RunProgress(folder, robot, reports=True)
     progress(SearchBegins("repair", INTACT))
     progress(Generation(1, 2, 0.1, 20, 1.0))
     progress(Generation(2, 2, 0.30000000000000004, 30, 2.0))
@@ -50,7 +50,7 @@ def test_the_searches_are_read_back_from_the_folder(tmp_path: Path, quadruped: R
 def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trials(
     tmp_path: Path, quadruped: Robot, kind: type[BaseException]
 ):
-    with pytest.raises(kind), Progress(tmp_path, quadruped).kept_on_failure():
+    with pytest.raises(kind), RunProgress(tmp_path, quadruped).kept_on_failure():
         raise kind("the folder has another run")
     assert not list(tmp_path.iterdir()), "an error before any search leaves the folder as it is"
     progress = recorded(tmp_path / "no-folder", quadruped)
