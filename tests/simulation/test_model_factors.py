@@ -1,5 +1,6 @@
 """Promises of model factors: the model and the MJCF have them; their distributions and sets."""
 
+import copy
 import dataclasses
 
 import mujoco
@@ -26,7 +27,7 @@ from selfmodel.simulation.model_factors import (
     with_parameters,
 )
 from selfmodel.tasks import ROBOTS
-from tests.helpers.robots.arms import arm
+from tests.helpers.robots.arms import arm, arm_mjcf, robot_of
 
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
@@ -186,6 +187,19 @@ def test_the_mjcf_contains_limits_of_force_that_a_gain_does_not_change():
     assert robot.model.actuator_forcelimited.all()
     fitted = with_parameters(robot, parameters).model.actuator_forcerange
     np.testing.assert_allclose(fitted, expected, rtol=1e-5)
+
+
+def test_the_limit_of_a_joint_that_two_motors_drive_is_scaled_once():
+    second = '<position name="second" joint="joint1" kp="1" ctrlrange="-1 1"/></actuator>'
+    robot = robot_of(arm_mjcf().replace("</actuator>", second))
+    model = copy.copy(robot.model)
+    model.jnt_actfrcrange[:] = (-2.0, 2.0)
+    limits = Parameters(motor_gains=(1.0,) * model.nu, force_limits=(0.5,) * model.nu)
+
+    fitted = model_with_parameters(robot, limits, model)
+
+    assert model.nu == robot.model.njnt + 1
+    np.testing.assert_array_equal(fitted.jnt_actfrcrange, model.jnt_actfrcrange / 2)
 
 
 def test_a_quantity_of_a_joint_is_scaled_and_one_that_is_zero_is_increased():
