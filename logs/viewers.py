@@ -167,6 +167,7 @@ class Kinematics:
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
+        self._data = mujoco.MjData(robot.model)  # once: its memory takes longer than its use
         bodies, parents = body_names(self._model), parent_names(self._model)
         every = range(len(bodies))
         self._fixed = robot.has_fixed_base
@@ -195,7 +196,7 @@ class Kinematics:
             observed = POSE if known[k] else POSE[:1]
             self._write({signal: rows[signal][k : k + 1] for signal in observed})
             row[:] = self._qpos[0]
-        poses = body_poses(self._model, qpos)
+        poses = body_poses(self._data, qpos)
         parents, children = poses[:, self._model.body_parentid[1:]], poses[:, 1:]
         with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
             moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])

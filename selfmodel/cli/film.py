@@ -87,7 +87,7 @@ class Film:
 
     def gaze(self, shot: Shot) -> FloatArray:
         """Returns the target of the camera, the smoothed root body, ``(frames, 3)``, m."""
-        path = motion.body_poses(self.model, shot.qpos)[:, self.root, :3]
+        path = motion.body_poses(mujoco.MjData(self.model), shot.qpos)[:, self.root, :3]
         duration = self.time[-1] - self.time[0]
         share = SMOOTHING * (len(path) - 1) / duration if duration > 0 else 0.0
         reach = min(round(share / 2), len(path))

@@ -221,7 +221,7 @@ def _send_body(recording: Any, film: Film, qpos: FloatArray, name: str, times: l
     """Sends the shapes of a body once, and its pose at every step."""
     rr = import_rerun()
     model = film.model
-    poses = motion.body_poses(model, qpos)
+    poses = motion.body_poses(mujoco.MjData(model), qpos)
     paths: dict[int, tuple[str, ...]] = {}
     for body in motion.bodies_of(model, model.body(film.root).name):
         path = ("world", name, model.body(body).name or f"body_{body}")

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -172,7 +173,7 @@ def _motion(robot: Robot, bodies: IndexArray, motion: Motion, steps: IndexArray)
     # A welded hinge has its own rotation in the hypothesis's model; the geometry is the robot's.
     poses = poses_of(robot, robot.model, motion.trajectory)
     qpos = poses.qpos[steps]
-    drawn = body_poses(robot.model, qpos)[:, bodies].reshape(-1, 7)
+    drawn = body_poses(mujoco.MjData(robot.model), qpos)[:, bodies].reshape(-1, 7)
     hinges = [int(robot.model.joint(name).qposadr[0]) for name in robot.anatomy.hinges]
     model = build(robot, motion.hypothesis).model
     detached = detached_bodies(robot.anatomy, model, motion.hypothesis)

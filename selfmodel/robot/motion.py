@@ -107,16 +107,15 @@ def positions_of(
     return qpos
 
 
-def body_poses(model: mujoco.MjModel, qpos: FloatArray) -> FloatArray:
-    """Returns the poses of the bodies along positions of a model, ``(steps, nq)``.
+def body_poses(data: mujoco.MjData, qpos: FloatArray) -> FloatArray:
+    """Returns the poses of the bodies of the model of ``data`` along positions, ``(steps, nq)``.
 
     They are positions x y z, m, and quaternions w x y z in the world, ``(steps, nbody, 7)``.
     """
-    data = mujoco.MjData(model)
-    poses = np.empty((len(qpos), model.nbody, 7))
+    poses = np.empty((len(qpos), data.model.nbody, 7))
     for row, pose in zip(qpos, poses, strict=True):
         data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
+        mujoco.mj_kinematics(data.model, data)
         pose[:, :3], pose[:, 3:] = data.xpos, data.xquat
     return poses
 
