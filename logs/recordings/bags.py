@@ -11,6 +11,7 @@ import re
 import shlex
 import shutil
 import sqlite3
+import struct
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -210,8 +211,9 @@ def _mcap(file: Path, found: _Found) -> Iterator[_Stored]:
                         claimed = record.message_count
             if opened.read(1):
                 raise ValueError("bytes follow its end")
-        except (EndOfFile, RecordLengthLimitExceeded) as failure:
-            if _is_closed(file) or (isinstance(failure, EndOfFile) and opened.read(1)):
+        except (EndOfFile, RecordLengthLimitExceeded, struct.error) as failure:
+            is_too_long = isinstance(failure, RecordLengthLimitExceeded)
+            if _is_closed(file) or (opened.read(1) and not is_too_long):
                 raise
             found.notes.append(
                 f"{file.name} has no end, as one that is still being recorded, or whose recorder "
