@@ -41,6 +41,12 @@ _FIELDS = {
         "std_msgs/Header header, string child_frame_id, "
         "geometry_msgs/PoseWithCovariance pose, geometry_msgs/TwistWithCovariance twist"
     ),
+    "sensor_msgs/Imu": (
+        "std_msgs/Header header, "
+        "geometry_msgs/Quaternion orientation, float64[9] orientation_covariance, "
+        "geometry_msgs/Vector3 angular_velocity, float64[9] angular_velocity_covariance, "
+        "geometry_msgs/Vector3 linear_acceleration, float64[9] linear_acceleration_covariance"
+    ),
     "selfmodel_msgs/SensorReadings": "std_msgs/Header header, string[] name, float64[] value",
     "sensor_msgs/JointState": (
         "std_msgs/Header header, string[] name, "
@@ -120,9 +126,9 @@ class Template:
             case "float64[]":
                 self._length(value or 0)
                 self._gap(value or 0)
-            case "float64[36]":
+            case "float64[9]" | "float64[36]":
                 self._gap(1)
-                self._reserve(8, 8 * 35)
+                self._reserve(8, 8 * (int(kind[8:-1]) - 1))
             case _ if kind.endswith("[]"):
                 self._length(len(value))
                 for item in value:
@@ -230,6 +236,7 @@ DESCRIPTION = "/robot_description"
 DESCRIPTION_TYPE = "std_msgs/msg/String"
 TRANSFORMS = "/tf"
 COMMANDS = "/joint_commands"
+IMU = "/imu"
 
 CHANNELS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -247,15 +254,24 @@ the last one (history 1, depth 1), reliable (1) and transient local (durability 
 FRAMES_PERIOD = 0.05
 """Period of ``/tf``, s: at every step, this topic for display would be a fifth of a log."""
 
-Derived = Literal["child_linear_velocity", "pose_unknown", "twist_unknown", "transforms"]
+Derived = Literal[
+    "child_linear_velocity",
+    "pose_unknown",
+    "twist_unknown",
+    "orientation_unknown",
+    "turning_unknown",
+    "acceleration_unknown",
+    "transforms",
+]
 """Quantities for other tools, which the reader ignores: the velocity of the base in its own frame,
-``(steps, 3)`` m/s; the first number of the covariances of the base's pose and twist, -1 if some of
-it is not known and otherwise 0, ``(steps, 1)``; position and quaternion (x y z w) of each body in
-its parent's frame, ``(steps, 7 bodies)``."""
+``(steps, 3)`` m/s; the first number of a covariance, such as of the base's pose and twist, -1 if
+some of it is not known and otherwise 0, ``(steps, 1)``; position and quaternion (x y z w) of each
+body in its parent's frame, ``(steps, 7 bodies)``."""
 
-Part = Signal | Derived | Literal["timing"]
-"""Quantity in a message. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a late
-step and for a missing observation."""
+Part = Signal | Derived | Literal["acceleration", "timing"]
+"""Quantity in a message. ``acceleration`` is what an accelerometer of the base measures, gravity
+included, ``(steps, 3)`` m/s^2. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a
+late step and for a missing observation."""
 
 _XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
 
@@ -351,6 +367,21 @@ TIMING = Topic(
     timing=3,
 )
 """Measured timing of the steps, on a robot with its own clock."""
+
+
+def imu(root: str) -> Topic:
+    """Returns the topic of the IMU of an imported recording, in the frame of the root body."""
+    return Topic(
+        IMU,
+        "sensor_msgs/msg/Imu",
+        {"header": {"frame_id": root}},
+        base_orientation=4,
+        orientation_unknown=1,
+        base_angular_velocity=3,
+        turning_unknown=1,
+        acceleration=3,
+        acceleration_unknown=1,
+    )
 
 
 def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:

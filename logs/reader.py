@@ -19,9 +19,11 @@ from selfmodel.logs.controllers import parse_controller
 from selfmodel.logs.log_file import Contents, Messages, read_contents
 from selfmodel.logs.messages import (
     COMMANDS,
+    IMU,
     TIMING,
     Part,
     Topic,
+    imu,
     is_known,
     names_in,
     schema_text,
@@ -66,6 +68,8 @@ class TrialLog:
         reason: Cause of the stop, or "".
         timing: Measured timing of the steps, on a robot with its own clock.
         imported: Whether the trial is an imported recording, resampled and thereby rounded.
+        acceleration: What the IMU of an imported recording measured, gravity included, in the frame
+            of the base, ``(steps, 3)`` m/s^2, NaN where not observed; None without an IMU.
     """
 
     trial: Trial
@@ -79,6 +83,7 @@ class TrialLog:
     reason: str
     timing: Timing | None
     imported: bool
+    acceleration: FloatArray | None
 
 
 def read_log(path: str | Path) -> TrialLog:
@@ -118,6 +123,9 @@ def interpret(contents: Contents) -> TrialLog:
     with contents.mismatch("it has no controller, and cannot be played back"):
         driver = controller or played_back(trajectory.names.motors, trajectory["commands"])
     plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
+    acceleration = None
+    if IMU in contents.topics:
+        acceleration = _rows(contents, imu(record.root), record, result.steps)["acceleration"]
     trial = Trial(plan, record.robot, trajectory, str(contents.path))
     # Compared as text: the displacement is NaN if the base was not observed.
     if repr(result.displacement) != repr(trial.displacement):
@@ -142,6 +150,7 @@ def interpret(contents: Contents) -> TrialLog:
         reason=result.reason,
         timing=timing,
         imported=records.IMPORT in contents.metadata,
+        acceleration=None if acceleration is None else frozen(acceleration),
     )
 
 

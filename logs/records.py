@@ -12,6 +12,7 @@ from typing import Annotated, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
+from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import MAX_SEED, Stage
@@ -130,15 +131,19 @@ def record_of(kind: type[Record], texts: Mapping[str, str]) -> Record:
     return msgspec.convert(texts, kind, strict=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Imported:
-    """Origin of an imported trial: source and quality by name, and the mapping as TOML.
+    """Origin of an imported trial, and what no signal has.
 
-    ``start`` of the facts is the recorded time of the first step, ns.
+    Attributes:
+        facts: Source and quality by name; ``start`` is the recorded time of the first step, ns.
+        mapping: The mapping, as TOML.
+        acceleration: Acceleration of the base, see ``messages.Part``; None without an IMU.
     """
 
     facts: Mapping[str, str]
     mapping: str
+    acceleration: FloatArray | None = None
 
     @property
     def start(self) -> int:

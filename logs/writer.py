@@ -103,8 +103,10 @@ class TrialWriter:
         self._robot, self._plan, self._header = robot, plan, header
         driven = driven_names(robot.model)
         self._kinematics = viewers.Kinematics(robot)
+        self._acceleration = header.imported.acceleration if header.imported else None
         self._topics = (
             *messages.topics(names, robot.root, timed=header.timed, driven=driven),
+            *([] if self._acceleration is None else [messages.imu(robot.root)]),
             *self._kinematics.topics,
         )
         self._first_stamp = header.imported.start if header.imported else 0
@@ -220,6 +222,14 @@ class TrialWriter:
             "pose_unknown": _unknown(rows["base_position"], rows["base_orientation"]),
             "twist_unknown": _unknown(child, rows["base_angular_velocity"]),
         }
+        if self._acceleration is not None:
+            measured = self._acceleration[self._written : self.steps]
+            parts |= {
+                "acceleration": measured,
+                "acceleration_unknown": _unknown(measured),
+                "orientation_unknown": _unknown(rows["base_orientation"]),
+                "turning_unknown": _unknown(rows["base_angular_velocity"]),
+            }
         drawn = np.flatnonzero(steps % messages.frames_stride(period) == 0)
         poses = self._kinematics.transforms({part: values[drawn] for part, values in rows.items()})
         content: list[tuple[IndexArray, Mapping[Part, FloatArray]]] = []

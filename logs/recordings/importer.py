@@ -45,6 +45,7 @@ class ImportedTrial:
         digests: SHA-256 of the recording's files by name.
         clock: Clock of the times: ``header``, ``log`` or ``column``.
         origin: Start of the trial, ns since 1970 or since the start of a table's time.
+        acceleration: Acceleration that the IMU measured; see ``records.Imported``.
         notes: Warnings, one sentence each.
     """
 
@@ -53,15 +54,16 @@ class ImportedTrial:
     digests: Mapping[str, str]
     clock: str
     origin: int
+    acceleration: FloatArray | None
     notes: tuple[str, ...]
 
     @property
     def valid(self) -> dict[str, float]:
-        """Fraction of observed values by signal."""
-        return {
-            signal: float(np.mean(np.isfinite(values)))
-            for signal, values in self.trajectory.signals.items()
-        }
+        """Fraction of observed values by signal, and of the acceleration of an IMU."""
+        values: dict[str, FloatArray] = {**self.trajectory.signals}
+        if self.acceleration is not None:
+            values["imu_linear_acceleration"] = self.acceleration
+        return {name: float(np.mean(np.isfinite(each))) for name, each in values.items()}
 
     def facts(self) -> dict[str, str]:
         """Returns the origin of the trial as texts for its log; lists and records are JSON."""
@@ -102,6 +104,10 @@ def import_recording(
         signals = _signals(mapping.trial, tracks, robot, origin, steps)
     except ValueError as error:
         raise mapping.error(("start",), f"{error}: set another start") from error
+    acceleration = None
+    if mapping.trial.imu is not None:
+        track = tracks.get(("imu_linear_acceleration", ""), NOTHING)
+        acceleration = frozen(at_steps(track, origin, steps, resample.linear, 3))
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
     trajectory = Trajectory(
         robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
@@ -120,7 +126,9 @@ def import_recording(
         *no_measurements(recording, mapping.places.values()),
         *notes(mapping.trial, trajectory, qualities, robot),
     )
-    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, warnings)
+    return ImportedTrial(
+        trajectory, qualities, recording.digests, clock, origin, acceleration, warnings
+    )
 
 
 def write_recording(
@@ -146,7 +154,9 @@ def write_recording(
         robot,
         TrialPlan("imported", mapping.trial.stage, driver, trajectory.steps, seed=0),
         samples_of(trajectory),
-        TrialHeader(Settings(), imported=Imported(recording.facts(), mapping.text)),
+        TrialHeader(
+            Settings(), imported=Imported(recording.facts(), mapping.text, recording.acceleration)
+        ),
     )
 
 

@@ -42,7 +42,7 @@ VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = MappingProxyType(
             "linear_velocity": (7, 10),
             "angular_velocity": (10, 13),
         },
-        "imu": {"orientation": (0, 4), "angular_velocity": (4, 7)},
+        "imu": {"orientation": (0, 4), "angular_velocity": (4, 7), "linear_acceleration": (7, 10)},
     }
 )
 """Numbers of each quantity of a body in the rows of ``messages.DECODERS``."""
@@ -138,8 +138,8 @@ class Commands(Angles):
     order: tuple[str, ...] = ()
 
 
-class Imu(Section):
-    """Topic or columns of an IMU."""
+class Body(Section):
+    """Topic or columns of the motion of a body."""
 
     topic: str = ""
     orientation: Quaternion = None
@@ -156,7 +156,13 @@ class Imu(Section):
             raise ValueError("this table needs topic, or the columns of a vector: add one")
 
 
-class Base(Imu):
+class Imu(Body):
+    """Topic or columns of an IMU, whose acceleration includes gravity, m/s^2."""
+
+    linear_acceleration: Vector = None
+
+
+class Base(Body):
     """Root body: its topic, whose velocities are in the frame of the base, or its columns.
 
     In the frame ``start``, the trial begins at x = y = 0 heading along +x. ``velocity_frame`` is
@@ -228,8 +234,8 @@ class Trial(Section, kw_only=True):
     def places(self) -> Places:
         """Yields quantities and parts with their places.
 
-        The quantities are signals, ``touch``, ``imu_orientation`` and ``imu_angular_velocity``;
-        the part is "" for the base and the IMU.
+        The quantities are signals, ``touch``, and those of ``VECTORS`` of the IMU, such as
+        ``imu_orientation``; the part is "" for the base and the IMU.
         """
         joints, commands = self.joints, self.commands
         for hinge, link in joints.links.items():
@@ -261,7 +267,7 @@ class Trial(Section, kw_only=True):
             yield ("sensors", sensor), Place(("sensors", sensor), TABLE, (name,))
 
 
-def _vectors(body: str, section: Imu | None) -> Places:
+def _vectors(body: str, section: Body | None) -> Places:
     if section is None:
         return
     for key, numbers in VECTORS[body].items():

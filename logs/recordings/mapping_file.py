@@ -80,9 +80,6 @@ _OF_BAG: Mapping[str, Keys] = {
 }
 """Keys that a table of the file has in the mapping of a bag only."""
 
-_COLUMN_KEYS = frozenset({"velocities", "efforts", "column", "velocity_frame", *VECTORS["base"]})
-"""Keys of columns, of a table or of a topic that is one."""
-
 
 def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
     """Checks that the keys are those of a table, whose mapping has ``[time]``, or of a bag."""
@@ -236,7 +233,7 @@ def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) 
     path, key = place.path, place.path[len(role)]
     if (base := mapping.trial.base) and role == ("base",) and base.velocity_frame == "world":
         path, key = ("base", "velocity_frame"), "velocity_frame"
-    if key in _COLUMN_KEYS and not series.by_place:
+    if key not in ("names", "topic", "index") and not series.by_place:
         raise mapping.error(
             path,
             f"{key} is for a table, or a topic of a type without a role, got {topic} of "

@@ -208,10 +208,13 @@ def _one(*numbers: float) -> Rows:
 def _imu(message: Any) -> Rows:  # noqa: ANN401
     # REP 145: a first covariance of -1 means no measurement.
     known = message.orientation_covariance[0] != -1
-    turning = message.angular_velocity_covariance[0] != -1
+    vectors = (
+        (message.angular_velocity, message.angular_velocity_covariance),
+        (message.linear_acceleration, message.linear_acceleration_covariance),
+    )
     return _one(
         *(_wxyz(message.orientation) if known else [np.nan] * 4),
-        *(_xyz(message.angular_velocity) if turning else [np.nan] * 3),
+        *(x for one, of in vectors for x in (_xyz(one) if of[0] != -1 else [np.nan] * 3)),
     )
 
 
@@ -247,9 +250,9 @@ DECODERS: Mapping[str, Callable[[Any], Rows]] = MappingProxyType(
 """Decoders of the supported message types into names and rows of numbers.
 
 Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
-(position, orientation w x y z, linear and angular velocity in the child's frame), Imu 7
-(orientation w x y z, angular velocity), touch 1. Missing numbers are NaN. The columns of a
-Float64MultiArray are named by their index; of types with one column, it has no name.
+(position, orientation w x y z, linear and angular velocity in the child's frame), Imu 10
+(orientation w x y z, angular velocity, linear acceleration), touch 1. Missing numbers are NaN. The
+columns of a Float64MultiArray are named by their index; of types with one column, it has no name.
 """
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from types import MappingProxyType
 
+from selfmodel.logs.recordings.mapping import VECTORS
+
 CERTAIN_SIMILARITY = 0.75
 """Minimum similarity of a certain match, of at most 1, if no other name is ``CERTAIN_LEAD``."""
 
@@ -126,13 +128,14 @@ _VECTORS = _sets(
     {
         "orientation": "orientation ori quat quaternion rot rotation attitude q",
         "angular_velocity": "angular ang gyro omega gyroscope w",
+        "linear_acceleration": "acceleration acc accel accelerometer",
         "linear_velocity": "velocity vel linear twist v",
         "position": "position pos odom pose p",
     }
 )
 """Words of the quantities of a base or an IMU, in the order of the decision."""
 
-_NUMBERED = ("orientation", "angular_velocity")
+_NUMBERED = ("orientation", "angular_velocity", "linear_acceleration")
 """Quantities whose components may be numbers: ``pos_0`` to ``pos_2`` are of three joints."""
 
 _OTHERS = _sets(
@@ -140,7 +143,7 @@ _OTHERS = _sets(
         "time": "time t timestamp stamp ts elapsed epoch sec secs seconds",
         "unit": "s ms us ns sec",
         "filler": "rad deg degrees nm joint state states m",
-        "imu": "imu gyro gyroscope",
+        "imu": "imu gyro gyroscope accelerometer",
     }
 )
 _COMPONENT = re.compile(r"(?P<group>.*?)[._ \-/\[(]?(?P<axis>[xyzwXYZW]|(?<!\d)\d)[\])]?$")
@@ -213,7 +216,8 @@ def _vectors(names: Sequence[str]) -> dict[str, dict[str, tuple[str, ...]]]:
                 continue
             if words.intersection(fitting) and set(axes) == set(order):
                 body = "imu" if words & _OTHERS["imu"] else "base"
-                found[body].setdefault(quantity, tuple(axes[axis] for axis in order))
+                if quantity in VECTORS[body]:
+                    found[body].setdefault(quantity, tuple(axes[axis] for axis in order))
                 break
     return found
 

@@ -17,7 +17,7 @@ from rosbags.typesys.store import Typestore
 from selfmodel.arrays import FloatArray
 from selfmodel.logs import SchemaMismatchError, read_log
 from selfmodel.logs.log_file import read_contents
-from selfmodel.logs.messages import description, names_in, schema_text, topics, transforms
+from selfmodel.logs.messages import description, imu, names_in, schema_text, topics, transforms
 from selfmodel.logs.records import TRIAL, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
@@ -33,6 +33,7 @@ TYPES = [
     "nav_msgs/msg/Odometry",
     "geometry_msgs/msg/Vector3Stamped",
     "tf2_msgs/msg/TFMessage",
+    "sensor_msgs/msg/Imu",
     "std_msgs/msg/String",
     OURS,
 ]
@@ -61,7 +62,7 @@ def numbers(value: object) -> Iterator[float]:
     elif dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             own = getattr(value, field.name)
-            yield from numbers(own[:1] if field.name == "covariance" else own)
+            yield from numbers(own[:1] if field.name.endswith("covariance") else own)
 
 
 @settings(max_examples=8, deadline=None)
@@ -69,7 +70,8 @@ def numbers(value: object) -> Iterator[float]:
 def test_messages_are_rosbags_messages_to_the_byte(
     store: Typestore, data: st.DataObject, names: Names, frames: tuple[str, ...]
 ):
-    for topic in (*topics(names, frames[0], timed=True), transforms(frames, frames[::-1])):
+    every = *topics(names, frames[0], timed=True), imu(frames[0]), transforms(frames, frames[::-1])
+    for topic in every:
         values = data.draw(arrays(np.float64, (3, sum(topic.parts.values()))))
         stamps = data.draw(st.lists(st.integers(0, 2**31 * 10**9 - 1), min_size=3, max_size=3))
         payloads = topic.template.encode(np.array(stamps), values)
@@ -84,6 +86,8 @@ def test_messages_are_rosbags_messages_to_the_byte(
                 assert [t.header.frame_id for t in message.transforms] == list(frames[::-1])
             elif topic.name == "/odom":
                 assert (header.frame_id, message.child_frame_id) == ("world", frames[0])
+            elif topic.name == "/imu":
+                assert header.frame_id == frames[0]
             elif hasattr(message, "name"):
                 assert names_in(payload) == tuple(message.name)
         read_stamps, read_values = topic.template.decode(payloads)

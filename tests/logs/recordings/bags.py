@@ -197,14 +197,22 @@ def odometry(
 
 
 def imu(
-    stamp: int, wxyz: Sequence[float], angular: Sequence[float], *, known: bool = True
+    stamp: int,
+    wxyz: Sequence[float],
+    angular: Sequence[float],
+    linear: Sequence[float] | None = None,
+    *,
+    known: bool = True,
 ) -> object:
+    """An Imu, whose orientation and linear acceleration may be unknown."""
     return made(
         "sensor_msgs/msg/Imu",
         header=header(stamp),
         orientation=vector(wxyz, "wxyz"),
         orientation_covariance=[0.0 if known else -1.0, *[0.0] * 8],
         angular_velocity=vector(angular),
+        linear_acceleration=vector(linear or (0, 0, 0)),
+        linear_acceleration_covariance=[0.0 if linear else -1.0, *[0.0] * 8],
     )
 
 
@@ -261,7 +269,7 @@ def low_state(
         for q, dq, tau in zip(position, velocity, effort, strict=True)
     ]
     motors += [{}] * (MOTORS - len(motors))
-    imu_state = {"quaternion": wxyz, "gyroscope": gyroscope}
+    imu_state = {"quaternion": wxyz, "gyroscope": gyroscope, "accelerometer": (0, 0, 9.5)}
     return made("unitree_go/msg/LowState", imu_state=imu_state, motor_state=motors, foot_force=feet)
 
 

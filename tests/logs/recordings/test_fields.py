@@ -95,6 +95,7 @@ def test_a_bag_of_unitree_is_imported_by_the_suggested_mapping(
     assert signals["sensors"][0].tolist() == [1, 0, 1, 0]
     assert np.allclose(signals["base_orientation"], [np.cos(0.1), np.sin(0.1), 0, 0])
     assert np.allclose(signals["base_angular_velocity"], [0, 0, 0.5])
+    assert np.allclose(recording.acceleration, [0, 0, 9.5])
     assert recording.qualities.keys() == {"/lowstate", "/lowcmd"}
 
 

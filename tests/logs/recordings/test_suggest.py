@@ -165,6 +165,14 @@ def test_a_vector_of_a_command_or_a_foot_is_not_the_base(group: str):
     assert classified(own + base).vectors["base"] == {"position": tuple(base)}
 
 
+@pytest.mark.parametrize("form", ["imu.linear_acceleration.{}", "imu_acc_{}", "accelerometer_{}"])
+def test_an_acceleration_is_of_the_imu_alone(form: str):
+    own = [form.format(axis) for axis in "xyz"]
+    others = [f"{body}_{axis}" for body in ("base_acceleration", "imu_vel") for axis in "xyz"]
+    found = classified(own + others).vectors
+    assert found == {"base": {}, "imu": {"linear_acceleration": tuple(own)}}
+
+
 def test_numbered_columns_are_mapped_in_order_and_marked(biped: Robot, tmp_path: Path):
     names = [f"q{k}" for k in range(4)] + [f"action[{k}]" for k in range(4)]
     found = {"t": np.arange(3.0), **{name: np.zeros(3) for name in names}}
