@@ -106,7 +106,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     Attributes:
         model: Digest of the self-model, ``self_model_digest``.
         comparator: Name of the comparator, for ``comparator_reason``.
-        kinds: Names of the fault kinds that were searched.
+        kinds: Names of the fault kinds that were asked for.
         summary: What is wrong, since when, how sure that is, and what to do.
         files: SHA-256 of each log, by its path.
         logs: Paths of the logs that a diagnosis of logs explains, in order.
@@ -128,6 +128,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     undetectable: list[str]
     test: str
     unsearched: dict[str, Any] | None = None
+    also_searched: tuple[str, ...] = ()
     intact_distance: float | None
     reason: str | None = None
     summary: str = ""

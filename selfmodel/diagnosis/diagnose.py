@@ -126,13 +126,13 @@ class DiagnosticSearch:
             return diagnosis_of(problem, ranked)
         starts = ranked[:REFINEMENT_STARTS]
         diagnosis = self._refined_diagnosis(starts, trials, problem)
-        if diagnosis.unsearched is None or not self._is_extended:
-            return diagnosis
-        named = [one for one in diagnosis.unsearched.named if len(one) <= self._settings.genes]
-        if not named:
-            return diagnosis
-        wider = problem_of(space.including(named))
-        return self._refined_diagnosis([*named, *starts], trials, wider)
+        better = diagnosis.unsearched.named if diagnosis.unsearched and self._is_extended else ()
+        if named := [one for one in better if len(one) <= self._settings.genes]:
+            problem = problem_of(space.including(named))
+            diagnosis = self._refined_diagnosis([*named, *starts], trials, problem)
+        asked = self._space.kinds
+        also = tuple(kind.name for kind in problem.space.kinds if kind not in asked)
+        return replace(diagnosis, also_searched=also)
 
     def _refined_diagnosis(
         self, starts: Sequence[Hypothesis], trials: Sequence[Trial], problem: Problem

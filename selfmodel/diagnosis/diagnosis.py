@@ -188,6 +188,8 @@ class Diagnosis:
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
             trials significantly better; see ``verdict.unsearched_fault``.
+        also_searched: Names of the kinds that were searched beyond those that were asked for,
+            because faults of them predicted the trials better.
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
@@ -210,6 +212,7 @@ class Diagnosis:
     verdict: Verdict
     test: str
     unsearched: UnsearchedFault | None = None
+    also_searched: tuple[str, ...] = ()
     undetectable: tuple[Hypothesis, ...] = ()
     reason: str = ""
     detectable: tuple[DetectableSeverity, ...] = ()

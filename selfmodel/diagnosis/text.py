@@ -137,11 +137,14 @@ def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> s
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:
-    """Returns the verdict, the change and the undetectable faults as sentences."""
+    """Returns the verdict, the change, further kinds and undetectable faults as sentences."""
     sentences = [_verdict(diagnosis)]
     if diagnosis.change is not None:
         change = str(diagnosis.change)
         sentences.append(f"{change[0].upper()}{change[1:]}.")
+    if diagnosis.also_searched:
+        also = ", ".join(diagnosis.also_searched)
+        sentences.append(f"Searched as well, because it was needed: {also}.")
     if diagnosis.undetectable:
         faults = ", ".join(map(str, diagnosis.undetectable_faults))
         sentences.append(f"Undetectable in these trials: {faults}.")
