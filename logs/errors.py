@@ -7,8 +7,8 @@ from os import PathLike
 from selfmodel.errors import WorkError
 
 AGAIN = "make the trial again"
-ANOTHER = "give a trial log, NAME.mcap"
 IMPORT_IT = "a recording of a robot becomes a trial log with `selfmodel logs import`"
+ANOTHER = f"give a trial log, NAME.mcap; {IMPORT_IT}"
 GOOD = "its observations are intact"
 OTHER_VERSION = "read it with the version of selfmodel that wrote it"
 

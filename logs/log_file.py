@@ -23,6 +23,7 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 from mcap.writer import CompressionType, Writer
 
+from selfmodel.errors import InputError
 from selfmodel.files import read_file, sync
 from selfmodel.logs import errors, records
 from selfmodel.logs.errors import LogError
@@ -218,6 +219,10 @@ def read_contents(path: Path, unread: Collection[str] = ()) -> Contents:
 
 def read_undamaged(path: Path, unread: Collection[str] = ()) -> tuple[Contents, LogError | None]:
     """Returns the contents of a file before its first damage, and the error of that damage."""
+    if path.is_dir():
+        is_bag = (path / "metadata.yaml").exists() or any(path.glob("*.db3*"))
+        what = "the folder of a bag of ROS 2" if is_bag else "a folder"
+        raise InputError(f"{path}: expected a log file, got {what}: {errors.ANOTHER}")
     data, contents = read_file(path, "a log file", MAX_BYTES), Contents(path)
     try:
         _gather(data, contents, unread)

@@ -195,8 +195,7 @@ def read_record(contents: Contents) -> records.TrialRecord:
     texts = contents.metadata.get(records.TRIAL)
     known = records.FORMAT, records.TIMED_FORMAT
     if texts is None:
-        advice = f"{errors.ANOTHER}; {errors.IMPORT_IT}"
-        raise contents.error(f"it has no record {records.TRIAL}", advice=advice)
+        raise contents.error(f"it has no record {records.TRIAL}", advice=errors.ANOTHER)
     if texts.get("format") not in known:
         what = f"expected format {' or '.join(known)}, got {texts.get('format')!r}"
         raise errors.UnsupportedError(contents.path, what, advice=errors.OTHER_VERSION)

@@ -105,7 +105,10 @@ def test_damage_is_called_by_its_name(
 def test_a_file_that_is_not_there_is_said_so(tmp_path: Path):
     with pytest.raises(InputError, match=r"nothing\.mcap: expected a log file"):
         read_log(tmp_path / "nothing.mcap")
-    with pytest.raises(InputError, match="Is a directory"):
+    with pytest.raises(InputError, match=r"got a folder: .*NAME\.mcap"):
+        read_log(tmp_path)
+    (tmp_path / "metadata.yaml").touch()
+    with pytest.raises(InputError, match=r"folder of a bag of ROS 2: .*`selfmodel logs import"):
         read_log(tmp_path)
 
 
