@@ -60,7 +60,7 @@ class ImportedTrial:
     @property
     def valid(self) -> dict[str, float]:
         """Fraction of observed values by signal, and of the acceleration of an IMU."""
-        values: dict[str, FloatArray] = {**self.trajectory.signals}
+        values = dict[str, FloatArray](self.trajectory.signals.items())
         if self.acceleration is not None:
             values["imu_linear_acceleration"] = self.acceleration
         return {name: float(np.mean(np.isfinite(each))) for name, each in values.items()}
