@@ -18,12 +18,12 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
-SHORT = ("--steps", "200")
+SHORT = ("--steps", "80")
 LOGS = ("before.mcap", "after.mcap")
 COMMANDS = (
     ("trial", "quadruped", "--out", "before.mcap", "--stage", "before", *SHORT),
     ("trial", "quadruped", "--out", "after.mcap", "--damage", "break:front_left_knee", *SHORT),
-    ("diagnose", *LOGS, "--population", "8", "--generations", "2", "--json"),
+    ("diagnose", *LOGS, "--population", "8", "--generations", "2", "--kinds", "break", "--json"),
     ("report", *LOGS, "--diagnosis", "printed.json", "--out", "report.html"),
 )
 

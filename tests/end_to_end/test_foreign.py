@@ -104,7 +104,7 @@ def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("foreign")
-    return generate(out, Plan("quadruped", "onset-break", 5, "large", duration=8.0, trials=1))
+    return generate(out, Plan("quadruped", "onset-break", 169, "large", duration=3.5, trials=1))
 
 
 def joint_states(bag: Path) -> tuple[list[str], np.ndarray, np.ndarray]:

@@ -1,6 +1,8 @@
-"""The robots in PyBullet: bodies, damage, servos, noise, trials through ``EnvironmentRobot``."""
+"""The robots in PyBullet: bodies, damage, servos, noise, trials, recoveries and recordings."""
 
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,6 +12,9 @@ pytest.importorskip("pybullet", reason="PyBullet is in the dependency group othe
 
 import pybullet
 
+from benchmarks.foreign.cases import Fault, Faults
+from benchmarks.foreign.motion import Motion
+from benchmarks.other_engine import recordings
 from benchmarks.other_engine.bullet import Bullet
 from benchmarks.other_engine.environment import BulletEnvironment, Servos, physical_robot
 from benchmarks.other_engine.reality import (
@@ -19,27 +24,24 @@ from benchmarks.other_engine.reality import (
     draw_reality,
     ideal_reality,
 )
-from selfmodel.controllers.controller import Controller, draw_genomes
+from benchmarks.other_engine.recovery import recovered, table, transfer_lines
 from selfmodel.controllers.playback import Playback
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory, collect
+from tests.helpers.drivers import random_controllers
 
 CASES = [(name, case) for name in ROBOTS for case in range(1, 10, 3)]
-
-
-def random_gait(robot: Robot, seed: int = 1) -> Controller:
-    network = network_for(robot)
-    return Controller(network, draw_genomes(np.random.default_rng(seed), (network.weights,)))
 
 
 def walked(
     robot: Robot, reality: Reality, damage: Damage, steps: int = 60, stream: int = 0
 ) -> Trajectory:
     with BulletEnvironment(robot, reality, damage, stream) as environment:
-        samples = physical_robot(environment, robot).run(random_gait(robot), steps)
+        (gait,) = random_controllers(robot, 1)
+        samples = physical_robot(environment, robot).run(gait, steps)
         return collect(robot.anatomy.names, samples)
 
 
@@ -170,9 +172,8 @@ def test_a_robot_stands_for_a_second_at_the_height_that_it_has_in_mujoco(robot: 
     assert found["time"] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("number", [0])
 def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
-    robot: Robot, number: int, bullet: Callable[..., Bullet]
+    robot: Robot, bullet: Callable[..., Bullet]
 ):
     body, hinges = bullet(robot), robot.anatomy.hinges
     model = robot.specification().compile()
@@ -183,14 +184,14 @@ def test_a_servo_in_the_air_follows_a_target_as_it_does_in_mujoco(
     pybullet.setGravity(0, 0, 0, physicsClientId=body.client)
     body.place(data.qpos[:3], data.qpos[3:7], np.zeros(len(hinges)))
     driven = [model.joint(joint).name for joint in model.actuator_trnid[:, 0]]
-    motor, found, expected = driven.index(hinges[number]), [], []
+    motor, found, expected = driven.index(hinges[0]), [], []
     for substep in range(500):
         targets = np.zeros(model.nu)
         targets[motor] = 0.4 * np.sin(4 * np.pi * 0.001 * substep)
         if substep % 5 == 0:
             data.ctrl[:] = targets
-            found.append(body.hinges()[0][number])
-            expected.append(data.joint(hinges[number]).qpos[0])
+            found.append(body.hinges()[0][0])
+            expected.append(data.joint(hinges[0]).qpos[0])
             mujoco.mj_step(model, data)
         body.step(servos.step(targets, *body.hinges()))
 
@@ -235,3 +236,83 @@ def test_equal_seeds_walk_alike_to_the_bit_and_other_seeds_do_not(robot: Robot):
 
     np.testing.assert_array_equal(first, second)
     assert not np.array_equal(first, other)
+
+
+BANK = Path(__file__).parents[2] / "benchmarks" / "bank"
+
+
+@pytest.mark.search
+def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
+    settings = Settings(steps=60, trials=1, generations=1).scaled(4)
+
+    row = recovered("quadruped", 1, 0, tmp_path / "run", settings=settings, threads=1)
+
+    row = json.loads(json.dumps(row))
+    assert row["truth"] == "break:front_left_knee"
+    assert [trial["stage"] for trial in row["trials"]] == ["before", "after", "recovery"]
+    assert row["reality"]["masses"] == list(draw_reality(ROBOTS["quadruped"].robot(), 0).masses)
+    simulated = [trial["simulated"] for trial in row["trials"]]
+    assert simulated[1] is None
+    assert np.isfinite([simulated[0], simulated[2]]).all()
+    assert row["recovered"] == row["trials"][2]["displacement"]
+
+
+@pytest.mark.search
+def test_gaits_of_both_engines_are_a_table(quadruped: Robot):
+    lines = list(transfer_lines(quadruped, [BANK / "quadruped-2.npz"], [0]))
+
+    name, mujoco_walk, ideal, drawn = lines[2].strip("| ").split(" | ")
+    assert name == "quadruped-2"
+    assert 0.5 * float(mujoco_walk) < min(float(ideal), float(drawn))
+
+
+def row(*, before: float, recovered: float, correct: bool) -> dict[str, object]:
+    trial = {"stage": "recovery", "displacement": recovered, "simulated": 4.0, "upright": True}
+    found = {"robot": "quadruped", "case": 2, "seconds": 1.0, "after": 0.0, "trials": [trial]}
+    return {**found, "before": before, "recovered": recovered, "correct": correct}
+
+
+def test_the_table_counts_an_error_as_a_wrong_diagnosis_and_no_recovery():
+    failed = {"robot": "quadruped", "case": 2, "seconds": 1.0, "error": "the robot stopped"}
+    rows = [
+        row(before=4.0, recovered=2.0, correct=True),
+        row(before=-1.0, recovered=3.0, correct=False),
+        failed,
+    ]
+
+    line = table(rows).splitlines()[2]
+
+    assert "| 3 | 1/3, 33 % (6 to 79) |" in line
+    assert "| 0.25 (0 to 0.5) |" in line  # no ratio to a robot that went backwards
+    assert "| 2/3, 67 %" in line
+
+
+A1 = recordings.a1()
+CALF = "FR_lower_joint"
+HINGE = A1.hinges.index(CALF)
+
+
+def standing(*faults: Fault) -> Motion:
+    stance = np.tile([0.0, 0.9, -1.8], 4)
+    reality = recordings.Reality(masses={}, torques=np.ones(12), friction=0.8, delay=5)
+    return recordings.simulated(A1, reality, faults, lambda *_: stance, 0.1)
+
+
+def test_the_healthy_robot_stands_near_its_stance():
+    motion = standing()
+    assert motion.is_upright()
+    np.testing.assert_allclose(motion.angles[-1], np.tile([0.0, 0.9, -1.8], 4), atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("fault", "angle"),
+    [(Fault("jam", CALF, -1.5), -1.5), (Fault("lost", CALF), np.nan)],
+    ids=["locked", "lost"],
+)
+def test_a_locked_joint_has_its_angle_and_a_lost_one_none(fault: Fault, angle: float):
+    np.testing.assert_array_equal(standing(fault).angles[:, HINGE], angle)
+
+
+def test_a_weak_motor_yields_to_the_load():
+    weak: Faults = (Fault("motor", CALF, 0.4),)
+    assert standing(*weak).angles[-1, HINGE] < standing().angles[-1, HINGE] - 0.02

@@ -9,7 +9,6 @@ import pytest
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.faults.world import PAYLOAD
 from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import nominal, with_parameters
@@ -105,16 +104,3 @@ def test_a_load_is_a_mass_in_kg_at_the_centre_of_a_link_of_an_arm():
     assert_same_paths(moved, follow(robot, spec.compile(), STEPS))
     bare = follow(robot, built(robot, "intact"), STEPS)
     assert np.abs(moved["joint2"] - bare["joint2"]).max() > 1e-3
-
-
-def test_a_robot_with_a_fixed_base_has_no_payload():
-    robot = Robot(
-        "arm",
-        """<mujoco><worldbody><body name="stand"><geom size="0.1"/><body name="arm">
-          <joint name="elbow" axis="0 1 0" range="-60 60"/>
-          <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/></body></body></worldbody>
-        <actuator><position name="elbow" joint="elbow" ctrlrange="-1 1"/></actuator></mujoco>""",
-        0.02,
-    )
-
-    assert PAYLOAD.parts(robot.anatomy) == ()

@@ -325,7 +325,12 @@ def test_a_signal_ends_a_trial_whose_driver_hangs_before_the_watchdog_does(
     bench: Hanging, tmp_path: Path
 ):
     main = threading.main_thread().ident
-    bench.hanging = lambda: signal.pthread_kill(main, signal.SIGTERM)
+
+    def signal_a_waiting_thread() -> None:
+        time.sleep(0.05)  # a wait that is about to begin is not interrupted
+        signal.pthread_kill(main, signal.SIGTERM)
+
+    bench.hanging = signal_a_waiting_thread
     stop = bench.stop
 
     def stop_and_let_go() -> None:

@@ -1,4 +1,4 @@
-"""Tests of the walking task: the checks of dm_control's own suite, with every kind of damage."""
+"""Tests of the walking task and its robots: the checks of dm_control's suite, with damage."""
 
 from collections.abc import Iterator
 
@@ -10,13 +10,17 @@ from dm_control.viewer import runtime
 from dm_env import specs
 
 from selfmodel import tasks
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.model_variant import ModelVariant
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 
 FASTEST = 50.0
@@ -155,3 +159,47 @@ def test_the_viewers_runtime_runs_episodes():
     viewed.single_step()
     assert viewed.state is runtime.State.RUNNING
     assert errors == []
+
+
+STANDING_DRIFT = 0.05
+"""Maximum drift of a standing robot in one run, m."""
+
+
+def test_its_parts_are_named_for_their_limbs(robot: Robot):
+    legs = {
+        joint.name.removesuffix("_knee") for joint in robot.anatomy.joints if "knee" in joint.name
+    }
+
+    assert len(legs) == {"quadruped": 4, "hexapod": 6}[robot.name]
+    proximal = {"quadruped": "shoulder", "hexapod": "hip"}[robot.name]
+    assert {joint.name for joint in robot.anatomy.joints} == {
+        f"{leg}_{part}" for leg in legs for part in (proximal, "knee")
+    }
+    assert {sensor.name for sensor in robot.anatomy.sensors} == {
+        f"{leg}_{kind}" for leg in legs for kind in ("touch", "angle")
+    }
+
+
+def test_its_joints_flex_and_extend_thirty_degrees(robot: Robot):
+    for joint in robot.anatomy.joints:
+        np.testing.assert_allclose(joint.limits, [[-np.pi / 6, np.pi / 6]] * len(joint.limits))
+
+
+def test_told_to_stand_it_stands(robot: Robot):
+    still = Controller(network_for(robot), np.zeros(network_for(robot).weights))
+    path = Simulator(robot, 1).run(
+        [(parse("intact", robot.anatomy), still)], 1000, ["base_position"]
+    )
+    position = path.trajectory["base_position"][0]
+    drift = np.linalg.norm(position[:, :2] - position[0, :2], axis=1)
+
+    assert not path.diverged.any()
+    assert drift.max() < STANDING_DRIFT
+    assert position[:, 2].min() > 0.8 * robot.standing_height
+
+
+def test_an_unknown_robot_or_task_names_the_nearest():
+    with pytest.raises(InputError, match="unknown robot 'quadrupd': did you mean quadruped"):
+        tasks.load("quadrupd", "walk")
+    with pytest.raises(InputError, match="unknown task of hexapod 'wlk': did you mean walk"):
+        tasks.load("hexapod", "wlk")
