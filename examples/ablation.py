@@ -21,7 +21,7 @@ def main(folder: Path) -> None:
         comparators=["forward-displacement"],  # or your own, as package.module:object
         gaps=[0.0],
         seeds=range(2),
-        settings=Settings(steps=100, generations=2, trials=2).scaled(10),
+        settings=Settings(steps=60, generations=2, trials=1).scaled(8),
     )
     failed = study.run(workers=2, on_progress=print)
     rows = study_rows("ablate", folder)

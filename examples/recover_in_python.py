@@ -18,7 +18,7 @@ def main(folder: str) -> None:
         robot=robot,
         folder=folder,
         comparator="forward-displacement",  # or your own object
-        settings=selfmodel.Settings(steps=100, trials=2, generations=3).scaled(10),
+        settings=selfmodel.Settings(steps=80, trials=1, generations=2).scaled(8),
         calibrate=False,
         on_event=print,
     )

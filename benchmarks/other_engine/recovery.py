@@ -28,6 +28,7 @@ from selfmodel.trials.trajectory import collect, forward_displacement
 from selfmodel.version import __version__
 
 Row = dict[str, Any]
+PAPER = Settings()
 
 
 def recovered(
@@ -117,22 +118,24 @@ def _in_mujoco(
     return None if result.diverged[0] else float(forward_displacement(result.trajectory)[0])
 
 
-def transfer_lines(robot: Robot, gaits: Sequence[Path], seeds: Sequence[int]) -> Iterator[str]:
-    """Yields a Markdown table, line by line: a row per gait, m in a trial of the paper's length."""
+def transfer_lines(
+    robot: Robot, gaits: Sequence[Path], seeds: Sequence[int], steps: int = PAPER.steps
+) -> Iterator[str]:
+    """Yields a Markdown table, line by line: a row per gait, m in a trial of some steps."""
     realities = [ideal_reality(robot), *(draw_reality(robot, seed) for seed in seeds)]
     names = ["gait", "MuJoCo", "PyBullet, ideal", *(f"PyBullet, robot {seed}" for seed in seeds)]
     yield f"| {' | '.join(names)} |"
     yield "|---" * len(names) + "|"
     for path in gaits:
         gait = load_controller(path)
-        found = [_in_mujoco(Simulator(robot, threads=1), INTACT, gait, Settings().steps) or 0.0]
-        found += [_in_bullet(robot, gait, reality) for reality in realities]
+        found = [_in_mujoco(Simulator(robot, threads=1), INTACT, gait, steps) or 0.0]
+        found += [_in_bullet(robot, gait, reality, steps) for reality in realities]
         yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
 
 
-def _in_bullet(robot: Robot, gait: Controller, reality: Reality) -> float:
+def _in_bullet(robot: Robot, gait: Controller, reality: Reality, steps: int) -> float:
     with BulletEnvironment(robot, reality) as environment:
-        samples = physical_robot(environment, robot).run(gait, Settings().steps)
+        samples = physical_robot(environment, robot).run(gait, steps)
         return float(forward_displacement(collect(robot.anatomy.names, samples)))
 
 

@@ -5,16 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from selfmodel.arguments import load_robot
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs.repertoires import save_repertoire
-from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
-from selfmodel.robot.designs import network_for
-from selfmodel.simulation.simulator import Simulator
+from selfmodel.robot.robot import Robot
 from tests.helpers.command import SMALL, refused, selfmodel
-
-STEPS = 60
-"""Of the trials of a repertoire."""
+from tests.helpers.drivers import random_repertoire
 
 
 @pytest.mark.parametrize(
@@ -105,21 +99,16 @@ HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
 
 
 @pytest.fixture(scope="module")
-def gaits(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def gaits(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     """A small repertoire of the quadruped."""
-    robot = load_robot("quadruped")
-    evaluate = simulated_evaluation(Simulator(robot, 1), INTACT, STEPS)
-    found = make_repertoire(
-        robot, network_for(robot), evaluate, steps=STEPS, seed=0, evaluations=60, levels=3
-    )
     path = tmp_path_factory.mktemp("repertoire") / "gaits.npz"
-    save_repertoire(path, found)
+    save_repertoire(path, random_repertoire(quadruped))
     return path
 
 
 def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
     run = (
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", str(STEPS), "--trials", "1"),
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
         *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate", "--json"),
     )
     found = [

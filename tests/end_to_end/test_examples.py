@@ -31,7 +31,7 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
 
     assert "(the truth: break:back_left_shoulder)" in told
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 4
+    assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 3
     assert not is_calibrated(tmp_path / "run"), "a report of the run must not calibrate"
 
 
@@ -92,6 +92,6 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     first = run("ablation.py", "folder", cwd=tmp_path)
     again = run("ablation.py", "folder", cwd=tmp_path)
 
-    assert "8 rows, 0 failed: folder/results.csv" in first
+    assert "4 rows, 0 failed: folder/results.csv" in first
     assert "GridBegins(total=11, finished=11)" in again
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40

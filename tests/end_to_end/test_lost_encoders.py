@@ -42,13 +42,14 @@ def diagnosis(
     trial: Trial,
     robot: Robot,
     comparator: str = "segment-prediction",
+    kinds: str = "paper",
 ) -> Diagnosis:
     return selfmodel.diagnose(
         trial,
         robot=robot,
         settings=SETTINGS,
         comparator=comparator,
-        kinds="paper",
+        kinds=kinds,
         seed=0,
         threads=1,
     )
@@ -76,6 +77,6 @@ def test_every_comparator_of_joints_judges_a_trial_without_an_encoder(
     comparator: str, quadruped: Robot
 ):
     trial = lost(quadruped, "break:front_left_knee", ("front_left_knee",), slice(None), 120)
-    found = diagnosis(trial, quadruped, comparator)
+    found = diagnosis(trial, quadruped, comparator, "break")
     assert np.isfinite(found.ranked[0].distance)
     assert found.ranked[0].distance < found.intact_distance

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -12,6 +13,7 @@ pytest.importorskip("pybullet", reason="PyBullet is in the dependency group othe
 
 import pybullet
 
+import selfmodel
 from benchmarks.foreign.cases import Fault, Faults
 from benchmarks.foreign.motion import Motion
 from benchmarks.other_engine import recordings
@@ -242,7 +244,9 @@ BANK = Path(__file__).parents[2] / "benchmarks" / "bank"
 
 
 @pytest.mark.search
-def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
+def test_a_recovery_is_a_row_of_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    small = partial(selfmodel.recover, kinds="break", repair="paper")
+    monkeypatch.setattr(selfmodel, "recover", small)
     settings = Settings(steps=60, trials=1, generations=1).scaled(4)
 
     row = recovered("quadruped", 1, 0, tmp_path / "run", settings=settings, threads=1)
@@ -259,7 +263,7 @@ def test_a_recovery_is_a_row_of_the_table(tmp_path: Path):
 
 @pytest.mark.search
 def test_gaits_of_both_engines_are_a_table(quadruped: Robot):
-    lines = list(transfer_lines(quadruped, [BANK / "quadruped-2.npz"], [0]))
+    lines = list(transfer_lines(quadruped, [BANK / "quadruped-2.npz"], [0], steps=250))
 
     name, mujoco_walk, ideal, drawn = lines[2].strip("| ").split(" | ")
     assert name == "quadruped-2"

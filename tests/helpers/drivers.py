@@ -1,8 +1,9 @@
-"""Random controllers and commands for the tests of any robot."""
+"""Random controllers, repertoires and commands for the tests of any robot."""
 
 import numpy as np
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 
@@ -21,6 +22,14 @@ def random_of(design: Design, count: int, seed: int = 0) -> list[Controller]:
     """Returns controllers of a design with random genomes."""
     genomes = draw_genomes(np.random.default_rng(seed), (count, design.weights))
     return [Controller(design, genome) for genome in genomes]
+
+
+def random_repertoire(robot: Robot, gaits: int = 7) -> Repertoire:
+    """Returns networks with random weights, scores and duty factors of four feet."""
+    rng, design = np.random.default_rng(0), network_for(robot)
+    genomes = draw_genomes(rng, (gaits, design.weights))
+    origin = Origin(robot.name, model_digest(robot), 60, 100, 20, 3, "0.1.0")
+    return Repertoire(design, genomes, rng.random(gaits), rng.random((gaits, 4)), origin)
 
 
 def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:

@@ -16,23 +16,15 @@ from selfmodel.logs.repertoires import (
     repertoire_bytes,
     save_repertoire,
 )
-from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
-from selfmodel.robot.designs import network_for
+from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.robot import Robot
 from tests.helpers.damage import damaged
-from tests.helpers.drivers import random_controllers
+from tests.helpers.drivers import random_repertoire
 
 
 @pytest.fixture(scope="module")
 def repertoire(quadruped: Robot) -> Repertoire:
-    rng = np.random.default_rng(0)
-    return Repertoire(
-        network_for(quadruped),
-        np.array([one.genome for one in random_controllers(quadruped, 7)]),
-        rng.random(7),
-        rng.random((7, 4)),
-        Origin("quadruped", model_digest(quadruped), 60, 100, 20, 3, "0.1.0"),
-    )
+    return random_repertoire(quadruped)
 
 
 def test_a_repertoire_is_read_as_it_was_written(

@@ -26,7 +26,6 @@ from selfmodel.recovery.repair import (
     robust,
     rollouts_of,
 )
-from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import DESIGNS, network_for
@@ -35,9 +34,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import forward_displacement
-from tests.helpers.drivers import random_controllers, random_cpgs
+from tests.helpers.drivers import random_controllers, random_cpgs, random_repertoire
 from tests.helpers.hostile import unstable
-from tests.recovery.test_repertoire import ORIGIN
 
 NOISY_EA = partial(Evolution, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
@@ -276,14 +274,8 @@ def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadrupe
 GAITS = Settings().scaled(40)
 
 
-def repertoire(robot: Robot, gaits: int) -> Repertoire:
-    design = network_for(robot)
-    genomes = np.round(draw_genomes(np.random.default_rng(5), (gaits, design.weights)), 2)
-    return Repertoire(design, genomes, np.arange(gaits, dtype=float), np.zeros((gaits, 4)), ORIGIN)
-
-
 def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped: Robot):
-    found, known = repertoire(quadruped, 1000), np.full(68, 0.3)
+    found, known = random_repertoire(quadruped, 1000), np.full(68, 0.3)
     make = from_repertoire(found)
     asked = make(68, draw_genomes, GAITS, np.random.default_rng(0), [known]).ask()
     other = make(68, draw_genomes, GAITS, np.random.default_rng(1), [known]).ask()
@@ -295,7 +287,7 @@ def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped
     assert set(drawn) <= {own.tobytes() for own in found.genomes}
     assert len(set(drawn)) == len(drawn)
     assert not np.array_equal(asked, other)
-    few = repertoire(quadruped, 2)
+    few = random_repertoire(quadruped, 2)
     assert len(from_repertoire(few)(68, draw_genomes, GAITS, np.random.default_rng(0)).ask()) == 4
     cheap = make(68, draw_genomes, short, np.random.default_rng(0)).ask()
     assert len(cheap) == round(GAITS.evaluations / 8)
