@@ -1,4 +1,4 @@
-"""Promises about steps that were late or lost: nothing is predicted or averaged across one."""
+"""Promises about what a log lacks: steps that were late or lost, and encoders of lost limbs."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -8,6 +8,7 @@ import dm_env
 import numpy as np
 import pytest
 
+import selfmodel
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
@@ -20,15 +21,18 @@ from selfmodel.logs import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.estimation import estimated_states
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.drivers import random_motion
+from tests.helpers.drivers import random_controllers, random_motion
+from tests.helpers.memory import in_memory
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 NAMES = QUADRUPED.anatomy.names
@@ -167,3 +171,54 @@ def test_a_trial_of_nothing_but_late_steps_is_refused(trial: Trial):
     late = replace(trial, trajectory=replace(trial.trajectory, late=np.ones(STEPS, dtype=bool)))
     with pytest.raises(InputError, match="needs 4 or more segments of 12 steps in which none was"):
         SEGMENT_PREDICTION.prepare(late)
+
+
+def lost(
+    robot: Robot, truth: str, hinges: tuple[str, ...], steps: slice, length: int = 500
+) -> Trial:
+    """A trial of a robot in which the encoders of some hinges measure nothing at some steps."""
+    physical = selfmodel.simulated_robot(robot, truth, gap=0.05, seed=3)
+    gait = random_controllers(robot, 1, seed=5)[0]
+    trial = in_memory(robot)(physical, TrialPlan("after", "after", gait, length, seed=0))
+    signals = {signal: trial.trajectory[signal].copy() for signal in SIGNALS}
+    columns = [robot.anatomy.hinges.index(hinge) for hinge in hinges]
+    for signal in ("joint_positions", "joint_velocities", "joint_efforts"):
+        signals[signal][steps, columns] = np.nan
+    for column, sensor in enumerate(robot.anatomy.sensors):
+        if sensor.kind == "angle" and sensor.hinge in hinges:
+            signals["sensors"][steps, column] = np.nan
+    return replace(trial, trajectory=replace(trial.trajectory, signals=signals))
+
+
+def diagnosis(trial: Trial, robot: Robot, comparator: str, kinds: str) -> selfmodel.Diagnosis:
+    small = selfmodel.Settings(generations=2).scaled(8)
+    options = {"settings": small, "comparator": comparator, "kinds": kinds}
+    return selfmodel.diagnose(trial, robot=robot, seed=0, threads=1, **options)
+
+
+@pytest.mark.search
+@pytest.mark.parametrize(
+    ("truth", "hinges", "first"),
+    [
+        ("break:front_left_shoulder", ("front_left_shoulder", "front_left_knee"), 0),
+        ("jam:back_right_shoulder", ("front_left_knee",), 200),
+    ],
+)
+def test_a_fault_is_found_without_the_encoders_of_a_limb(
+    truth: str, hinges: tuple[str, ...], first: int, quadruped: Robot
+):
+    trial = lost(quadruped, truth, hinges, slice(first, None))
+    assert str(diagnosis(trial, quadruped, "segment-prediction", "paper").best) == truth
+
+
+@pytest.mark.search
+@pytest.mark.parametrize(
+    "comparator", ["segment-prediction-onboard", "gait-pattern", "noisy-transfer"]
+)
+def test_every_comparator_of_joints_judges_a_trial_without_an_encoder(
+    comparator: str, quadruped: Robot
+):
+    trial = lost(quadruped, "break:front_left_knee", ("front_left_knee",), slice(None), 120)
+    found = diagnosis(trial, quadruped, comparator, "break")
+    assert np.isfinite(found.ranked[0].distance)
+    assert found.ranked[0].distance < found.intact_distance

@@ -4,8 +4,10 @@ Whatever is promised of our own robots holds for a body that slides instead of f
 motors pull tendons or lag behind their commands, and whose hinges bend to one side only.
 """
 
+import importlib
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -20,6 +22,8 @@ from selfmodel.logs.viewers import Kinematics, body_names
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.recovery.falls import first_falls
+from selfmodel.robot.mjcf.load import load_mjcf
+from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
@@ -32,6 +36,8 @@ from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.drivers import random_controllers
+from tests.helpers.exactness import exactness
 from tests.helpers.hostile import lacking
 from tests.helpers.robots.bodies import BODIES, EVERY_BODY, swinging, swung
 from tests.logs.conftest import plan_of
@@ -192,3 +198,45 @@ def test_nobody_has_fallen_at_the_start_and_a_swimmer_never_does(body: Robot):
     assert first_falls(run, UP, body.standing_height) > 0
     if body.name == "swimmer":
         assert first_falls(run, UP, body.standing_height) == STEPS
+
+
+def exported(
+    folder: Path, name: str, monkeypatch: pytest.MonkeyPatch, *, upright: bool = False
+) -> Robot:
+    """Returns the robot of a walker of dm_control.locomotion."""
+    monkeypatch.setenv("MUJOCO_GL", "disable")  # without an OpenGL library
+    walkers = importlib.import_module("dm_control.locomotion.walkers")
+    mjcf = importlib.import_module("dm_control.mjcf")
+    walker = getattr(walkers, name)()
+    if upright:
+        walker.root_body.quat = walker.upright_pose.xquat
+    mjcf.export_with_assets(walker.mjcf_model, str(folder), "walker.xml")
+    return load_mjcf(folder / "walker.xml", MjcfSettings(base="free"))
+
+
+@pytest.mark.bodies
+@pytest.mark.parametrize("name", ["Ant", "CMUHumanoidPositionControlledV2020"])
+def test_a_freed_walker_is_a_robot_whose_predictions_are_exact(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    robot = exported(tmp_path, name, monkeypatch)
+    (driver,) = random_controllers(robot, 1)
+
+    found = exactness(robot, INTACT, driver, steps=40)
+
+    assert not robot.has_fixed_base
+    assert robot.model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    assert (found.prediction, found.displacement) == (0, 0)
+
+
+@pytest.mark.bodies
+def test_a_humanoid_in_the_upright_pose_of_its_walker_stands_on_its_legs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    name = "CMUHumanoidPositionControlledV2020"
+    robot = exported(tmp_path, name, monkeypatch, upright=True)
+    data = mujoco.MjData(robot.model)
+    mujoco.mj_kinematics(robot.model, data)
+
+    assert data.body("head").xpos[2] > data.body("root").xpos[2] + 0.3
+    assert data.body("lfoot").xpos[2] < data.body("root").xpos[2] - 0.5
