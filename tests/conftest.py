@@ -1,7 +1,9 @@
 """Fixtures of all tests, and the choice between the fast tier and everything."""
 
+import dataclasses
 import os
 import signal
+from collections.abc import Iterator
 
 # dm_control looks for a display as it is imported; nothing here is drawn.
 os.environ["MUJOCO_GL"] = "disable"
@@ -14,6 +16,7 @@ from hypothesis import settings
 from selfmodel.isolation import run_isolated
 from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import fit
 from selfmodel.tasks import ROBOTS
 from tests.helpers.in_process import in_this_process
 
@@ -32,6 +35,16 @@ load.run_isolated = in_this_process
 def isolated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Opens models in a child process, as for users: for what may crash or fill the memory."""
     monkeypatch.setattr(load, "run_isolated", run_isolated)
+
+
+@pytest.fixture(scope="module")
+def coarse_calibration() -> Iterator[None]:
+    """Calibrates with fewer candidates and iterations, for promises that need some fitted model."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "FLOATING", dataclasses.replace(fit.FLOATING, iterations=1))
+        patch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
+        patch.setattr(fit, "CANDIDATE_DAMPINGS", (1.0,))
+        yield
 
 
 def pytest_configure(config: pytest.Config) -> None:

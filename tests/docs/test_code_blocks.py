@@ -71,6 +71,7 @@ def runnable() -> list[object]:
     return [pytest.param(page, marks=marks[page], id=name_of(page)) for page in pages]
 
 
+@pytest.mark.usefixtures("coarse_calibration")
 @pytest.mark.parametrize("page", runnable())
 def test_code_of_a_page_runs_in_order(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)

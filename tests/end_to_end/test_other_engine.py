@@ -244,6 +244,7 @@ BANK = Path(__file__).parents[2] / "benchmarks" / "bank"
 
 
 @pytest.mark.search
+@pytest.mark.usefixtures("coarse_calibration")
 def test_a_recovery_is_a_row_of_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     small = partial(selfmodel.recover, kinds="break", repair="paper")
     monkeypatch.setattr(selfmodel, "recover", small)

@@ -47,7 +47,7 @@ SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 
 
 @pytest.mark.process
-@pytest.mark.xdist_group("readme")
+@pytest.mark.usefixtures("coarse_calibration")
 @pytest.mark.parametrize("step", [one for one in steps() if not is_in_ci(one)], ids=name_of)
 def test_a_reader_can_run(step: str | Block, folder: Path, monkeypatch: pytest.MonkeyPatch):
     if isinstance(step, str):

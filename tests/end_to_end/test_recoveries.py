@@ -56,6 +56,7 @@ def test_a_table_of_several_repairs_has_lines_of_each():
 
 
 @pytest.mark.search
+@pytest.mark.usefixtures("coarse_calibration")
 def test_recoveries_of_a_study_are_those_of_recover_and_share_a_gait(tmp_path: Path):
     study = suite(
         tmp_path,

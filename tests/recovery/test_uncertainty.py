@@ -31,7 +31,7 @@ from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import lacking
 
-pytestmark = pytest.mark.search
+pytestmark = [pytest.mark.search, pytest.mark.usefixtures("coarse_calibration")]
 
 
 def healthy_trial(robot: Robot, gap: float, folder: Path, steps: int = 600) -> Trial:
