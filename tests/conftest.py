@@ -1,6 +1,5 @@
 """Fixtures of all tests, and the choice between the fast tier and everything."""
 
-import dataclasses
 import os
 import signal
 from collections.abc import Iterator
@@ -16,8 +15,8 @@ from hypothesis import settings
 from selfmodel.isolation import run_isolated
 from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation import fit
 from selfmodel.tasks import ROBOTS
+from tests.helpers.calibration import coarse
 from tests.helpers.in_process import in_this_process
 
 settings.register_profile("full", deadline=None)  # a busy machine is no bug
@@ -39,11 +38,8 @@ def isolated(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def coarse_calibration() -> Iterator[None]:
-    """Calibrates with fewer candidates and iterations, for promises that need some fitted model."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit, "FLOATING", dataclasses.replace(fit.FLOATING, iterations=1))
-        patch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
-        patch.setattr(fit, "CANDIDATE_DAMPINGS", (1.0,))
+    """Calibrates coarsely in all tests of a file from this one on."""
+    with coarse():
         yield
 
 

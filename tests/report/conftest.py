@@ -7,6 +7,7 @@ import pytest
 from selfmodel.report.content import shots_of
 from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject, subject_of_run
+from tests.helpers.calibration import coarse
 from tests.helpers.command import selfmodel
 
 RECOVER = (
@@ -20,14 +21,16 @@ RECOVER = (
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a small recovery."""
     folder = tmp_path_factory.mktemp("report")
-    done = selfmodel(*RECOVER, cwd=folder)
+    with coarse():
+        done = selfmodel(*RECOVER, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder / "run"
 
 
 @pytest.fixture(scope="session")
 def subject(run: Path) -> Subject:
-    return subject_of_run(run, threads=1)
+    with coarse():
+        return subject_of_run(run, threads=1)
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,8 @@ from selfmodel.logs.results import DiagnosisResult, as_json, result_bytes
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.report.subject import DiagnosisFile, Subject, is_run, subject_of_logs, subject_of_run
 
+pytestmark = pytest.mark.usefixtures("coarse_calibration")
+
 
 def test_a_run_has_its_result_trials_and_diagnoses_with_the_losses_of_the_run(
     run: Path, subject: Subject
