@@ -18,7 +18,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.helpers.command import SMALL, refused, selfmodel
+from tests.helpers.command import refused, selfmodel
 from tests.helpers.drivers import random_motion
 
 STEPS = 150
@@ -89,29 +89,6 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     diagnose = ("diagnose", "after.mcap", "--comparator", "forward-displacement", "--json")
     diagnosed = selfmodel(*diagnose, "--robot", "fit.xml", cwd=folder)
     assert diagnosed.returncode == 0, diagnosed.stderr
-
-
-@pytest.mark.search
-def test_a_trial_from_before_the_failure_is_fitted_to_and_not_explained(tmp_path: Path):
-    healthy = selfmodel(
-        *("trial", "quadruped", "--steps", "150", "--stage", "before", "--out", "healthy.mcap"),
-        cwd=tmp_path,
-    )
-    failed = selfmodel(
-        *("trial", "quadruped", "--controller", "healthy.mcap", "--out", "failed.mcap"),
-        *("--damage", "break:front_left_knee", "--steps", "150"),
-        cwd=tmp_path,
-    )
-    done = selfmodel(
-        *("diagnose", "healthy.mcap", "failed.mcap", "--json", *SMALL, "--kinds", "break"),
-        *("--comparator", "forward-displacement"),
-        cwd=tmp_path,
-    )
-
-    assert [healthy.returncode, failed.returncode, done.returncode] == [0, 0, 0], done.stderr
-    found = json.loads(done.stdout)
-    assert (found["intact"], found["logs"]) == (["healthy.mcap"], ["failed.mcap"])
-    assert found["calibration"] is not None
 
 
 def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):

@@ -16,17 +16,8 @@ FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--out", "r
 def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a robot was recovered with oscillators, and what it said."""
     folder = tmp_path_factory.mktemp("rhythmic")
-    done = selfmodel(
-        "recover",
-        "quadruped",
-        "--case",
-        "3",
-        "--controller",
-        "cpg",
-        "--no-calibrate",
-        *FEW,
-        cwd=folder,
-    )
+    asked = ("--case", "3", "--controller", "cpg", "--no-calibrate")
+    done = selfmodel("recover", "quadruped", *asked, *FEW, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
 

@@ -7,6 +7,7 @@ the output of version 0.1.
 import json
 import os
 import shutil
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -40,8 +41,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
+@cache
 def printed(*command: str, exit_code: int = 0) -> dict:
-    """Runs a command in this process and returns the JSON that it printed."""
+    """Runs a command in this process, once, and returns the JSON that it printed."""
     done = CliRunner().invoke(app, list(command), env={**os.environ})
     assert done.exit_code == exit_code, (done.output, done.exception)
     return json.loads(done.stdout)
@@ -150,7 +152,7 @@ def test_the_logs_of_a_run_give_the_diagnosis_that_the_run_found(
     result = json.loads(Path("cpg/result.json").read_text(encoding="utf-8"))
     logs = [trial["log"] for trial in result["trials"]]
 
-    found = printed("diagnose", *logs, "--kinds", "paper", "--threads", "1", "--json")
+    found = printed("diagnose", *logs, "--threads", "1", "--json", "--kinds", "paper", exit_code=0)
 
     assert found["diagnosis"][0] == facts(result["diagnosis"][0])
     for old, key in (("verdict", "verdict"), *OLD_KEYS.items()):

@@ -1,8 +1,6 @@
 """Repertoire files: what is written is read, and nothing else is."""
 
 import io
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -75,20 +73,3 @@ def test_damaged_bytes_are_an_error_with_the_remedy_or_change_nothing(
         assert repertoire_bytes(found) == whole
     assert sentence.startswith("here: expected a repertoire")
     assert "repertoire make`" in sentence
-
-
-def test_a_repertoire_is_read_without_mujoco_and_pyribs(repertoire: Repertoire, tmp_path: Path):
-    save_repertoire(tmp_path / "gaits.npz", repertoire)
-    code = (
-        "import sys; sys.modules['mujoco'] = sys.modules['ribs'] = None\n"
-        "from pathlib import Path; from selfmodel.logs.repertoires import load_repertoire\n"
-        "print(len(load_repertoire(Path(sys.argv[1]))))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, tmp_path / "gaits.npz"],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-
-    assert done.stdout == "7\n"
