@@ -15,5 +15,5 @@ def coarse() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fit, "FLOATING", replace(fit.FLOATING, iterations=1))
         patch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
-        patch.setattr(fit, "CANDIDATE_DAMPINGS", (1.0,))
+        patch.setattr(fit, "CANDIDATE_DAMPINGS", (0.5, 1.0))
         yield
