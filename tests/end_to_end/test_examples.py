@@ -3,8 +3,11 @@
 import importlib.util
 import json
 import re
+import runpy
 import subprocess
 import sys
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +18,18 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.logs.journal import is_calibrated
 from selfmodel.studies.statistics import Interval
 from selfmodel.testing import check_comparator
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, as_started_in, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def run(name: str, *arguments: str, cwd: Path) -> str:
-    """Runs an example in a folder and returns what it printed."""
-    command = [sys.executable, EXAMPLES / name, *arguments]
-    return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True).stdout
+    """Runs an example in a folder, as ``python NAME``, and returns what it printed."""
+    path = {"PYTHONPATH": str(EXAMPLES)}
+    with as_started_in(cwd, [name, *arguments], path), redirect_stdout(StringIO()) as told:
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+    return told.getvalue()
 
 
 @pytest.mark.process
@@ -92,7 +97,8 @@ def test_plugins_of_ones_own_are_checked_in_python(tmp_path: Path):
 
 @pytest.mark.process
 def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
-    first = run("ablation.py", "folder", cwd=tmp_path)
+    command = [sys.executable, EXAMPLES / "ablation.py", "folder"]
+    first = subprocess.check_output(command, cwd=tmp_path, text=True)
     again = run("ablation.py", "folder", cwd=tmp_path)
 
     assert "4 rows, 0 failed: folder/results.csv" in first

@@ -29,7 +29,7 @@ def selfmodel(*arguments: str, cwd: Path, **environment: str) -> Done:
     """
     stdout, stderr = io.StringIO(), io.StringIO()
     with (
-        _as_started_in(cwd, ["selfmodel", *map(str, arguments)], environment),
+        as_started_in(cwd, ["selfmodel", *map(str, arguments)], environment),
         redirect_stdout(stdout),
         redirect_stderr(stderr),
     ):
@@ -66,7 +66,7 @@ def refused(*arguments: str, said: str, cwd: Path, **environment: str) -> Done:
 
 
 @contextmanager
-def _as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -> Iterator[None]:
+def as_started_in(folder: Path, argv: list[str], environment: dict[str, str]) -> Iterator[None]:
     """Sets what a new process would have, and restores it; modules in the folder are forgotten."""
     before = Path.cwd(), sys.argv, list(sys.path), dict(os.environ), set(sys.modules)
     spawned_in = multiprocessing.process.ORIGINAL_DIR
