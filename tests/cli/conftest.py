@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.command import SMALL, Done, selfmodel
+from tests.helpers.command import SMALL, Done, succeeds
 
 SHORT = ("quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--steps", "60", "--trials", "1")
 
@@ -14,8 +14,7 @@ SHORT = ("quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--steps", "60"
 def recovery(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """A folder in which a recovery with short trials ran, and the command that ran."""
     folder = tmp_path_factory.mktemp("short")
-    done = selfmodel("recover", *SHORT, "--out", "run", "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = succeeds("recover", *SHORT, "--out", "run", "--json", cwd=folder)
     return folder, done
 
 

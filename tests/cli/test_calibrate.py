@@ -18,7 +18,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Stage, TrialPlan
-from tests.helpers.command import refused, selfmodel
+from tests.helpers.command import printed, refused, selfmodel, succeeds
 from tests.helpers.drivers import random_motion
 
 STEPS = 150
@@ -70,9 +70,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.search
 def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
-    done = selfmodel("calibrate", "intact.mcap", "-o", "fit.xml", "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found = printed("calibrate", "intact.mcap", "-o", "fit.xml", "--json", cwd=folder)
 
     assert found["error"] < found["error_before"]
     assert not found["as_it_was"]
@@ -80,21 +78,18 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     assert all(0 < one["deviation"] <= 0.3 for one in found["parameters"])
     assert {"set", "held_out_gain", "suspicion"} <= set(found)
     assert not (folder / "fit.xml.part").exists()
-    replayed = selfmodel("replay", "intact.mcap", "--robot", "fit.xml", "--json", cwd=folder)
-    assert replayed.returncode == 0, replayed.stderr
+    replayed = succeeds("replay", "intact.mcap", "--robot", "fit.xml", "--json", cwd=folder)
     plain = selfmodel("replay", "intact.mcap", "--json", cwd=folder)
     errors = [json.loads(run.stdout)["rms"]["joint_positions"] for run in (replayed, plain)]
     assert json.loads(replayed.stdout)["model"] == "fit.xml"
     assert errors[0] != errors[1]
     diagnose = ("diagnose", "after.mcap", "--comparator", "forward-displacement", "--json")
-    diagnosed = selfmodel(*diagnose, "--robot", "fit.xml", cwd=folder)
-    assert diagnosed.returncode == 0, diagnosed.stderr
+    succeeds(*diagnose, "--robot", "fit.xml", cwd=folder)
 
 
 def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
-    done = selfmodel("calibrate", "exact.mcap", "-o", "same.xml", cwd=folder)
+    done = succeeds("calibrate", "exact.mcap", "-o", "same.xml", cwd=folder)
 
-    assert done.returncode == 0, done.stderr
     assert "motor front_left_shoulder" in done.stdout
     assert "not determined by these trials" in done.stdout
     assert "delay, control steps: 0 (0 before)" in done.stdout
@@ -103,9 +98,8 @@ def test_a_table_says_each_factor_and_how_sure_it_is(folder: Path):
 
 @pytest.mark.search
 def test_contacts_that_were_changed_are_printed_and_in_the_model(folder: Path):
-    done = selfmodel("calibrate", "hard.mcap", "-o", "hard.xml", cwd=folder)
+    done = succeeds("calibrate", "hard.mcap", "-o", "hard.xml", cwd=folder)
 
-    assert done.returncode == 0, done.stderr
     assert "contacts: stiffness x 2, damping x 0.25" in done.stdout
     assert 'solref="-10000 -75"' in (folder / "hard.xml").read_text(encoding="utf-8")
 

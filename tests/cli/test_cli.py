@@ -19,7 +19,16 @@ from selfmodel.logs.results import read_result, versions
 from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
 from tests.cli.conftest import SHORT
-from tests.helpers.command import DIAGNOSIS, SMALL, Done, refused, selfmodel, selfmodel_process
+from tests.helpers.command import (
+    DIAGNOSIS,
+    SMALL,
+    Done,
+    printed,
+    refused,
+    selfmodel,
+    selfmodel_process,
+    succeeds,
+)
 from tests.helpers.drivers import random_controllers
 
 ROOT = Path(__file__).parents[2]
@@ -243,14 +252,13 @@ def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
         encoding="utf-8",
     )
     intact = ("recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1")
-    done = selfmodel(
+    done = succeeds(
         *(*intact, "--kinds", "break"),
         *("--comparator", "mine:squared", "--steps", "20", "--no-calibrate"),
         cwd=tmp_path,
         PYTHONPATH=".",
     )
 
-    assert done.returncode == 0, done.stderr
     assert "comparator squared: " in done.stderr
     assert "truth: intact; the diagnosis is" in done.stdout
     assert any(
@@ -263,7 +271,7 @@ def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
 
 
 def test_robots_are_listed_with_their_parts_and_cases(tmp_path: Path):
-    told = json.loads(selfmodel("robots", "--json", cwd=tmp_path).stdout)["robots"]
+    told = printed("robots", "--json", cwd=tmp_path)["robots"]
 
     assert [one["robot"] for one in told] == ["quadruped", "hexapod"]
     assert [one["weights"] for one in told] == [68, 120]

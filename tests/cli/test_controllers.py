@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import is_calibrated
-from tests.helpers.command import SMALL, refused, selfmodel
+from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 
 FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--out", "run", "--json")
 
@@ -17,9 +17,7 @@ def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a robot was recovered with oscillators, and what it said."""
     folder = tmp_path_factory.mktemp("rhythmic")
     asked = ("--case", "3", "--controller", "cpg", "--no-calibrate")
-    done = selfmodel("recover", "quadruped", *asked, *FEW, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)
+    return folder, printed("recover", "quadruped", *asked, *FEW, cwd=folder)
 
 
 @pytest.mark.search
@@ -37,8 +35,7 @@ def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple
 def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[Path, dict]):
     folder, told = rhythmic
     given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
-    done = selfmodel("trial", "quadruped", *given, "--out", "broken.mcap", "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    succeeds("trial", "quadruped", *given, "--out", "broken.mcap", "--json", cwd=folder)
     again = selfmodel(
         *("replay", "broken.mcap", "--hypothesis", "break:back_left_knee", "--json"), cwd=folder
     )
@@ -51,8 +48,7 @@ def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[
 def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Path):
     for number, asked in enumerate((["--controller", "cpg"], ["--neurons", "6"])):
         out = f"{number}.mcap"
-        done = selfmodel("trial", "quadruped", *asked, "--steps", "9", "--out", out, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        succeeds("trial", "quadruped", *asked, "--steps", "9", "--out", out, cwd=tmp_path)
     rhythmic, large = (read_log(tmp_path / f"{k}.mcap").trial.plan.controller for k in (0, 1))
 
     assert rhythmic.design.name == "cpg"
@@ -62,9 +58,7 @@ def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Pat
 @pytest.mark.search
 def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Path):
     asked = ("--neurons", "5", "--damage", "neuron:4", "--no-calibrate")
-    done = selfmodel("recover", "quadruped", *asked, *FEW, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    told = printed("recover", "quadruped", *asked, *FEW, cwd=tmp_path)
     log = read_log(tmp_path / told["trials"][-1]["log"])
 
     assert told["neurons"] == 5

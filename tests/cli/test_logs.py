@@ -10,7 +10,7 @@ import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
-from tests.helpers.command import DIAGNOSIS, SMALL, refused, selfmodel
+from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
 
 PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
@@ -21,8 +21,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
     damage = ("--damage", "break:front_left_knee", "--seed", "3")
     for robot, name, extra in (("quadruped", "a", damage), ("hexapod", "b", ())):
-        done = selfmodel("trial", robot, *extra, "--out", f"{name}.mcap", cwd=folder)
-        assert done.returncode == 0, done.stderr
+        succeeds("trial", robot, *extra, "--out", f"{name}.mcap", cwd=folder)
     data = (folder / "a.mcap").read_bytes()
     (folder / "cut.mcap.part").write_bytes(data[: len(data) // 2])
     (folder / "copy.mcap").write_bytes(data)
@@ -33,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_info_tells_what_is_in_a_log_but_not_what_is_hidden(folder: Path):
     done = selfmodel("logs", "info", "a.mcap", cwd=folder)
-    told = json.loads(selfmodel("logs", "info", "a.mcap", "--json", cwd=folder).stdout)
+    told = printed("logs", "info", "a.mcap", "--json", cwd=folder)
 
     assert done.returncode == 0
     for word in ("quadruped", "finished", "/joint_states", "Foxglove", "rerun", "observed"):
@@ -76,10 +75,8 @@ def test_damage_is_told_with_what_can_be_saved_and_how(
     salvaged = selfmodel(*arguments, "--json", cwd=folder)
     assert json.loads(salvaged.stdout)["steps"] == steps
     assert selfmodel("logs", "verify", str(out), cwd=folder).returncode == 0
-    told = json.loads(
-        selfmodel(
-            *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
-        ).stdout
+    told = printed(
+        *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
     )
     assert (told["identical"], told["steps"]) == (True, steps)
 
@@ -89,7 +86,7 @@ def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
 ):
     name = tmp_path / "cut half é.mcap"
     name.write_bytes((folder / "cut.mcap.part").read_bytes())
-    (told,) = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"]
+    told = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"][0]
     command = told["error"].partition("`")[2].partition("`")[0]
     arguments = shlex.split(command.replace("NEW.mcap", str(tmp_path / "new.mcap")))[1:]
 
@@ -126,7 +123,7 @@ def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
 
 
 def test_verify_expects_the_digest_that_info_and_verify_print(folder: Path):
-    told = json.loads(selfmodel("logs", "verify", "a.mcap", "--json", cwd=folder).stdout)
+    told = printed("logs", "verify", "a.mcap", "--json", cwd=folder)
     digest = told["files"][0]["digest"]
     expected = ("logs", "verify", "--expect", digest)
 
@@ -142,7 +139,7 @@ def test_verify_expects_the_digest_that_info_and_verify_print(folder: Path):
 
 def test_replay_of_the_truth_is_identical_and_says_so(folder: Path):
     arguments = ("replay", "a.mcap", "--hypothesis", "break:front_left_knee")
-    told = json.loads(selfmodel(*arguments, "--json", cwd=folder).stdout)
+    told = printed(*arguments, "--json", cwd=folder)
     said = selfmodel(*arguments, cwd=folder).stdout
 
     version = mujoco.__version__
@@ -156,7 +153,7 @@ def test_replay_of_the_truth_is_identical_and_says_so(folder: Path):
 def test_replay_of_another_hypothesis_shows_where_they_part(folder: Path, tmp_path: Path):
     figure = tmp_path / "parting.png"
     arguments = ("replay", "a.mcap", "--hypothesis", "break:front_left_shoulder")
-    told = json.loads(selfmodel(*arguments, "--json", cwd=folder).stdout)
+    told = printed(*arguments, "--json", cwd=folder)
     drawn = selfmodel(*arguments, "--out", str(figure), cwd=folder, COLUMNS="80")
 
     assert told["identical"] is False
@@ -189,13 +186,11 @@ def test_replay_with_another_mujoco_compares_with_a_tolerance_and_says_so(
 def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     """A folder in which a small recovery by displacement alone ran, and what it printed."""
     folder = tmp_path_factory.mktemp("paper")
-    done = selfmodel(
+    return folder, printed(
         *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "100", *PAPERS),
         *("--trials", "1", "--out", "run", "--json"),
         cwd=folder,
     )
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)
 
 
 @pytest.mark.parametrize(
@@ -206,9 +201,7 @@ def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
 ):
     folder, told = request.getfixturevalue(run)
     logs = [trial["log"] for trial in told["trials"]]
-    done = selfmodel("diagnose", *logs, *options, "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found = printed("diagnose", *logs, *options, "--json", cwd=folder)
 
     for said in DIAGNOSIS:
         assert found[said] == told[said], said

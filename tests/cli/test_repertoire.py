@@ -3,16 +3,15 @@
 import json
 from pathlib import Path
 
-from tests.helpers.command import refused, selfmodel
+from tests.helpers.command import refused, selfmodel, succeeds
 
 SMALL = ("--evaluations", "40", "--steps", "40", "--seed", "2")
 
 
 def test_a_repertoire_is_made_and_shown(tmp_path: Path):
-    done = selfmodel(
+    done = succeeds(
         "repertoire", "make", "quadruped", "--out", "gaits.npz", *SMALL, "--json", cwd=tmp_path
     )
-    assert done.returncode == 0, done.stderr
     made = json.loads(done.stdout)
     shown = selfmodel("repertoire", "info", "gaits.npz", "--json", cwd=tmp_path)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.report.charts import Report, html_of
-from tests.helpers.command import SMALL, refused, selfmodel
+from tests.helpers.command import SMALL, refused, selfmodel, succeeds
 
 BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"
 
@@ -18,18 +18,14 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     common = ("--controller", str(BANK), "--steps", "80")
     trials = (("before", "--stage", "before"), ("after", "--damage", "jam:back_left_knee=0.3"))
     for name, *options in trials:
-        done = selfmodel(
-            "trial", "quadruped", *common, *options, "--out", f"{name}.mcap", cwd=folder
-        )
-        assert done.returncode == 0, done.stderr
+        succeeds("trial", "quadruped", *common, *options, "--out", f"{name}.mcap", cwd=folder)
     return folder
 
 
 @pytest.fixture(scope="module")
 def diagnosed(logs: Path) -> Path:
     """The JSON file of a diagnosis of the logs."""
-    done = selfmodel("diagnose", "before.mcap", "after.mcap", *SMALL, "--json", cwd=logs)
-    assert done.returncode == 0, done.stderr
+    done = succeeds("diagnose", "before.mcap", "after.mcap", *SMALL, "--json", cwd=logs)
     (logs / "found.json").write_text(done.stdout)
     return logs / "found.json"
 
@@ -65,9 +61,8 @@ def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
 def test_a_campaign_is_reported_into_its_folder(tmp_path: Path):
     (tmp_path / "results.csv").write_text("robot,correct\nquadruped,true\n")
 
-    done = selfmodel("report", str(tmp_path), cwd=tmp_path)
+    done = succeeds("report", str(tmp_path), cwd=tmp_path)
 
-    assert done.returncode == 0, done.stderr
     assert "1 of 1 diagnoses are right" in done.stdout
     assert (tmp_path / "report.html").exists()
 

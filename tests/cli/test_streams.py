@@ -12,7 +12,7 @@ import pytest
 
 from selfmodel import cli
 from selfmodel.cli import main
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, selfmodel, succeeds
 
 ROOT = Path(__file__).parents[2]
 
@@ -39,8 +39,7 @@ def shell(line: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("streams")
-    done = selfmodel("trial", "quadruped", "--steps", "60", "--out", "a.mcap", cwd=folder)
-    assert done.returncode == 0
+    succeeds("trial", "quadruped", "--steps", "60", "--out", "a.mcap", cwd=folder)
     return folder / "a.mcap"
 
 

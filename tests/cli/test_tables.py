@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs import read_log
-from tests.helpers.command import selfmodel
+from tests.helpers.command import selfmodel, succeeds
 from tests.helpers.go2 import STAND, recorded
 
 pytestmark = pytest.mark.process
@@ -21,12 +21,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the model of an ant, and a log of it with a broken ankle."""
     folder = tmp_path_factory.mktemp("ant")
     (folder / "ant.xml").write_bytes(ANT.read_bytes())
-    done = selfmodel(
+    succeeds(
         *("trial", "ant.xml", "--damage", "break:ankle_1", "--steps", "200", "--seed", "3"),
         *("--stage", "after", "--out", "after.mcap"),
         cwd=folder,
     )
-    assert done.returncode == 0, done.stderr
     return folder
 
 
@@ -34,12 +33,10 @@ def test_an_exported_trial_is_imported_as_the_same_trial(folder: Path):
     table = "after.csv"
     done = selfmodel("logs", "export", "after.mcap", "-o", table, "--json", cwd=folder)
     assert json.loads(done.stdout)["rows"] == 200
-    done = selfmodel("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = succeeds("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=folder)
     (folder / "map.toml").write_text(done.stdout)
     imported = ("logs", "import", table, "--mapping", "map.toml", "--out", "again.mcap")
-    done = selfmodel(*imported, cwd=folder)
-    assert done.returncode == 0, done.stderr
+    done = succeeds(*imported, cwd=folder)
 
     original, again = (
         read_log(folder / name).trial.trajectory for name in ("after.mcap", "again.mcap")
@@ -56,8 +53,7 @@ def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path)
     (tmp_path / "map.toml").write_text(
         done.stdout.replace("control_timestep = 0.01 ", "control_timestep = 0.02 ")
     )
-    done = selfmodel("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = succeeds("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
 
     trajectory = read_log(tmp_path / "g.mcap").trial.trajectory
     with np.load(table) as recorded:

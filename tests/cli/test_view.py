@@ -22,7 +22,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.robot.motion import shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
-from tests.helpers.command import refused, selfmodel
+from tests.helpers.command import refused, selfmodel, succeeds
 
 pytest.importorskip("rerun", reason="the extra rerun is not installed")
 
@@ -36,8 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a short log."""
     folder = tmp_path_factory.mktemp("view")
     arguments = ("--damage", "break:front_left_knee", "--steps", str(STEPS), "--out", "a.mcap")
-    done = selfmodel("trial", "quadruped", *arguments, cwd=folder)
-    assert done.returncode == 0, done.stderr
+    succeeds("trial", "quadruped", *arguments, cwd=folder)
     return folder
 
 
@@ -105,9 +104,8 @@ def test_a_jammed_part_is_red_in_both_bodies(shown: Shown):
 
 
 def test_the_output_names_the_file_and_how_to_open_the_log_in_foxglove(folder: Path):
-    told = selfmodel("view", "a.mcap", "-o", "a.rrd", cwd=folder)
+    told = succeeds("view", "a.mcap", "-o", "a.rrd", cwd=folder)
 
-    assert told.returncode == 0, told.stderr
     assert "a.rrd: quadruped as logged, and simulated as intact, transparent" in told.stdout
     assert "In Foxglove or Lichtblick: open the local file a.mcap" in told.stdout
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from tests.helpers.code_blocks import Block, blocks, commands
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, succeeds
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -52,8 +52,7 @@ SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 def test_a_reader_can_run(step: str | Block, folder: Path, monkeypatch: pytest.MonkeyPatch):
     if isinstance(step, str):
         words = shlex.split(step)[1:]
-        done = selfmodel(*words, *SHORTER.get(words[0], ()), cwd=folder)
-        assert done.returncode == 0, done.stderr
+        succeeds(*words, *SHORTER.get(words[0], ()), cwd=folder)
     else:
         monkeypatch.chdir(folder)
         small = "settings=selfmodel.Settings(generations=2).scaled(8), healthy="

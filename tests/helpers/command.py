@@ -1,6 +1,7 @@
 """The command line as its users run it, in this process or in one of its own."""
 
 import io
+import json
 import multiprocessing.process
 import os
 import subprocess
@@ -41,6 +42,18 @@ def selfmodel(*arguments: str, cwd: Path, **environment: str) -> Done:
     # The command counts warnings, which are errors in every other test.
     assert "note: Python warned" not in stderr.getvalue(), stderr.getvalue()
     return Done(arguments, status, stdout.getvalue(), stderr.getvalue())
+
+
+def succeeds(*arguments: str, cwd: Path, **environment: str) -> Done:
+    """Runs a command like ``selfmodel``; it ends with status 0."""
+    done = selfmodel(*arguments, cwd=cwd, **environment)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def printed(*arguments: str, cwd: Path, **environment: str) -> dict:
+    """Runs a command with ``--json`` like ``succeeds``, and returns what it printed."""
+    return json.loads(succeeds(*arguments, cwd=cwd, **environment).stdout)
 
 
 def selfmodel_process(*arguments: str, cwd: Path, **environment: str) -> Done:

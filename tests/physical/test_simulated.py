@@ -31,7 +31,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.helpers.command import SMALL, selfmodel
+from tests.helpers.command import SMALL, printed
 from tests.helpers.drivers import random_controllers, random_motion
 
 STEPS = 60
@@ -341,13 +341,28 @@ def test_in_a_trial_debris_starts_where_the_limb_is_however_the_robot_stands(
 
 @pytest.mark.search
 def test_a_recovery_across_a_gap_is_of_one_robot_whose_trials_all_differ(tmp_path: Path):
-    done = selfmodel(
-        "recover", "quadruped", "--damage", "intact", *SMALL, "--steps", "40", "--trials", "1",
-        "--no-calibrate", "--comparator", "forward-displacement", "--kinds", "paper",
-        "--gap", "0.1", "--out", "run", "--json", cwd=tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    told = printed(
+        "recover",
+        "quadruped",
+        "--damage",
+        "intact",
+        *SMALL,
+        "--steps",
+        "40",
+        "--trials",
+        "1",
+        "--no-calibrate",
+        "--comparator",
+        "forward-displacement",
+        "--kinds",
+        "paper",
+        "--gap",
+        "0.1",
+        "--out",
+        "run",
+        "--json",
+        cwd=tmp_path,
+    )
     paths = [tmp_path / trial["log"] for trial in told["trials"]]
     hidden = [read_gap(path) for path in paths]
 

@@ -1,6 +1,5 @@
 """Commands on robots with a fixed base: an arm, and the quadruped on a stand."""
 
-import json
 import shutil
 from importlib.resources import files
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.helpers.command import refused, selfmodel
+from tests.helpers.command import printed, refused, succeeds
 from tests.helpers.robots.arms import arm_mjcf
 
 pytestmark = [pytest.mark.process, pytest.mark.search]
@@ -18,9 +17,7 @@ SEARCH = ("--population", "12", "--generations", "3", *KINDS)
 
 
 def run(folder: Path, *arguments: str) -> dict:
-    done = selfmodel(*arguments, "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return printed(*arguments, "--json", cwd=folder)
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +49,7 @@ def test_a_log_of_a_stand_is_replayed_to_the_bit_drawn_and_calibrated(folder: Pa
     run(folder, "trial", "stand.xml", "--steps", "100", "-o", "exact.mcap")
     assert run(folder, "replay", "exact.mcap")["identical"]
     for command, out in (("calibrate", "stand-fit.xml"), ("render", "stand-film.png")):
-        done = selfmodel(command, "exact.mcap", "-o", out, cwd=folder)
-        assert done.returncode == 0, done.stderr
+        succeeds(command, "exact.mcap", "-o", out, cwd=folder)
 
 
 def test_an_arm_with_a_weak_motor_follows_its_trajectory_better_than_before(folder: Path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.command import SMALL, refused, selfmodel
+from tests.helpers.command import SMALL, printed, refused, selfmodel
 from tests.robot.mjcf.awkward import mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
@@ -22,9 +22,7 @@ def test_a_users_robot_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_p
     before = ant.read_bytes()
     damage = ("--damage", "break:ankle_1", "--trials", "1", "--steps", "80", *SMALL)
     kinds = ("--kinds", "paper", "--json")
-    done = selfmodel("recover", "ant.xml", *damage, "--out", "run", *kinds, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    told = printed("recover", "ant.xml", *damage, "--out", "run", *kinds, cwd=tmp_path)
 
     logs = sorted(str(path) for path in (tmp_path / "run" / "trials").glob("*.mcap"))
     alone = selfmodel("diagnose", *logs, *kinds, cwd=tmp_path)
@@ -38,7 +36,7 @@ def test_a_users_robot_is_recovered_and_diagnosed_from_its_logs(ant: Path, tmp_p
 
 
 def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):
-    told = json.loads(selfmodel("robots", str(ant), "--json", cwd=tmp_path).stdout)
+    told = printed("robots", str(ant), "--json", cwd=tmp_path)
     shown = selfmodel("robots", str(ant), cwd=tmp_path, COLUMNS="60").stdout
 
     assert told["root"] == {"body": "torso", "floats": True, "fixed": False}
@@ -52,7 +50,7 @@ def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):
 
 def test_settings_are_options(ant: Path, tmp_path: Path):
     options = ("--set", "control_timestep=0.02", "--set", "touch=[]")
-    told = json.loads(selfmodel("robots", str(ant), *options, "--json", cwd=tmp_path).stdout)
+    told = printed("robots", str(ant), *options, "--json", cwd=tmp_path)
 
     assert (told["control_timestep"], told["hidden_neurons"]) == (0.02, 3)
     assert not any(sensor["kind"] == "touch" for sensor in told["sensor_details"])
