@@ -43,11 +43,7 @@ LEFT_OUT = (
 )
 """Keys of JSON that are times, versions, sentences, places or digests of whole files."""
 
-RENAMED = {
-    "rivals": "indistinguishable",
-    "unseen": "undetectable",
-    "outside": "unsearched",
-}
+RENAMED = {"rivals": "indistinguishable", "unseen": "undetectable", "outside": "unsearched"}
 """Keys of JSON by their names before 0.2."""
 
 NO_RESULTS = (".json", ".jsonl", ".pdf", ".png", ".svg")

@@ -59,22 +59,16 @@ def test_recover_prints_one_json_object_with_every_key(short: tuple[Path, dict])
     assert told["evaluations"]["diagnostic"] == 2 * (8 + 4)
     assert told["evaluations"]["repair"] >= 2 * 2 * 8
     assert set(told["evaluations"]) == {
-        *("repair", "diagnostic", "distinct_hypotheses", "simulated_steps", "diverged"),
+        *("repair", "diagnostic", "distinct_hypotheses", "simulated_steps", "diverged")
     }
     assert 1 <= len(told["diagnosis"]) <= 10
     ways = [trial["displacement"] for trial in told["trials"]]
-    assert told["displacement"] == {
-        "before": ways[0],
-        "after": ways[1],
-        "recovered": max(ways[2:]),
-    }
+    assert told["displacement"] == {"before": ways[0], "after": ways[1], "recovered": max(ways[2:])}
     assert told["recovery"] == max(ways[2:]) / ways[0]
     assert isinstance(told["correct"], bool)
 
 
-def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(
-    short: tuple[Path, dict],
-):
+def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(short: tuple[Path, dict]):
     folder, told = short
     for trial in told["trials"]:
         log = read_log(folder / trial["log"])
@@ -94,9 +88,7 @@ def test_the_database_is_read_back_from_the_folder(short: tuple[Path, dict], qua
     assert [str(h) for h in database.hypotheses] == [d["hypothesis"] for d in told["diagnosis"]]
 
 
-def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(
-    short: tuple[Path, dict],
-):
+def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(short: tuple[Path, dict]):
     folder, told = short
     found = read_result(folder / "run" / "result.json", "a result", "")
 
@@ -196,8 +188,7 @@ def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, qu
     save_controller(tmp_path / "gait.npz", controller)
     few = ("--steps", "200", "--json")
     first = selfmodel(
-        *("trial", "quadruped", "--controller", "gait.npz", *few, "--out", "a.mcap"),
-        cwd=tmp_path,
+        *("trial", "quadruped", "--controller", "gait.npz", *few, "--out", "a.mcap"), cwd=tmp_path
     )
     second = selfmodel(
         *("trial", "quadruped", "--controller", "a.mcap", *few, "--out", "b.mcap"), cwd=tmp_path

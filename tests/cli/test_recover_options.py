@@ -111,10 +111,7 @@ def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
     )
     found = [
         printed(*run, *options, "--out", name, cwd=tmp_path)
-        for name, options in {
-            "given": ("--repertoire", str(gaits)),
-            "without": (),
-        }.items()
+        for name, options in {"given": ("--repertoire", str(gaits)), "without": ()}.items()
     ]
     recovered = [one["trials"][2]["displacement"] for one in found]
     assert [one["search"] for one in found] == ["repertoire", "cma-es"]

@@ -68,7 +68,7 @@ def test_bodies_of_the_suite_and_of_the_user_fail_and_recover_once(tmp_path: Pat
 
     # A limb of one joint has no part that could be lost alone: the biped has no case 1.
     assert [(row["robot"], row["case"]) for row in rows] == [
-        *(("biped", 5), ("suite-walker-walk", 1), ("suite-walker-walk", 5)),
+        *(("biped", 5), ("suite-walker-walk", 1), ("suite-walker-walk", 5))
     ]
     assert all(row["trials"] == 2 and row["seconds"] > 0 for row in rows)
     assert rows[1]["before"] == rows[2]["before"], "one gait for all cases of a body and seed"

@@ -113,9 +113,7 @@ def predicted(
 
 
 def losses(
-    prediction: Trajectory,
-    positions: np.ndarray = MOTION,
-    velocities: np.ndarray = MOTION,
+    prediction: Trajectory, positions: np.ndarray = MOTION, velocities: np.ndarray = MOTION
 ) -> np.ndarray:
     logged: dict[Signal, np.ndarray] = {
         "joint_positions": positions[0][:, COMPARED],

@@ -16,9 +16,7 @@ GROUP = list(LARGE_DIFFERENCES)
 
 @settings(max_examples=8)
 @given(
-    frequency=st.floats(1.2, 2.5),
-    late=st.floats(0.0, 1.0),
-    phases=st.permutations(WALK).map(tuple),
+    frequency=st.floats(1.2, 2.5), late=st.floats(0.0, 1.0), phases=st.permutations(WALK).map(tuple)
 )
 def test_when_the_strides_begin_does_not_matter(
     frequency: float, late: float, phases: tuple[float, ...]

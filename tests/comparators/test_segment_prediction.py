@@ -223,9 +223,7 @@ def test_the_right_noise_of_the_right_sensor_is_nearest(deviation: float):
 
 
 @pytest.mark.parametrize("radians_per_step", [0.02, 0.3, 0.6])
-def test_a_joint_that_swings_alone_is_no_noisy_one_up_to_ten_steps_a_swing(
-    radians_per_step: float,
-):
+def test_a_joint_that_swings_alone_is_no_noisy_one_up_to_ten_steps_a_swing(radians_per_step: float):
     logged = moving(radians_per_step)
     logged[..., 1:] = 0
 

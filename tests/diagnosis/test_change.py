@@ -30,11 +30,7 @@ def losses_of(change: int, *, pieces: int = PIECES, noise: float = 0.2, seed: in
     rng = np.random.default_rng(seed)
     common = rng.gamma(2, 0.1, pieces)
     jammed = np.arange(pieces) >= change
-    rows = {
-        INTACT: jammed * 1.0,
-        JAM: ~jammed * 1.0,
-        BREAK: np.full(pieces, 0.9),
-    }
+    rows = {INTACT: jammed * 1.0, JAM: ~jammed * 1.0, BREAK: np.full(pieces, 0.9)}
     return of({one: common + row + noise * rng.uniform(0, 1, pieces) for one, row in rows.items()})
 
 
@@ -158,13 +154,7 @@ def test_the_surrogate_selects_and_the_comparator_itself_decides():
     """A surrogate with fewer pieces that ranks another hypothesis first."""
     losses = losses_of(30)
     few = 2 * MIN_PIECES + 4
-    coarse = of(
-        {
-            INTACT: np.linspace(0, 1, few),
-            JAM: np.full(few, 0.7),
-            BREAK: np.full(few, 0.4),
-        }
-    )
+    coarse = of({INTACT: np.linspace(0, 1, few), JAM: np.full(few, 0.7), BREAK: np.full(few, 0.4)})
     assert best_split([INTACT], [JAM, BREAK], coarse, coarse).after == BREAK
     asked: set[Hypothesis] = set()
 

@@ -44,8 +44,7 @@ def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Tr
 
 
 @pytest.mark.parametrize(
-    ("lost", "expected"),
-    [((), SEGMENTS), (BASE, ONBOARD), (VELOCITIES, NOISY), (MOST, SERIES)],
+    ("lost", "expected"), [((), SEGMENTS), (BASE, ONBOARD), (VELOCITIES, NOISY), (MOST, SERIES)]
 )
 def test_the_best_comparator_is_the_first_that_the_trial_allows(
     lost: Sequence[Signal], expected: str, robot: Robot, trial: Trial

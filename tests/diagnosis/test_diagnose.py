@@ -5,11 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from selfmodel.comparators import (
-    COMPARATORS,
-    FORWARD_DISPLACEMENT,
-    SEGMENT_PREDICTION,
-)
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
@@ -43,11 +39,7 @@ def logged(robot: Robot, truth: str, controller: Controller, steps: int = 100) -
 
 
 @pytest.mark.parametrize(
-    "truth",
-    [
-        "break:front_left_knee",
-        pytest.param("intact", marks=pytest.mark.search),
-    ],
+    "truth", ["break:front_left_knee", pytest.param("intact", marks=pytest.mark.search)]
 )
 def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: str):
     trials = [logged(quadruped, truth, c) for c in random_controllers(quadruped, 2)]
@@ -75,9 +67,7 @@ class Indifferent:
         )
 
 
-def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_first(
-    quadruped: Robot,
-):
+def test_of_hypotheses_that_explain_as_well_the_one_with_fewer_faults_ranks_first(quadruped: Robot):
     (controller,) = random_controllers(quadruped, 1)
     trial = logged(quadruped, "break:front_left_knee", controller)
     diagnose = DiagnosticSearch(Simulator(quadruped, 2), Indifferent(), SMALL)

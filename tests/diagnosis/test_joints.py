@@ -122,8 +122,7 @@ def terms(hypothesis: Hypothesis) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    "truth",
-    [f"motor:{KNEE}=0.37", f"damping:{KNEE}=8.0", f"joint-friction:{SHOULDER}=0.23"],
+    "truth", [f"motor:{KNEE}=0.37", f"damping:{KNEE}=8.0", f"joint-friction:{SHOULDER}=0.23"]
 )
 def test_a_fault_that_only_the_joint_shows_is_found_with_its_severity(truth: str):
     found, real = searched("intact", truth), said(truth)
@@ -210,8 +209,7 @@ def losses_of_joints(after: HingeLosses, before: HingeLosses | None) -> Syntheti
 
 def test_the_joint_with_the_largest_excess_is_the_first():
     joints = losses_of_joints(
-        hinge_losses(1, {KNEE: {INTACT: 0.3}, SHOULDER: {INTACT: 0.1}}),
-        hinge_losses(5),
+        hinge_losses(1, {KNEE: {INTACT: 0.3}, SHOULDER: {INTACT: 0.1}}), hinge_losses(5)
     )
 
     excess = excesses(INTACT, joints)

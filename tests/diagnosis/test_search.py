@@ -128,10 +128,7 @@ def helped(swing: float) -> Losses:
 
 @pytest.mark.parametrize(
     ("swing", "found"),
-    [
-        (0.1, "break:front_left_knee+sensor:front_right_touch"),
-        (3.0, "break:front_left_knee"),
-    ],
+    [(0.1, "break:front_left_knee+sensor:front_right_touch"), (3.0, "break:front_left_knee")],
     ids=["of use", "by chance"],
 )
 def test_a_fault_is_kept_where_it_is_of_use_and_dropped_where_chance_would_do_as_well(

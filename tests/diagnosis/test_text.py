@@ -150,7 +150,7 @@ def test_the_limits_of_a_kind_are_one_clause_and_equal_limits_are_named_together
         (
             "These trials would have shown: motor up to 0.7 (a, c), up to 0.5 (b), no severity "
             "(d); friction up to 0.5 or from 1.25. Smaller changes are below the limit."
-        ),
+        )
     ]
 
 

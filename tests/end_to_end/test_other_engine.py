@@ -19,13 +19,7 @@ from benchmarks.foreign.motion import Motion
 from benchmarks.other_engine import recordings
 from benchmarks.other_engine.bullet import Bullet
 from benchmarks.other_engine.environment import BulletEnvironment, Servos, physical_robot
-from benchmarks.other_engine.reality import (
-    Damage,
-    Reality,
-    damage_of,
-    draw_reality,
-    ideal_reality,
-)
+from benchmarks.other_engine.reality import Damage, Reality, damage_of, draw_reality, ideal_reality
 from benchmarks.other_engine.recovery import recovered, table, transfer_lines
 from selfmodel.controllers.playback import Playback
 from selfmodel.physical.simulated import SimulatedRobot

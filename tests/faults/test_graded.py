@@ -9,13 +9,7 @@ import pytest
 
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
-from selfmodel.faults.world import (
-    CELL_SIZE,
-    CELLS_PER_BUMP,
-    FLAT_RADIUS,
-    HALF_EXTENT,
-    unit_heights,
-)
+from selfmodel.faults.world import CELL_SIZE, CELLS_PER_BUMP, FLAT_RADIUS, HALF_EXTENT, unit_heights
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader
 from selfmodel.simulation.simulator import Simulator

@@ -11,13 +11,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import (
-    ALL_KINDS,
-    KIND_SETS,
-    KINDS,
-    PAPER_KINDS,
-    cases_of,
-)
+from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, PAPER_KINDS, cases_of
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.contacts import reaches_ground
 from selfmodel.robot.model_variant import ModelVariant

@@ -178,9 +178,7 @@ def test_an_observation_that_comes_again_is_missing():
 
 
 @given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=30))
-def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(
-    took: list[float],
-):
+def test_a_step_is_late_exactly_where_its_time_is_off_by_more_than_the_tolerance(took: list[float]):
     timer, now = StepTimer(1.0, 0.25), 7.0
     assert not timer.update(now, {}).late
     for each in took:

@@ -197,10 +197,7 @@ def test_it_costs_what_it_may_and_reports_its_progress(
 @pytest.mark.search
 @pytest.mark.parametrize(
     ("score", "steps"),
-    [
-        (DISPLACEMENT, {210, 420}),
-        (LAST, {420}),
-    ],
+    [(DISPLACEMENT, {210, 420}), (LAST, {420})],
     ids=["grows with time", "does not"],
 )
 def test_rollouts_have_half_of_the_steps_at_first_with_a_score_that_grows_with_time(

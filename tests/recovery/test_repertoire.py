@@ -14,12 +14,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery import map_elites as module
 from selfmodel.recovery.falls import falls_of
-from selfmodel.recovery.map_elites import (
-    feet_of,
-    make_repertoire,
-    reevaluate,
-    simulated_evaluation,
-)
+from selfmodel.recovery.map_elites import feet_of, make_repertoire, reevaluate, simulated_evaluation
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest, self_model_digest
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

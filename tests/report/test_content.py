@@ -26,7 +26,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     report = report_of(subject)
 
     assert [section.key for section in report.sections] == [
-        *("trials", "hypotheses", "residual", "separation", "searches", "calibration", "gait"),
+        *("trials", "hypotheses", "residual", "separation", "searches", "calibration", "gait")
     ]
     assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
     assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline

@@ -124,11 +124,7 @@ def test_a_result_without_what_a_report_needs_is_refused_by_its_key(
 @pytest.mark.parametrize("key", ["comparator", "kinds"])
 def test_a_report_imports_no_module_that_a_file_names(run: Path, tmp_path: Path, key: str):
     value: object = "antigravity:geohash" if key == "comparator" else ["antigravity:geohash"]
-    folder = changed(
-        run,
-        tmp_path / "run",
-        lambda values: values.update({key: value}),
-    )
+    folder = changed(run, tmp_path / "run", lambda values: values.update({key: value}))
 
     with pytest.raises(InputError, match=r"antigravity:geohash.* imports nothing"):
         subject_of_run(folder, threads=1)

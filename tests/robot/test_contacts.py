@@ -175,7 +175,7 @@ def test_bodies_that_are_no_neighbours_penetrate_whether_or_not_the_model_simula
     depth = round(0.2 - 0.8 * np.sin(0.2), 6)
 
     assert depths(robot, (0, 0, 0), (NEAR, 0, 0), (0, -NEAR, 0), (-1.5, 0, 0)) == [
-        *(0, depth, depth, 0),
+        *(0, depth, depth, 0)
     ]
 
 

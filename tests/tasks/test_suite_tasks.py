@@ -12,11 +12,7 @@ from selfmodel.tasks import entry, suite_bodies, suite_tasks
 
 FAST = (("walker", "walk"), ("reacher", "easy"))
 EVERY = [
-    pytest.param(
-        domain,
-        task,
-        marks=() if (domain, task) in FAST else pytest.mark.bodies,
-    )
+    pytest.param(domain, task, marks=() if (domain, task) in FAST else pytest.mark.bodies)
     for domain, own in suite_tasks.TASKS.items()
     for task in own[:1]
 ]

@@ -16,15 +16,7 @@ from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.logs.salvage import salvage
 from selfmodel.robot.robot import Robot
 from tests.logs.conftest import MJCF
-from tests.logs.recordings.bags import (
-    ROS,
-    T0,
-    Item,
-    imu,
-    joint_state,
-    trajectory,
-    write_bag,
-)
+from tests.logs.recordings.bags import ROS, T0, Item, imu, joint_state, trajectory, write_bag
 from tests.logs.recordings.conftest import JOINTS, MAPPING, angle, imported, recorded
 
 

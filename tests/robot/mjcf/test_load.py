@@ -51,10 +51,7 @@ def test_an_awkward_but_valid_file_gives_a_robot_that_moves(what: str, tmp_path:
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
-@pytest.mark.parametrize(
-    "what",
-    [what for what, case in AWKWARD.items() if case.sentence],
-)
+@pytest.mark.parametrize("what", [what for what, case in AWKWARD.items() if case.sentence])
 def test_an_invalid_file_is_refused_in_one_sentence(what: str, tmp_path: Path):
     path = AWKWARD[what].write(tmp_path)
 
