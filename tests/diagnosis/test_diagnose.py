@@ -125,12 +125,12 @@ def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_
     quadruped: Robot, base: str, kinds: tuple[FaultKind, ...], *, is_searched: bool
 ):
     robot = quadruped if base == "floating" else arm()
-    (controller,) = random_cpgs(robot, 1)
-    before, after = (logged(robot, faults, controller, 200) for faults in ("intact", "delay=2.8"))
+    (controller,), steps = random_cpgs(robot, 1), 200 if is_searched else 120
+    before, after = (logged(robot, one, controller, steps) for one in ("intact", "delay=2.8"))
     diagnose = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
-        SMALL,
+        dataclasses.replace(Settings().scaled(4), generations=1),
         kinds or PAPER_KINDS,
         healthy_trials=[before],
     )
