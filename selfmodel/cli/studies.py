@@ -1,10 +1,8 @@
 """Commands that run studies: ``ablate``, ``suite run`` and ``paper``."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -18,12 +16,9 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.registry import kind_names
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies import figures, plans, rows as loaded, tables as formats
-from selfmodel.studies.comparisons import balance_warnings
+from selfmodel.studies import paper_page, plans, tables as formats
 from selfmodel.studies.grid import CellEnds, dask_executor
-from selfmodel.studies.paper_page import tables_of, write_results
-from selfmodel.studies.statistics import Interval
-from selfmodel.studies.study import Row, Study
+from selfmodel.studies.study import Study
 from selfmodel.tasks import ROBOTS
 
 PROCESSES, DASK = EXECUTORS = ("processes", "dask")
@@ -52,25 +47,7 @@ def ablate(options: Ablate) -> None:
         search=options.search,
         only=inputs.share("--only", options.only),
     )
-    failed = run_shown(study, options)
-    rows = loaded.study_rows(study.name, options.out)
-    scores = formats.ablation_scores(rows)
-    ends = {one["trials"] for one in scores}
-    shown = [one for one in scores if one["trials"] in (min(ends), max(ends))]
-    drawn = figures.of_ablation(rows, scores)
-    notes = balance_warnings(loaded.whole(loaded.outcomes_of(study.name, rows)))
-    _finish(
-        study,
-        failed,
-        formats.results_files(study.name, rows, "scores", scores)
-        | {f"figures/{name}": data for name, data in drawn.items()},
-        [_score_table(scores)],
-        {"rows": rows, "scores": scores},
-        options=options,
-        shown=_score_table(shown),
-        legend="With 95 % intervals; time as a multiple of the paper's comparator's.",
-        notes=[f"warning: {note}" for note in notes],
-    )
+    _run(study, options, formats.ablation_results)
 
 
 def run_suite(options: RunSuite) -> None:
@@ -101,20 +78,7 @@ def run_suite(options: RunSuite) -> None:
         search=options.search,
         only=inputs.share("--only", options.only),
     )
-    failed = run_shown(study, options)
-    rows = loaded.study_rows(study.name, options.out)
-    summaries = formats.suite_summaries(rows)
-    found = formats.table_of("summaries", summaries, list(map(_summary_texts, summaries)), texts=3)
-    _finish(
-        study,
-        failed,
-        formats.results_files(study.name, rows, "summaries", summaries),
-        [found],
-        {"rows": rows, "summaries": summaries},
-        options=options,
-        shown=found,
-        legend="Medians over the runs; right with its 95 % interval, %.",
-    )
+    _run(study, options, formats.suite_results)
 
 
 def paper(options: RepeatPaper) -> None:
@@ -128,112 +92,34 @@ def paper(options: RepeatPaper) -> None:
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         settings=options.settings,
     )
+    _run(study, options, paper_page.results_of)
+
+
+def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Results]) -> None:
+    """Runs a study, writes and prints its results, and ends the command."""
     failed = run_shown(study, options)
-    results, files = write_results(options.out)
-    tables = tables_of(results)
-    _finish(
-        study,
-        failed,
-        {},
-        tables,
-        results.as_dict(),
-        options=options,
-        shown=tables[1],
-        legend="Medians over the runs, m; the paper: whether it reports the case as restored.",
-        written=files,
-    )
-
-
-def _finish(
-    study: Study,
-    failed: Sequence[CellEnds],
-    results: Mapping[str, bytes],
-    tables: Sequence[formats.Table],
-    facts: Mapping[str, Any],
-    *,
-    options: Options,
-    shown: formats.Table,
-    legend: str,
-    notes: Sequence[str] = (),
-    written: Sequence[Path] = (),
-) -> None:
-    """Writes the results of a study, prints them, and ends the command.
-
-    Args:
-        study: The study.
-        failed: Its failed cells.
-        results: Content of its files by path in its folder.
-        tables: Its tables, for the chosen format.
-        facts: What ``--json`` prints.
-        options: Options of the study.
-        shown: The table for readers.
-        legend: Line below it.
-        notes: Lines on standard error.
-        written: Files that were written before.
-    """
-    paths = [*written, *formats.write_files(study.folder, results)]
+    found = results_of(study.folder)
+    files = dict(found.files)
     if options.table is not None:
-        content = formats.table_files(tables, options.table)
-        paths += formats.write_files(study.folder / "tables", content)
-    files = [str(path) for path in paths]
+        content = formats.table_files(found.tables, options.table)
+        files |= {f"tables/{name}": data for name, data in content.items()}
+    paths = [str(path) for path in formats.write_files(study.folder, files)]
     if options.as_json:
         failures = [{"run": one.name, "error": one.error} for one in failed]
-        print_json(formats.as_json({**facts, "failures": failures, "files": files}), indent=1)
+        facts = formats.as_json({**found.facts, "failures": failures, "files": paths})
+        print_json(facts, indent=1)
     else:
-        if len(shown.shown):
-            show(list(shown.shown.columns), shown.shown.to_numpy().tolist(), texts=shown.texts)
-            print_lines(legend)
-        print_notes(*notes)
-        print_lines(*files)
+        if len(rows := found.shown.shown):
+            show(list(rows.columns), rows.to_numpy().tolist(), texts=found.shown.texts)
+            print_lines(found.legend)
+        print_notes(*found.notes)
+        print_lines(*paths)
     if failed:
         print_notes(
             f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
             f"same command tries them again"
         )
         raise typer.Exit(1)
-
-
-def _score_table(scores: Sequence[Row]) -> formats.Table:
-    has_recovery = any(one["recovery"] for one in scores)
-    texts = [
-        {
-            "robot": one["robot"],
-            "gap": f"{one['gap']:g}",
-            "comparator": one["comparator"],
-            "trials": str(one["trials"]),
-            "right": f"{one['right']} of {one['runs']}",
-            "right, %": _interval(one["correct"], 100, ".0f"),
-            "time": _interval(one["time"]),
-            **({"recovered ÷ before": _interval(one["recovery"])} if has_recovery else {}),
-        }
-        for one in scores
-    ]
-    return formats.table_of("scores", scores, texts, texts=3)
-
-
-def _summary_texts(one: Row) -> dict[str, str]:
-    share = one["correct"]
-    ends = f"({100 * share.low:.0f} to {100 * share.high:.0f})"
-    return {
-        "robot": one["robot"],
-        "case": "single faults" if one["case"] is None else str(one["case"]),
-        "truth": one["truth"],
-        "right": f"{one['right']} of {one['runs']} {ends}",
-        **{name: f"{one[name]:.2f}" for name in ("before", "after", "recovered")},
-        "recovered ÷ before": "-" if one["recovery"] is None else f"{one['recovery']:.2f}",
-        "upright": f"{one['upright']} of {one['runs']}",
-        **{name: f"{one[name]:.0f}" for name in ("trials", "seconds")},
-    }
-
-
-def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -> str:
-    if interval is None:
-        return "-"
-    estimate, low, high = (
-        format(factor * one, form) for one in (interval.estimate, interval.low, interval.high)
-    )
-    known = not math.isnan(interval.low + interval.high)
-    return f"{estimate} ({low} to {high})" if known else estimate
 
 
 def run_shown(study: Study, options: Options) -> Sequence[CellEnds]:

@@ -5,7 +5,6 @@ Source: J. C. Bongard and H. Lipson, *Automated Damage Diagnosis and Recovery fo
 its Table II are not available, so nothing here is read from them.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -149,14 +148,23 @@ def collect(folder: Path) -> PaperResults:
     )
 
 
-def write_results(folder: Path) -> tuple[PaperResults, tuple[Path, ...]]:
-    """Writes page, tables and figures of all finished runs in the folder of an experiment.
+def results_of(folder: Path) -> tables.Results:
+    """Returns page, tables and figures of all finished runs in the folder of an experiment.
 
-    Without a finished recovery, nothing is written.
+    Without a finished recovery, there are no files.
     """
     results = collect(folder)
-    if not results.recoveries:
-        return results, ()
+    every = tables_of(results)
+    return tables.Results(
+        results.as_dict(),
+        every,
+        every[1],
+        "Medians over the runs, m; the paper: whether it reports the case as restored.",
+        _files(results, every) if results.recoveries else {},
+    )
+
+
+def _files(results: PaperResults, every: Sequence[Table]) -> dict[str, bytes]:
     robots = dict.fromkeys(row["robot"] for row in results.recoveries)
     drawn = {
         "figure-1": figures.robots([ROBOTS[name].robot() for name in robots]),
@@ -165,15 +173,15 @@ def write_results(folder: Path) -> tuple[PaperResults, tuple[Path, ...]]:
     if costs := results.costs():  # comparators that have no run in common cannot be compared
         drawn["figure-6"] = figures.by_cost(costs, ON_ROBOT, REPORTED)
     rows = {name: getattr(results, name) for name in ("recoveries", "trials", "evolution")}
-    every = [*tables_of(results), *(table_of(name, one) for name, one in rows.items())]
     files: dict[str, bytes] = {}
     for name, figure in drawn.items():
         files |= figures.files_of(name, figure)
-    files |= tables.table_files(every, "csv")
-    text = json.dumps(results.as_dict(), indent=1, allow_nan=False)
-    files["results.json"] = f"{text}\n".encode()
-    files["paper.md"] = page(results).encode()
-    return results, tables.write_files(folder, files)
+    files |= tables.table_files([*every, *(table_of(*item) for item in rows.items())], "csv")
+    return {
+        **files,
+        "results.json": tables.json_bytes(results.as_dict()),
+        "paper.md": page(results).encode(),
+    }
 
 
 def tables_of(results: PaperResults) -> list[Table]:

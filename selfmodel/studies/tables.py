@@ -1,10 +1,11 @@
-"""Tables of studies: summaries of their rows, and files in the formats of papers and programs."""
+"""Results of studies: summaries of their rows, and tables in the formats of papers and programs."""
 
 import dataclasses
 import io
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean, median
 from types import MappingProxyType
@@ -15,8 +16,9 @@ import pandas as pd
 from selfmodel.arrays import finite_or_none
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.logs.files import make_folder, replace_file
-from selfmodel.studies.comparisons import ends
-from selfmodel.studies.rows import KINDS, REFERENCE, frame_of
+from selfmodel.studies import figures
+from selfmodel.studies.comparisons import balance_warnings, ends
+from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
 
@@ -169,20 +171,105 @@ def _flat(record: Row, intervals: set[str]) -> Row:
     return flat
 
 
-def results_files(
-    name: str, rows: Sequence[Row], key: str, summaries: Sequence[Row]
-) -> dict[str, bytes]:
-    """Returns the files ``results.csv`` and ``results.json`` of a study.
+@dataclass(frozen=True)
+class Results:
+    """Results of all finished runs of a study.
 
-    Args:
-        name: Name of the study.
-        rows: Its rows.
-        key: Name of its summaries in JSON.
-        summaries: Its summaries.
+    Attributes:
+        facts: Its rows and summaries, by the keys of ``results.json``.
+        tables: Tables of the summaries.
+        shown: The table for readers, and ``legend``, the line below it.
+        files: Content of its files, by their path in the folder of the study.
+        notes: Warnings.
     """
-    text = json.dumps(as_json({"rows": rows, key: summaries}), indent=1, allow_nan=False)
-    table = csv_bytes(frame_of(rows, KINDS[name].columns))
-    return {"results.csv": table, "results.json": f"{text}\n".encode()}
+
+    facts: Mapping[str, Any]
+    tables: Sequence[Table]
+    shown: Table
+    legend: str
+    files: Mapping[str, bytes]
+    notes: Sequence[str] = field(default=())
+
+
+def ablation_results(folder: Path) -> Results:
+    """Returns the results of an ablation, with its figures."""
+    rows = study_rows("ablate", folder)
+    scores = ablation_scores(rows)
+    ends = {one["trials"] for one in scores}
+    shown = [one for one in scores if one["trials"] in (min(ends), max(ends))]
+    drawn = figures.of_ablation(rows, scores)
+    warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
+    facts = {"rows": rows, "scores": scores}
+    return Results(
+        facts,
+        [_score_table(scores)],
+        _score_table(shown),
+        "With 95 % intervals; time as a multiple of the paper's comparator's.",
+        _files("ablate", facts) | {f"figures/{name}": data for name, data in drawn.items()},
+        [f"warning: {warning}" for warning in warnings],
+    )
+
+
+def suite_results(folder: Path) -> Results:
+    """Returns the results of a study of bodies."""
+    facts = {"rows": (rows := study_rows("suite", folder)), "summaries": suite_summaries(rows)}
+    texts = list(map(_summary_texts, facts["summaries"]))
+    table = table_of("summaries", facts["summaries"], texts, texts=3)
+    legend = "Medians over the runs; right with its 95 % interval, %."
+    return Results(facts, [table], table, legend, _files("suite", facts))
+
+
+def _files(name: str, facts: Mapping[str, Any]) -> dict[str, bytes]:
+    return {
+        "results.csv": csv_bytes(frame_of(facts["rows"], KINDS[name].columns)),
+        "results.json": json_bytes(facts),
+    }
+
+
+def _score_table(scores: Sequence[Row]) -> Table:
+    has_recovery = any(one["recovery"] for one in scores)
+    texts = [
+        {
+            "robot": one["robot"],
+            "gap": f"{one['gap']:g}",
+            "comparator": one["comparator"],
+            "trials": str(one["trials"]),
+            "right": f"{one['right']} of {one['runs']}",
+            "right, %": _interval(one["correct"], 100, ".0f"),
+            "time": _interval(one["time"]),
+            **({"recovered ÷ before": _interval(one["recovery"])} if has_recovery else {}),
+        }
+        for one in scores
+    ]
+    return table_of("scores", scores, texts, texts=3)
+
+
+def _summary_texts(one: Row) -> dict[str, str]:
+    share = one["correct"]
+    ends = f"({100 * share.low:.0f} to {100 * share.high:.0f})"
+    return {
+        "robot": one["robot"],
+        "case": "single faults" if one["case"] is None else str(one["case"]),
+        "truth": one["truth"],
+        "right": f"{one['right']} of {one['runs']} {ends}",
+        **{name: f"{one[name]:.2f}" for name in ("before", "after", "recovered")},
+        "recovered ÷ before": "-" if one["recovery"] is None else f"{one['recovery']:.2f}",
+        "upright": f"{one['upright']} of {one['runs']}",
+        **{name: f"{one[name]:.0f}" for name in ("trials", "seconds")},
+    }
+
+
+def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -> str:
+    if interval is None:
+        return "-"
+    estimate, low, high = (format(factor * end, form) for end in dataclasses.astuple(interval))
+    known = not math.isnan(interval.low + interval.high)
+    return f"{estimate} ({low} to {high})" if known else estimate
+
+
+def json_bytes(facts: Mapping[str, Any]) -> bytes:
+    """Returns rows and summaries as a JSON file."""
+    return f"{json.dumps(as_json(facts), indent=1, allow_nan=False)}\n".encode()
 
 
 def csv_bytes(frame: pd.DataFrame) -> bytes:
