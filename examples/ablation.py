@@ -8,8 +8,7 @@ from pathlib import Path
 
 from selfmodel.settings import Settings
 from selfmodel.studies import ablation
-from selfmodel.studies.rows import study_rows
-from selfmodel.studies.tables import ablation_scores, results_files, write_files
+from selfmodel.studies.tables import ablation_results, write_files
 
 
 def main(folder: Path) -> None:
@@ -24,13 +23,12 @@ def main(folder: Path) -> None:
         settings=Settings(steps=60, generations=2, trials=1).scaled(8),
     )
     failed = study.run(workers=2, on_progress=print)
-    rows = study_rows("ablate", folder)
-    scores = ablation_scores(rows)
-    for score in scores:
+    found = ablation_results(folder)
+    for score in found.facts["scores"]:
         name, trials = score["comparator"], score["trials"]
         print(f"{name}, {trials} trials: {score['right']} of {score['runs']} right")
-    table, *_ = write_files(folder, results_files("ablate", rows, "scores", scores))
-    print(f"{len(rows)} rows, {len(failed)} failed: {table}")
+    table, *_ = write_files(folder, found.files)
+    print(f"{len(found.facts['rows'])} rows, {len(failed)} failed: {table}")
 
 
 if __name__ == "__main__":  # the grid's processes import this file

@@ -420,7 +420,7 @@ def simulated_robot(
     robot = arguments.robot_of(robot)
     hidden = arguments.hypothesis_of(hypothesis, robot)
     stream = 1 if hidden.faults else 0
-    return draw_reality(robot, seed, gap).robot(robot, hidden, stream)
+    return SimulatedRobot(robot, hidden, draw_reality(robot, seed, gap), stream)
 
 
 @dataclass(frozen=True, eq=False)

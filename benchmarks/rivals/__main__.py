@@ -26,6 +26,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
 from selfmodel.recovery.repair import RobustFitness
@@ -33,7 +34,8 @@ from selfmodel.recovery.scores import UPRIGHT
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.domain import DomainDistribution, start_spread
-from selfmodel.simulation.model_factors import exact
+from selfmodel.simulation.model_factors import exact, with_model
+from selfmodel.simulation.reality_gap import perturbed_model
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
@@ -165,16 +167,17 @@ def problem_of(
     shared, method, seed = (parameters[name] for name in ("shared", "method", "seed"))
     robot, steps = recoveries.planned_entry(parameters).robot(), shared["steps"]
     truth = parse(parameters["truth"], robot.anatomy)
-    reality = draw_reality(robot, seed, parameters["gap"])
+    gap = draw_reality(robot, seed, parameters["gap"])
     simulator = Simulator(robot, threads=1)
-    twin = Simulator(reality.hidden_model(robot), 1, simulator.stats)
+    hidden = with_model(robot, perturbed_model(robot.model, gap), robot.control_delay + gap.delay)
+    twin = Simulator(hidden, 1, simulator.stats)
     key = int.from_bytes(hashlib.sha256(method.encode()).digest()[:4])
     rng, design = np.random.default_rng([seed, key]), network_for(robot)
     settings = Settings().scaled(shared["population"])
     own = {ORACLE: ORACLE_TRIALS, "physical-evolution": shared["evolution_trials"]}
-    level = reality.gap.level
+    level = gap.level
     problem = Problem(
-        physical=reality.robot(robot, truth, PHYSICAL),
+        physical=SimulatedRobot(robot, truth, gap, PHYSICAL),
         robot=robot,
         normal=build(robot, truth).normal,
         steps=steps,

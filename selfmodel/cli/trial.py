@@ -15,6 +15,7 @@ from selfmodel.faults.sensors import silent_neurons
 from selfmodel.logs.files import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality
@@ -27,7 +28,7 @@ def trial(options: RunTrial) -> None:
     inputs.check_log_name(options.out)
     space = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds))
     hidden = space.parse("intact" if options.damage is None else options.damage)
-    reality = draw_reality(robot, options.seed, options.gap)
+    gap = draw_reality(robot, options.seed, options.gap)
     kind = "network" if options.controller is None else options.controller
     if kind in DESIGNS:
         design = plugins.design(kind, robot, options.neurons)
@@ -38,9 +39,9 @@ def trial(options: RunTrial) -> None:
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
     plan = TrialPlan("trial", inputs.stage(options.stage), driver, settings.steps, options.seed)
-    header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
+    header = TrialHeader(settings, hidden=str(hidden), gap=gap.text)
     try:
-        logged = run_trial(reality.robot(robot, hidden), plan, options.out, robot, header)
+        logged = run_trial(SimulatedRobot(robot, hidden, gap), plan, options.out, robot, header)
     except KeyboardInterrupt as interruption:
         if (part := partial_path(options.out)).exists():
             interruption.add_note(f"the steps so far are in {part}")

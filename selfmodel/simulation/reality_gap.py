@@ -2,9 +2,9 @@
 
 import copy
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -53,9 +53,12 @@ class RealityGap:
     delay: int
     seed: int
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns the attributes as plain values, for a log."""
-        return dataclasses.asdict(self)
+    @property
+    def text(self) -> str | None:
+        """Hidden record of a trial log, as JSON; None for no gap."""
+        if self.level == 0:
+            return None
+        return json.dumps({**dataclasses.asdict(self), "structure": None}, allow_nan=False)
 
 
 def draw_gap_of(

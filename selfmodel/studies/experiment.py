@@ -1,6 +1,5 @@
 """Recovery of a simulated physical robot with known faults: definition, score, run, correctness."""
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,8 +38,7 @@ from selfmodel.recovery.scores import (
 from selfmodel.recovery.tracking import Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.model_factors import with_model
-from selfmodel.simulation.reality_gap import RealityGap, perturbed_model
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import Entry
@@ -111,11 +109,14 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     start = perf_counter()
     robot, truth, threads = experiment.robot, experiment.truth, experiment.threads
     simulator = Simulator(robot, threads)
-    reality = draw_reality(robot, experiment.seed, experiment.gap)
-    if experiment.physical is not None and reality.text is None:
-        healthy, damaged = (experiment.physical(robot, hidden) for hidden in (INTACT, truth))
-    else:
-        healthy, damaged = reality.robot(robot), reality.robot(robot, truth, stream=1)
+    gap = draw_reality(robot, experiment.seed, experiment.gap)
+    physical: list[PhysicalRobot] = [
+        SimulatedRobot(robot, hidden, gap, stream)
+        if experiment.physical is None or gap.level
+        else experiment.physical(robot, hidden)
+        for stream, hidden in enumerate((INTACT, truth))
+    ]
+    healthy, damaged = physical
     check_measurable(experiment.score, robot, observed_of(healthy, damaged))
     journal = create_journal(
         experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
@@ -125,7 +126,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         simulator=simulator,
         choose_comparator=experiment.choose_comparator,
         run_trial=TrialRunner(
-            journal.trials, robot, experiment.settings, hidden=hidden, gap=reality.text
+            journal.trials, robot, experiment.settings, hidden=hidden, gap=gap.text
         ),
         store_diagnosis=journal.add,
         settings=experiment.settings,
@@ -147,32 +148,9 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     return Outcome(recovery, correct, simulator.stats, seconds)
 
 
-@dataclass(frozen=True)
-class Reality:
-    """Difference between a physical robot and its model, apart from faults; level 0 is none."""
-
-    gap: RealityGap
-
-    @property
-    def text(self) -> str | None:
-        """Hidden record of a trial log, as JSON; None if the robot equals its model."""
-        if self.gap.level == 0:
-            return None
-        return json.dumps({**self.gap.as_dict(), "structure": None}, allow_nan=False)
-
-    def hidden_model(self, robot: Robot) -> Robot:
-        """Returns a robot whose model has the factors and the delay of the gap, for an oracle."""
-        model = perturbed_model(robot.model, self.gap)
-        return with_model(robot, model, robot.control_delay + self.gap.delay)
-
-    def robot(self, robot: Robot, hidden: Hypothesis = INTACT, stream: int = 0) -> SimulatedRobot:
-        """Returns the physical robot with hidden faults; see ``SimulatedRobot``."""
-        return SimulatedRobot(robot, hidden, self.gap, stream)
-
-
-def draw_reality(robot: Robot, seed: int, level: float) -> Reality:
+def draw_reality(robot: Robot, seed: int, level: float) -> RealityGap:
     """Returns the gap of a physical robot; a search with the same seed draws other numbers."""
-    return Reality(draw_gap(robot, level, random_stream(seed, "gap")))
+    return draw_gap(robot, level, random_stream(seed, "gap"))
 
 
 def is_correct(

@@ -31,6 +31,7 @@ from selfmodel.logs.files import replace_file
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import RepairSearch
@@ -203,15 +204,15 @@ def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str
     truth = truth_of(parameters, robot)
     before: list[tuple[Stage, Hypothesis]] = [("before", INTACT)] * HEALTHY_TRIALS
     after: list[tuple[Stage, Hypothesis]] = [("after", truth)] * settings.trials
-    reality = experiments.draw_reality(robot, seed, parameters["gap"])
+    gap = experiments.draw_reality(robot, seed, parameters["gap"])
     trials: list[Trial] = []
     for number, (stage, hidden) in enumerate([*before, *after]):
         name = f"{number:02d}-{stage}"
         gait = gaits[number if stage == "before" else number - HEALTHY_TRIALS]
         # Noise differs between trials and is the same for every comparator.
-        physical = reality.robot(robot, hidden, stream=number)
+        physical = SimulatedRobot(robot, hidden, gap, stream=number)
         plan = TrialPlan(name, stage, gait, settings.steps, seed)
-        header = TrialHeader(settings, hidden=str(hidden), gap=reality.text)
+        header = TrialHeader(settings, hidden=str(hidden), gap=gap.text)
         trials.append(run_trial(physical, plan, folder / f"{name}.mcap", robot, header))
     calibrated = calibrate(robot, trials[:HEALTHY_TRIALS], threads=1).robot
     replace_file(folder / CALIBRATED, calibrated.mjcf.encode())

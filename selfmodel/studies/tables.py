@@ -195,8 +195,8 @@ def ablation_results(folder: Path) -> Results:
     """Returns the results of an ablation, with its figures."""
     rows = study_rows("ablate", folder)
     scores = ablation_scores(rows)
-    ends = {one["trials"] for one in scores}
-    shown = [one for one in scores if one["trials"] in (min(ends), max(ends))]
+    counts = {one["trials"] for one in scores}
+    shown = [one for one in scores if one["trials"] in (min(counts), max(counts))]
     drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
@@ -246,12 +246,12 @@ def _score_table(scores: Sequence[Row]) -> Table:
 
 def _summary_texts(one: Row) -> dict[str, str]:
     share = one["correct"]
-    ends = f"({100 * share.low:.0f} to {100 * share.high:.0f})"
+    interval = f"({100 * share.low:.0f} to {100 * share.high:.0f})"
     return {
         "robot": one["robot"],
         "case": "single faults" if one["case"] is None else str(one["case"]),
         "truth": one["truth"],
-        "right": f"{one['right']} of {one['runs']} {ends}",
+        "right": f"{one['right']} of {one['runs']} {interval}",
         **{name: f"{one[name]:.2f}" for name in ("before", "after", "recovered")},
         "recovered ÷ before": "-" if one["recovery"] is None else f"{one['recovery']:.2f}",
         "upright": f"{one['upright']} of {one['runs']}",

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -10,18 +9,18 @@ import numpy as np
 import pytest
 
 from selfmodel.settings import Settings
-from selfmodel.studies import figures
+from selfmodel.studies import figures, paper_page
 from selfmodel.studies.paper_page import (
     NOT_RESTORED,
     UNKNOWN,
     PaperResults,
     best_so_far,
     page,
+    results_of,
     tables_of,
-    write_results,
 )
 from selfmodel.studies.recoveries import ON_ROBOT
-from selfmodel.studies.tables import csv_bytes
+from selfmodel.studies.tables import csv_bytes, write_files
 from selfmodel.tasks import ROBOTS
 from tests.helpers.study_rows import evolution, recovery, trials
 
@@ -80,9 +79,9 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     rows = [recovery(), recovery(case=7, correct=False), recovery(robot="hexapod", case=7)]
     rows += [recovery(robot="hexapod", case=7, seed=1, distinct_hypotheses=51)]
     given = results(rows, trials([2.0, 0.0, 1.0, 3.0]), evolution([1.0]))
-    monkeypatch.setattr(sys.modules[write_results.__module__], "collect", lambda _folder: given)
+    monkeypatch.setattr(paper_page, "collect", lambda _folder: given)
     monkeypatch.setattr(figures, "files_of", lambda name, _figure: {f"{name}.png": b""})
-    _, files = write_results(tmp_path)
+    files = write_files(tmp_path, results_of(tmp_path).files)
     text = (tmp_path / "paper.md").read_text()
 
     assert {path.stem for path in files if path.suffix == ".png"} == {
