@@ -13,7 +13,6 @@ from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.faults.registry import kind_names
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import paper_page, plans, tables as formats
@@ -35,7 +34,7 @@ def ablate(options: Ablate) -> None:
         robots=inputs.texts("--robots", options.robots, ROBOTS),
         cases=None if cases == "all" else numbers,
         damages=[damage.strip() for damage in options.damages.split(",") if damage.strip()],
-        kinds=kind_names(options.kinds),
+        kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", options.gaps),
         seeds=options.every_seed,
@@ -71,7 +70,7 @@ def run_suite(options: RunSuite) -> None:
         score=options.score,
         controller=options.controller,
         comparator=options.comparator,
-        kinds=kind_names(options.kinds),
+        kinds=options.kinds,
         gap=options.gap,
         neurons=options.neurons,
         repair=options.repair,

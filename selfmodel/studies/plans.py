@@ -15,7 +15,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, notation_kinds
+from selfmodel.faults.registry import kind_names, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
@@ -33,10 +33,6 @@ comparator; or, after the first trial, as in a recovery, by the diagnosis so far
 
 GAITS = 6
 """Number of gaits per robot in the bank."""
-
-DEFAULT_KIND_NAMES, PAPER_KIND_NAMES = (
-    ",".join(kind.name for kind in kinds) for kinds in (DEFAULT_KINDS, PAPER_KINDS)
-)
 
 TABLE_ONE: Mapping[int, str] = MappingProxyType(
     {
@@ -81,7 +77,7 @@ def ablation(
     seeds: Sequence[int],
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: Sequence[str] = (),
-    kinds: str = DEFAULT_KIND_NAMES,
+    kinds: str = "default",
     next_trial: str = BANK,
     bank: Path | None = None,
     score: str | None = None,
@@ -141,7 +137,7 @@ def ablation(
     @cache
     def gait(robot: str, number: int) -> Cell:
         if bank is None:
-            return recoveries.gait_cell(models[robot], settings, number, chosen)
+            return recoveries.gait_cell(models[robot], shared, number)
         return recoveries.given_gait_cell(bank, models[robot], number)
 
     def needs(point: Point) -> dict[str, Cell]:
@@ -169,7 +165,7 @@ def suite(
     comparator: str,
     controller: str = "network",
     neurons: int | None = None,
-    kinds: str = PAPER_KIND_NAMES,
+    kinds: str = "paper",
     gap: float = 0.0,
     score: str | None = None,
     repair: str = plugins.PAPER,
@@ -202,9 +198,9 @@ def suite(
             if truth and max(silent_neurons(parse(truth, robot.anatomy)), default=-1) < hidden:
                 point = _point(models[body], case, truth, gap, seed)
                 points.append({**point, "comparator": comparator})
-    design = {"controller": controller, "neurons": neurons}
-    shared = {**_shared(settings, kinds, chosen), **design, "comparator": comparator, "gap": gap}
-    return _study("suite", folder, points, shared, _one_gait(models, settings, chosen, **design))
+    shared = _shared(settings, kinds, chosen) | {"comparator": comparator, "gap": gap}
+    shared |= {"controller": controller, "neurons": neurons}
+    return _study("suite", folder, points, shared, _one_gait(models, shared))
 
 
 def paper(
@@ -238,21 +234,16 @@ def paper(
         for seed, robot, case in itertools.product(seeds, robots, cases)
         for way in (*comparators, ON_ROBOT)
     ]
-    shared = {**_shared(settings, PAPER_KIND_NAMES, chosen), "calibrated": False}
-    return _study("paper", folder, points, shared, _one_gait(models, settings, chosen))
+    shared = {**_shared(settings, "paper", chosen), "calibrated": False}
+    return _study("paper", folder, points, shared, _one_gait(models, shared))
 
 
-def _one_gait(
-    models: Mapping[str, Mapping[str, str]],
-    settings: Settings,
-    repair: Mapping[str, str],
-    **design: Any,  # noqa: ANN401  # name and neurons
-) -> Needs:
+def _one_gait(models: Mapping[str, Mapping[str, str]], shared: Mapping[str, Any]) -> Needs:
     """Returns the needs of a recovery: the gait of its robot and seed."""
 
     @cache
     def gait(robot: str, seed: int) -> Cell:
-        return recoveries.gait_cell(models[robot], settings, seed, repair, **design)
+        return recoveries.gait_cell(models[robot], shared, seed)
 
     return lambda point: {"gait": gait(point["robot"], point["seed"])}
 
@@ -301,7 +292,7 @@ def _shared(
     """Returns the parameters of all points: those of a recovery, with their defaults."""
     return {
         "settings": dataclasses.asdict(settings),
-        "kinds": kinds,
+        "kinds": kind_names(kinds),
         **repair,
         "next_trial": next_trial,
         "controller": "network",

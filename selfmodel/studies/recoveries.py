@@ -111,33 +111,20 @@ def repair_parameters(repair: str, search: str | None, score: str | None) -> dic
     }
 
 
-def gait_cell(
-    robot: Parameters,
-    settings: Settings,
-    seed: int,
-    repair: Parameters,
-    *,
-    controller: str = "network",
-    neurons: int | None = None,
-) -> Cell:
+def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
     """Returns the cell of the first gait of a recovery with the same seed.
 
     Args:
         robot: The robot, as ``planned``.
-        settings: Parameters of the repair.
+        shared: Parameters of the recoveries, of which some determine the gait.
         seed: Seed of all random numbers.
-        repair: The repair that evolves the gait, as ``repair_parameters``.
-        controller: Name of the controller design.
-        neurons: Number of hidden neurons; None for the design's default.
     """
-    values = dataclasses.asdict(settings)
+    settings = shared["settings"].items()
     parameters = {
         **robot,
         "seed": seed,
-        "settings": {name: values[name] for name in values if name not in DIAGNOSIS_SETTINGS},
-        "controller": controller,
-        "neurons": neurons,
-        **repair,
+        "settings": {name: value for name, value in settings if name not in DIAGNOSIS_SETTINGS},
+        **{name: shared[name] for name in ("controller", "neurons", "repair", "search", "score")},
     }
     name = f"{robot_key(robot['robot'])}-seed{seed:03d}"
     return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits")
