@@ -30,11 +30,13 @@ def expanded(words: list[str]) -> list[str]:
 
 
 def shortened(words: list[str]) -> list[str]:
-    """The arguments of a command, with a small search or one process where the page has more."""
+    """The arguments of a command, with a small search, few kinds or one process where it may."""
     if words[0] in ("ablate", "suite") and "--out" in words and "--workers" not in words:
         return [*words, "--workers", "1"]
     searches = words[0] in ("diagnose", "report", "recover") and "--help" not in words
-    return [*words, *SMALL] if searches and "--population" not in words else words
+    small = SMALL if "--population" not in words else ()
+    few = ("--kinds", "paper") if "--kinds" not in words else ()
+    return [*words, *small, *few] if searches else words
 
 
 def name_of(page: Path) -> str:
