@@ -83,7 +83,14 @@ def test_a_calibrated_model_is_one_for_replay_and_diagnose(folder: Path):
     errors = [json.loads(run.stdout)["rms"]["joint_positions"] for run in (replayed, plain)]
     assert json.loads(replayed.stdout)["model"] == "fit.xml"
     assert errors[0] != errors[1]
-    diagnose = ("diagnose", "after.mcap", "--comparator", "forward-displacement", "--json")
+    diagnose = (
+        "diagnose",
+        "after.mcap",
+        "--comparator",
+        "forward-displacement",
+        "--kinds",
+        "break",
+    )
     succeeds(*diagnose, "--robot", "fit.xml", cwd=folder)
 
 

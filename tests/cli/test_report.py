@@ -8,6 +8,7 @@ import pytest
 from selfmodel.report.charts import Report, html_of
 from tests.helpers.command import SMALL, refused, selfmodel, succeeds
 
+FEW = (*SMALL, "--kinds", "break,jam-angle")
 BANK = Path(__file__).parents[2] / "benchmarks" / "bank" / "quadruped-0.npz"
 
 
@@ -25,7 +26,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def diagnosed(logs: Path) -> Path:
     """The JSON file of a diagnosis of the logs."""
-    done = succeeds("diagnose", "before.mcap", "after.mcap", *SMALL, "--json", cwd=logs)
+    done = succeeds("diagnose", "before.mcap", "after.mcap", *FEW, "--json", cwd=logs)
     (logs / "found.json").write_text(done.stdout)
     return logs / "found.json"
 
@@ -34,7 +35,7 @@ def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_s
     logs: Path, diagnosed: Path
 ):
     given = ("before.mcap", "after.mcap")
-    done = selfmodel("report", *given, *SMALL, "--json", "-o", "a.html", cwd=logs)
+    done = selfmodel("report", *given, *FEW, "--json", "-o", "a.html", cwd=logs)
     again = selfmodel(
         "report", *reversed(given), "--diagnosis", diagnosed.name, "-o", "again.html", cwd=logs
     )
