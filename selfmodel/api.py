@@ -36,7 +36,7 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trajectory import samples_of
-from selfmodel.trials.trial import Stage, Trial, TrialPlan
+from selfmodel.trials.trial import Stage, Trial, TrialPlan, by_stage
 
 
 def evolve_controller(
@@ -478,9 +478,3 @@ def set_up_diagnosis(
     )
     drawn = damaged[0].plan.seed if seed is None else seed
     return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn)
-
-
-def by_stage(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], tuple[Trial, ...]]:
-    """Returns the trials to explain, and those of the stage ``before`` unless all are."""
-    failed = tuple(trial for trial in trials if trial.plan.stage != "before") or tuple(trials)
-    return failed, tuple(trial for trial in trials if trial not in failed)

@@ -256,90 +256,38 @@ columns of a Float64MultiArray are named by their index; of types with one colum
 """
 
 
-_LINE = "=" * 80
-_UNITREE_HEAD = """\
-uint8[2] head
-uint8 level_flag
-uint8 frame_reserve
-uint32[2] sn
-uint32[2] version
-uint16 bandwidth
-"""
+_FIELDS = {
+    "Head": "uint8[2] head, uint8 level_flag, uint8 frame_reserve, uint32[2] sn, "
+    "uint32[2] version, uint16 bandwidth",
+    "LowState": "IMUState imu_state, MotorState[20] motor_state, BmsState bms_state, "
+    "int16[4] foot_force, int16[4] foot_force_est, uint32 tick, uint8[40] wireless_remote, "
+    "uint8 bit_flag, float32 adc_reel, int8 temperature_ntc1, int8 temperature_ntc2, "
+    "float32 power_v, float32 power_a, uint16[4] fan_frequency, uint32 reserve, uint32 crc",
+    "IMUState": "float32[4] quaternion, float32[3] gyroscope, float32[3] accelerometer, "
+    "float32[3] rpy, int8 temperature",
+    "MotorState": "uint8 mode, float32 q, float32 dq, float32 ddq, float32 tau_est, "
+    "float32 q_raw, float32 dq_raw, float32 ddq_raw, int8 temperature, uint32 lost, "
+    "uint32[2] reserve",
+    "BmsState": "uint8 version_high, uint8 version_low, uint8 status, uint8 soc, int32 current, "
+    "uint16 cycle, int8[2] bq_ntc, int8[2] mcu_ntc, uint16[15] cell_vol",
+    "LowCmd": "MotorCmd[20] motor_cmd, BmsCmd bms_cmd, uint8[40] wireless_remote, uint8[12] led, "
+    "uint8[2] fan, uint8 gpio, uint32 reserve, uint32 crc",
+    "MotorCmd": "uint8 mode, float32 q, float32 dq, float32 tau, float32 kp, float32 kd, "
+    "uint32[3] reserve",
+    "BmsCmd": "uint8 off, uint8[3] reserve",
+}
+
+
+def _defined(name: str, *nested: str) -> str:
+    texts = [f"{_FIELDS['Head']}, {_FIELDS[name]}"]
+    texts += [f"MSG: unitree_go/{part}, {_FIELDS[part]}" for part in nested]
+    return f"{'=' * 80}\n".join(text.replace(", ", "\n") + "\n" for text in texts)
+
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
-        "unitree_go/msg/LowState": f"""\
-{_UNITREE_HEAD}IMUState imu_state
-MotorState[20] motor_state
-BmsState bms_state
-int16[4] foot_force
-int16[4] foot_force_est
-uint32 tick
-uint8[40] wireless_remote
-uint8 bit_flag
-float32 adc_reel
-int8 temperature_ntc1
-int8 temperature_ntc2
-float32 power_v
-float32 power_a
-uint16[4] fan_frequency
-uint32 reserve
-uint32 crc
-{_LINE}
-MSG: unitree_go/IMUState
-float32[4] quaternion
-float32[3] gyroscope
-float32[3] accelerometer
-float32[3] rpy
-int8 temperature
-{_LINE}
-MSG: unitree_go/MotorState
-uint8 mode
-float32 q
-float32 dq
-float32 ddq
-float32 tau_est
-float32 q_raw
-float32 dq_raw
-float32 ddq_raw
-int8 temperature
-uint32 lost
-uint32[2] reserve
-{_LINE}
-MSG: unitree_go/BmsState
-uint8 version_high
-uint8 version_low
-uint8 status
-uint8 soc
-int32 current
-uint16 cycle
-int8[2] bq_ntc
-int8[2] mcu_ntc
-uint16[15] cell_vol
-""",
-        "unitree_go/msg/LowCmd": f"""\
-{_UNITREE_HEAD}MotorCmd[20] motor_cmd
-BmsCmd bms_cmd
-uint8[40] wireless_remote
-uint8[12] led
-uint8[2] fan
-uint8 gpio
-uint32 reserve
-uint32 crc
-{_LINE}
-MSG: unitree_go/MotorCmd
-uint8 mode
-float32 q
-float32 dq
-float32 tau
-float32 kp
-float32 kd
-uint32[3] reserve
-{_LINE}
-MSG: unitree_go/BmsCmd
-uint8 off
-uint8[3] reserve
-""",
+        "unitree_go/msg/LowState": _defined("LowState", "IMUState", "MotorState", "BmsState"),
+        "unitree_go/msg/LowCmd": _defined("LowCmd", "MotorCmd", "BmsCmd"),
     }
 )
 """Definitions of types in bags that have none: those in SQLite of ROS 2 before Iron."""

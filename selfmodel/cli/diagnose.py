@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 from selfmodel import arguments, plugins
-from selfmodel.api import LogDiagnosis, by_stage, set_up_diagnosis
+from selfmodel.api import LogDiagnosis, set_up_diagnosis
 from selfmodel.cli.commands import Diagnose, FromLogs
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
@@ -22,7 +22,7 @@ from selfmodel.logs import TrialLog
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.trial import trial_names
+from selfmodel.trials.trial import by_stage, trial_names
 
 
 def diagnose(options: Diagnose) -> None:

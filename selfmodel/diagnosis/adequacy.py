@@ -26,7 +26,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
-from selfmodel.diagnosis.losses import LossTable, Problem
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPart, have_one_gait

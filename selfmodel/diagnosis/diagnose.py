@@ -20,7 +20,8 @@ from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Change, Diagnosis
 from selfmodel.diagnosis.joints import with_joint_faults
-from selfmodel.diagnosis.losses import Calibrate, LossFunction, LossTable, Problem, Timeline
+from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
+from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.diagnosis.search import LocalSearch, evolved
 from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import Generation

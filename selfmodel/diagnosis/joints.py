@@ -24,7 +24,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis import significance
-from selfmodel.diagnosis.losses import Problem
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.search import LocalSearch, with_fitted_severity
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import Fault

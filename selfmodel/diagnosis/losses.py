@@ -1,4 +1,4 @@
-"""Losses of hypotheses on logged trials, and the problem that a diagnosis solves with them."""
+"""Losses of hypotheses on logged trials, by a comparator."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray, median_of_known
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.diagnosis.choice import contract_error, prepared_trial
 from selfmodel.diagnosis.comparator import (
     Comparator,
@@ -19,28 +19,18 @@ from selfmodel.diagnosis.comparator import (
 )
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.joints import JAMMED_AT_ANGLE, OF_MOTORS, SERVO_GAIN, WEAK_MOTOR
-from selfmodel.faults.kind import Fault
-from selfmodel.progress import Observer, ignore
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.requests import END, ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
+from selfmodel.trials.trial import Trial, TrialPart, whole
 
 Parts = Sequence[Trial | TrialPart]
 
 LossFunction = Callable[[Sequence[Hypothesis]], FloatArray]
 """Returns the losses of some hypotheses, ``(n, pieces)``; inf where a simulation diverged."""
-
-Calibrate = Callable[[Sequence[Trial]], Calibration]
-"""Fits the self-model to some trials of the healthy robot."""
 
 OPENING, MIN_OPENING = 1 / 3, 100
 """Part of a trial that is simulated, from its beginning, if the comparator has no surrogate, and
@@ -50,15 +40,6 @@ two simulations differ."""
 MANY_TRIALS = 3
 """Trials from which on the surrogate of the surrogate is enough: together they have as many pieces
 as one trial by the surrogate."""
-
-MIN_SURROGATE_PIECES = 2
-"""Pieces of the surrogate comparator that a search in a part of the trials needs."""
-
-TOLD_APART = (0.2, 0.5)
-"""Severities at which the gain of a servo is compared with the torque of its motor."""
-
-MAX_JAM_SPREAD = 0.05
-"""Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 
 class Timeline(NamedTuple):
@@ -299,201 +280,9 @@ def contradiction_losses(
     return losses
 
 
-class Problem:
-    """Trials to explain, or parts of them, and the losses of hypotheses about them.
-
-    Jams at the angles at which the encoders end are added to the hypotheses, and gains of servos
-    that equal weak motors in the trials are left out.
-
-    Args:
-        table: Losses of the comparator.
-        space: The hypotheses about the robot.
-        trials: Trials to explain, or parts of them.
-        surrogate: Losses of the surrogate comparator, and its trials; see ``LossTable.surrogate``.
-        healthy_trials: Trials of the healthy robot, or parts of them.
-        names: Names of the trials of the whole diagnosis, by path.
-        settings: Parameters of the search.
-        calibrate: Fits the self-model to some trials; None for one that is given as it is.
-        healthy_parts: Parts of trials before a change, in which the robot was healthy.
-        observer: Called with the progress of each stage.
-
-    Attributes:
-        healthy_motions: Healthy trials, and healthy parts of the trials to explain.
-        has_test: Whether hypotheses are compared by a paired test.
-    """
-
-    def __init__(
-        self,
-        table: LossTable,
-        space: HypothesisSpace,
-        trials: Parts,
-        *,
-        surrogate: tuple[LossTable, Parts],
-        healthy_trials: Parts,
-        names: Mapping[str, str],
-        settings: Settings,
-        calibrate: Calibrate | None = None,
-        healthy_parts: Parts = (),
-        observer: Observer = ignore,
-    ) -> None:
-        self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
-        self.calibrate, self.observer = calibrate, observer
-        self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
-        self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
-        jams = observed_jams([part.rows for part in self.trials], space.anatomy)
-        self.space = self._told_apart(replace(space, observed=jams))
-        self.has_test = table.is_piecewise([part.trial for part in self.trials])
-        # Closed-loop windows are correlated, and not compared with those of healthy trials.
-        every = [part.trial for part in (*self.healthy_trials, *self.trials)]
-        is_comparable = table.is_piecewise(every) and table.uses_segments(every)
-        self._comparable = self.healthy_trials if is_comparable else []
-
-    def _told_apart(self, space: HypothesisSpace) -> HypothesisSpace:
-        """Returns the hypotheses without gains of servos of which no prediction reaches a limit."""
-        is_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)
-        parts = space.parts(SERVO_GAIN) if is_asked and WEAK_MOTOR in space.kinds else ()
-        alike = []
-        for part in parts:
-            faults = [Fault(kind, part, value) for kind in OF_MOTORS for value in TOLD_APART]
-            losses = self.losses([Hypothesis((fault,)) for fault in faults])
-            one, other = np.split(losses, 2)
-            if np.isfinite(losses).all() and np.array_equal(one, other):
-                alike.append(part)
-        return space.without(SERVO_GAIN, alike)
-
-    def within(
-        self, cut: Callable[[Sequence[Trial]], Parts], healthy_trials: Parts = ()
-    ) -> "Problem | None":
-        """Returns the problem of a part of the trials; None if the surrogate has too few pieces.
-
-        ``healthy_trials`` are the parts of the trials in which the robot was healthy; they are the
-        reference if there are no trials of the healthy robot.
-        """
-        table, coarse = self.surrogate[0], cut([whole(one).trial for one in self.surrogate[1]])
-        if table.losses([INTACT], coarse).shape[1] < MIN_SURROGATE_PIECES:
-            return None
-        return Problem(
-            self.table,
-            self.space,
-            cut([part.trial for part in self.trials]),
-            surrogate=(table, coarse),
-            healthy_trials=self.healthy_trials or healthy_trials,
-            names=self.names,
-            settings=self.settings,
-            calibrate=self.calibrate,
-            healthy_parts=healthy_trials,
-            observer=self.observer,
-        )
-
-    @cached_property
-    def recalibrated(self) -> LossTable | None:
-        """Losses with the self-model that is fitted to the healthy trials and these together.
-
-        None for a self-model that is given as it is, and if the trials are too short for a fit.
-        """
-        every = [part.rows for part in (*self.healthy_trials, *self.trials)]
-        try:
-            return self.calibrate and self.table.of_robot(self.calibrate(every).robot)
-        except InputError:
-            return None
-
-    def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
-        """Returns the losses on the trials to explain, ``(n, pieces)``."""
-        return self.table.losses(hypotheses, self.trials)
-
-    def coarse(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
-        """Returns the losses on the same trials by the surrogate, ``(n, fewer pieces)``."""
-        table, trials = self.surrogate
-        return table.losses(hypotheses, trials)
-
-    def healthy(self, hypotheses: Sequence[Hypothesis]) -> FloatArray | None:
-        """Returns the losses on healthy trials, ``(n, healthy pieces)``.
-
-        The result is None without healthy trials, or if the losses are correlated over a trial and
-        so not comparable between trials.
-        """
-        return self.table.losses(hypotheses, self._comparable) if self._comparable else None
-
-    @cached_property
-    def reference(self) -> FloatArray | None:
-        """Losses of the empty hypothesis on all healthy trials, ``(pieces,)``; None without any.
-
-        Encoders that are lost in the trials to explain are left out of the healthy ones.
-        """
-        return np.concatenate(self._references) if self._references else None
-
-    @property
-    def hardest(self) -> FloatArray | None:
-        """The part of ``reference`` of the healthy trial with the largest mean loss."""
-        return max(self._references, key=np.mean, default=None)
-
-    @cached_property
-    def _references(self) -> list[FloatArray]:
-        healthy = self._observed(self.healthy_trials)
-        rows = [np.asarray(self.table.losses([INTACT], [part])[0]) for part in healthy]
-        return [row for row in rows if len(row)]  # a part before a change may have no piece
-
-    @cached_property
-    def has_joints(self) -> bool:
-        """Whether the comparator predicts the motion of single joints."""
-        return self.table.by_hinge([INTACT], self.trials) is not None
-
-    def of_joint(
-        self, joint: str, hypotheses: Sequence[Hypothesis], *, healthy: bool = False
-    ) -> FloatArray:
-        """Returns the losses of the motion of a joint on the trials to explain, ``(n, pieces)``.
-
-        A loss is the mean over the known hinges of the joint, and NaN where all are unknown, as for
-        a hypothesis that detaches the joint. Without healthy trials there are no pieces of them.
-        """
-        trials = self._observed_comparable if healthy else self.trials
-        by_hinge = self.table.by_hinge(hypotheses, trials) if trials else None
-        if by_hinge is None:
-            return np.empty((len(hypotheses), 0))
-        anatomy = self.space.anatomy
-        columns = [anatomy.hinges.index(one) for one in anatomy.joint(joint).hinges]
-        losses = by_hinge[:, :, columns]
-        known = ~np.isnan(losses)
-        count = known.sum(axis=2)
-        total = np.where(known, losses, 0.0).sum(axis=2)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-    @cached_property
-    def _observed_comparable(self) -> list[TrialPart]:
-        return self._observed(self._comparable)
-
-    def _observed(self, healthy: Sequence[TrialPart]) -> list[TrialPart]:
-        """Returns healthy trials without the encoders that are lost in the trials to explain."""
-        observed = [part.trial for part in self.trials]
-        return [replace(part, trial=observed_as(part.trial, observed)) for part in healthy]
-
-
 def by_total_loss(hypotheses: Sequence[Hypothesis], losses: LossFunction) -> list[Hypothesis]:
     """Returns hypotheses sorted by the sum of their losses, smallest first; the sort is stable."""
     if not hypotheses:
         return []
     order = np.argsort(losses(hypotheses).sum(axis=1), kind="stable")
     return [hypotheses[i] for i in order]
-
-
-def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
-    """Returns for every joint a jam at the angle at which its encoders end.
-
-    The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
-    without torque predicts a short segment better than the jam: each segment begins at the logged
-    angle. The encoder contains the angle, whether the joint is jammed or not.
-
-    There is none of a joint whose encoders are unknown, or whose hinges end at different angles.
-    """
-    trajectory = trials[-1].trajectory  # a fault may begin during the trials
-    medians = median_of_known(trajectory["joint_positions"][round((1 - END) * trajectory.steps) :])
-    ends = dict(zip(trajectory.names.hinges, medians, strict=True))
-    jams = []
-    for name in JAMMED_AT_ANGLE.parts(anatomy):
-        joint = anatomy.joint(name)
-        angles = [ends[hinge] for hinge in joint.hinges]
-        if np.isfinite(angles).all() and np.ptp(angles) <= MAX_JAM_SPREAD:
-            lows, highs = zip(*joint.limits, strict=True)
-            angle = min(max(round(float(np.mean(angles)), 3) + 0.0, *lows), *highs)
-            jams.append(Fault(JAMMED_AT_ANGLE, name, angle))
-    return tuple(jams)

@@ -37,7 +37,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis import significance
-from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.losses import LossFunction, by_total_loss
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.evolution import Evolution, GenerationCallback, evolve
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import GENE_VALUES, HypothesisSpace

@@ -23,8 +23,9 @@ from selfmodel.diagnosis.diagnosis import (
     Verdict,
 )
 from selfmodel.diagnosis.joints import excesses, lead_at_joints
-from selfmodel.diagnosis.losses import LossFunction, Problem, by_total_loss
+from selfmodel.diagnosis.losses import LossFunction, by_total_loss
 from selfmodel.diagnosis.probability import probabilities, unlikeness
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind

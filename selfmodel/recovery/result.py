@@ -13,7 +13,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, by_stage
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Database:
 
     @property
     def evidence(self) -> tuple[Trial, ...]:
-        """Trials that a diagnosis has to explain: all since the robot failed."""
-        return tuple(trial for trial in self.trials if trial.plan.stage != "before")
+        """Trials that a diagnosis has to explain, once the robot failed: all since then."""
+        return by_stage(self.trials)[0]
 
     @property
     def hypotheses(self) -> tuple[Hypothesis, ...]:

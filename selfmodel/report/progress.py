@@ -18,7 +18,7 @@ from selfmodel.report.content import NOT_FINISHED, report_of, searches_section
 from selfmodel.report.subject import Subject, title_of
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, by_stage
 
 
 @dataclass(eq=False)
@@ -87,13 +87,12 @@ class RunProgress:
                 headline=f"{NOT_FINISHED}: {last or 'it begins'}.",
                 sections=() if section is None else (section,),
             )
-        healthy = [trial for trial in self._trials if trial.plan.stage == "before"]
-        damaged = [trial for trial in self._trials if trial.plan.stage != "before"]
+        damaged, healthy = by_stage(self._trials)
         subject = Subject(
             name=name,
             robot=self.robot,
-            healthy=tuple(healthy),
-            damaged=tuple(damaged[: self._diagnoses[-1].trials]),
+            healthy=healthy,
+            damaged=damaged[: self._diagnoses[-1].trials],
             diagnoses=tuple(self._diagnoses),
             comparator=self._comparator.comparator,
             calibration=self._calibration,

@@ -14,7 +14,6 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from selfmodel import arguments, plugins
-from selfmodel.api import by_stage
 from selfmodel.arguments import AUTO, comparator_choice, fitted
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
@@ -50,7 +49,7 @@ from selfmodel.simulation.fit import NOMINAL
 from selfmodel.simulation.log_check import Suspicion
 from selfmodel.simulation.model_factors import Parameters, factor_names, with_parameters
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.trials.trial import Trial, trial_names
+from selfmodel.trials.trial import Trial, by_stage, trial_names
 
 Result = TypeVar("Result", bound=DiagnosisResult)
 

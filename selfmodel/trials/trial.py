@@ -261,6 +261,12 @@ def trial_names(trials: Iterable[Trial]) -> dict[str, str]:
     return {path: name if counts[name] == 1 else path for path, name in names.items()}
 
 
+def by_stage(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], tuple[Trial, ...]]:
+    """Returns the trials to explain, and those of the stage ``before`` unless all are."""
+    failed = tuple(trial for trial in trials if trial.plan.stage != "before") or tuple(trials)
+    return failed, tuple(trial for trial in trials if trial not in failed)
+
+
 def observed_as(trial: Trial, others: Sequence[Trial]) -> Trial:
     """Returns a trial without the columns that were never observed in one of the others.
 

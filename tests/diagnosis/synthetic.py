@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from selfmodel.diagnosis.losses import LossFunction, Problem
+from selfmodel.diagnosis.losses import LossFunction
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.progress import ignore
@@ -39,12 +40,12 @@ class Synthetic(Problem):
         hinges_before: HingeLosses | None = None,
     ) -> None:
         self.space, self.settings, self.has_test = space, Settings(genes=most), True
-        self.trials, self.healthy_trials, self._observed_comparable = ["damaged"], [], ["healthy"]
+        self.trials, self.healthy_trials, self._observed = ["damaged"], [], ["healthy"]
         self.losses, self.observer = losses, ignore
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
         self.table = SimpleNamespace(by_hinge=self._by_hinge)
-        self.has_joints = hinges is not None
+        self.has_joints, self._is_comparable = hinges is not None, True
 
     def healthy(self, hypotheses: Sequence[Hypothesis]) -> np.ndarray | None:
         """Returns the given losses."""

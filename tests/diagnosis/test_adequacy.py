@@ -12,7 +12,8 @@ from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.playback import played_back
 from selfmodel.diagnosis.adequacy import COVERAGE, doubt_of, faster_joints, sufficient_trials
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
-from selfmodel.diagnosis.losses import LossTable, Problem
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO
 from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.errors import InputError

@@ -16,13 +16,8 @@ from selfmodel.comparators import (
     SENSOR_SERIES,
 )
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
-from selfmodel.diagnosis.losses import (
-    LossTable,
-    Problem,
-    contradiction_losses,
-    observed_jams,
-    simulate,
-)
+from selfmodel.diagnosis.losses import LossTable, contradiction_losses, simulate
+from selfmodel.diagnosis.problem import Problem, observed_jams
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis

@@ -17,7 +17,8 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, Fit
-from selfmodel.diagnosis.losses import LossTable, Problem
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_RATIO, TEST
 from selfmodel.diagnosis.verdict import (
     EQUAL_DISTANCES,
