@@ -118,19 +118,25 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
 
 
 @pytest.mark.parametrize(
-    ("base", "kinds", "is_searched"),
-    [("floating", DEFAULT_KINDS, True), ("fixed", DEFAULT_KINDS, False), ("fixed", (), False)],
+    ("base", "kinds", "beside", "is_searched"),
+    [
+        ("floating", DEFAULT_KINDS, "", True),
+        ("floating", DEFAULT_KINDS, "jam:front_left_knee", False),  # as many faults as genes
+        ("fixed", DEFAULT_KINDS, "", False),
+        ("fixed", (), "", False),
+    ],
 )
 def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_on_a_floating_base(
-    quadruped: Robot, base: str, kinds: tuple[FaultKind, ...], *, is_searched: bool
+    quadruped: Robot, base: str, kinds: tuple[FaultKind, ...], beside: str, *, is_searched: bool
 ):
     robot = quadruped if base == "floating" else arm()
-    (controller,), steps = random_cpgs(robot, 1), 200 if is_searched else 120
-    before, after = (logged(robot, one, controller, steps) for one in ("intact", "delay=2.8"))
+    (controller,), steps = random_cpgs(robot, 1), 120 if base == "fixed" else 200
+    faults = "+".join(filter(None, (beside, "delay=2.8")))
+    before, after = (logged(robot, one, controller, steps) for one in ("intact", faults))
     diagnose = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
-        dataclasses.replace(Settings().scaled(4), generations=1),
+        dataclasses.replace(Settings().scaled(4), generations=1, genes=1),
         kinds or PAPER_KINDS,
         healthy_trials=[before],
     )
@@ -145,5 +151,6 @@ def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_
         assert (again.best, again.also_searched) == (found.best, ("delay",))
     else:
         assert found.verdict == "unexplained"
+        assert str(found.best) == (beside or "intact")
         assert found.unsearched is not None
         assert (found.unsearched.kind, found.also_searched) == ("delay", ())

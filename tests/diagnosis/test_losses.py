@@ -5,6 +5,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -375,19 +376,25 @@ def test_a_jam_is_at_the_median_angle_of_the_last_third_of_the_last_trial(quadru
     assert jam_of(quadruped, np.where(np.arange(90) < 60, 0.2, np.nan)) is None
 
 
-@pytest.mark.parametrize("reached", [(), ("joint2", "joint3")], ids=["beyond", "reached"])
+@pytest.mark.parametrize(
+    ("reached", "mixed"),
+    [((), ""), (("joint2", "joint3"), ""), (("joint3",), "joint2")],
+    ids=["beyond", "reached", "mixed"],
+)
 def test_the_gain_of_a_servo_is_asked_where_a_limit_tells_it_from_a_weak_motor(
-    reached: tuple[str, ...],
+    reached: tuple[str, ...], mixed: str
 ):
-    """Elsewhere the two are equal, and no trial could decide."""
+    """Elsewhere the two are equal, and no trial could decide; or not all motors are servos."""
     arm = robot_of(arm_mjcf())
     spec = arm.specification()
     for motor in spec.actuators:
         is_reached = f"joint{motor.name[-1]}" in reached
         motor.forcerange = [-3.0, 3.0] if is_reached else [-1e4, 1e4]
+    if mixed:
+        spec.add_actuator(name="torque", target=mixed, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     robot = dataclasses.replace(arm, mjcf=spec.to_xml())
-    motion = 0.3 * np.sin(np.arange(200)[:, np.newaxis] / 9 + np.arange(6))
-    trial = Trial.from_arrays(robot, motion, motion)
+    motion = 0.3 * np.sin(np.arange(200)[:, np.newaxis] / 9 + np.arange(7))
+    trial = Trial.from_arrays(robot, motion[:, :6], motion[:, : len(robot.anatomy.motors)])
     table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
     problem = Problem(
         table,
