@@ -1,66 +1,25 @@
 """Summary and verification of a log, without simulation."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from selfmodel.arrays import finite_or_none
 from selfmodel.files import file_digest
 from selfmodel.logs.errors import GOOD, CorruptError, SchemaMismatchError
 from selfmodel.logs.log_file import Messages, read_contents
 from selfmodel.logs.reader import TrialLog, interpret, read_log
 from selfmodel.logs.records import HIDDEN, IMPORT, SALVAGE
 from selfmodel.robot.mjcf.untrusted import checked_model
-from selfmodel.trials.signals import SIGNALS, Signal
 
 
-@dataclass(frozen=True)
-class TopicInfo:
-    """Type of the messages on a topic, their number, and mean rate, 1/s (0 for a single one)."""
+def read_info(path: Path) -> dict[str, Any]:
+    """Returns the summary of a log as JSON values, without the hidden faults of a simulated robot.
 
-    type: str
-    messages: int
-    rate: float
-
-
-@dataclass(frozen=True, eq=False)
-class Info:
-    """Summary of a log.
-
-    Attributes:
-        log: Trial, model and settings.
-        bytes: Size of the file, bytes.
-        topics: Topics by name.
-        attachments: Sizes of the attachments by name, bytes.
-        records: Names of the metadata records.
-        observed: Fraction of observed numbers by signal, in [0, 1].
-        source: Origin of an imported or salvaged trial; empty for other trials.
-        digest: SHA-256 of the file.
-    """
-
-    log: TrialLog
-    bytes: int
-    topics: Mapping[str, TopicInfo]
-    attachments: Mapping[str, int]
-    records: tuple[str, ...]
-    observed: Mapping[Signal, float]
-    source: Mapping[str, str]
-    digest: str
-
-    @property
-    def driver(self) -> str:
-        """Description of the controller, or of its replacement by recorded commands."""
-        return self.log.trial.plan.controller.summary
-
-    @property
-    def has_truth(self) -> bool:
-        """Whether the log contains the hidden faults of a simulated robot, for scoring."""
-        return HIDDEN in self.records
-
-
-def read_info(path: Path) -> Info:
-    """Returns the summary of a log, without the hidden faults of a simulated robot.
+    ``observed`` has the fraction of observed numbers by signal, in [0, 1], ``attachments`` sizes in
+    bytes, and ``source`` the origin of an imported or salvaged trial.
 
     Raises:
         LogError: The file is damaged, or not a trial log.
@@ -68,26 +27,45 @@ def read_info(path: Path) -> Info:
     """
     contents = read_contents(path)
     log = interpret(contents)
-    signals = {signal: log.trial.trajectory[signal] for signal in SIGNALS}
-    return Info(
-        log=log,
-        bytes=path.stat().st_size,
-        topics={name: _topic(messages) for name, messages in contents.topics.items()},
-        attachments={name: len(data) for name, data in contents.attachments.items()},
-        records=tuple(contents.metadata),
-        observed={
-            signal: float(np.mean(~np.isnan(values))) if values.size else 1.0
+    trial, timing, signals = log.trial, log.timing, log.trial.trajectory.signals
+    clock = {"late": timing.late, "missing": timing.missing} if timing else {}
+    return {
+        "file": str(path),
+        "bytes": path.stat().st_size,
+        "robot": trial.robot,
+        "trial": trial.plan.name,
+        "stage": trial.plan.stage,
+        "status": log.status,
+        "reason": log.reason,
+        "steps": trial.trajectory.steps,
+        "planned_steps": trial.plan.steps,
+        "control_timestep": log.control_timestep,
+        "seed": trial.plan.seed,
+        "displacement": finite_or_none(trial.displacement),
+        "driver": trial.plan.controller.summary,
+        "software": dict(log.software),
+        "topics": {
+            name: {"type": held.type, "messages": len(held.times), "rate": round(_rate(held), 3)}
+            for name, held in contents.topics.items()
+        },
+        "attachments": {name: len(data) for name, data in contents.attachments.items()},
+        "records": list(contents.metadata),
+        "observed": {
+            signal: round(float(np.mean(~np.isnan(values))), 6) if values.size else 1.0
             for signal, values in signals.items()
         },
-        source=contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {},
-        digest=file_digest(path),
-    )
+        "clock": {name: int(flags.sum()) for name, flags in clock.items()} or None,
+        "truth": "hidden" if HIDDEN in contents.metadata else "unknown",
+        "source": dict(contents.metadata.get(SALVAGE) or contents.metadata.get(IMPORT) or {}),
+        "digest": file_digest(path),
+    }
 
 
-def _topic(messages: Messages) -> TopicInfo:
+def _rate(messages: Messages) -> float:
+    """Mean rate of the messages on a topic, 1/s; 0 for a single one."""
     times = [time for time, _ in messages.times]
     span = (times[-1] - times[0]) * 1e-9 if len(times) > 1 else 0.0
-    return TopicInfo(messages.type, len(times), (len(times) - 1) / span if span else 0.0)
+    return (len(times) - 1) / span if span else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -394,11 +394,6 @@ def transforms(bodies: Sequence[str], parents: Sequence[str]) -> Topic:
     return Topic(TRANSFORMS, kind, {"transforms": content}, transforms=7 * len(bodies))
 
 
-def frames_stride(control_timestep: float) -> int:
-    """Returns the number of control steps between two messages on ``/tf``."""
-    return max(1, round(FRAMES_PERIOD / control_timestep))
-
-
 def description(text: str) -> bytes:
     """Returns the message on ``/robot_description``."""
     return Template(DESCRIPTION_TYPE, {"data": text}).payload

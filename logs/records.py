@@ -171,11 +171,6 @@ class TrialHeader:
     imported: Imported | None = None
 
 
-def settings_json(settings: Settings) -> bytes:
-    """Returns settings as JSON."""
-    return json.dumps(dataclasses.asdict(settings), indent=1).encode()
-
-
 def parse_settings(data: bytes) -> Settings:
     """Returns the settings of a log; a missing setting has its default."""
     values = msgspec.json.decode(data, type=dict[str, float | int])

@@ -380,9 +380,9 @@ def best_hypothesis(path: Path) -> str:
     )
     with _explained(path, what, "name the hypothesis by --hypothesis"):
         values = parse_json(read_file(path, what, MAX_BYTES))
-        if isinstance(values, list):
-            return msgspec.convert(values, _Journal)[-1].ranked[0].hypothesis
-        return msgspec.convert(verified(values), _Printed).diagnosis[0].hypothesis
+        last = values[-1] if isinstance(values, list) and values else verified(values)
+        ranked = last.get("diagnosis", last.get("ranked")) if isinstance(last, dict) else None
+        return msgspec.convert(ranked, _Ranking)[0].hypothesis
 
 
 class _Candidate(Struct):
@@ -390,14 +390,3 @@ class _Candidate(Struct):
 
 
 _Ranking = Annotated[list[_Candidate], Meta(min_length=1)]
-
-
-class _Printed(Struct):
-    diagnosis: _Ranking
-
-
-class _Logged(Struct):
-    ranked: _Ranking
-
-
-_Journal = Annotated[list[_Logged], Meta(min_length=1)]

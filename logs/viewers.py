@@ -151,12 +151,6 @@ def body_names(model: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(model.body(b).name or f"body_{b}" for b in range(1, model.nbody))
 
 
-def parent_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Returns the name of the parent's frame for each body but the world."""
-    names = (WORLD, *body_names(model))
-    return tuple(names[parent] for parent in model.body_parentid[1:])
-
-
 class Kinematics:
     """Forward kinematics of a robot without faults, like ROS's robot_state_publisher.
 
@@ -168,7 +162,8 @@ class Kinematics:
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
         self._data = mujoco.MjData(robot.model)  # once: its memory takes longer than its use
-        bodies, parents = body_names(self._model), parent_names(self._model)
+        names = (WORLD, *body_names(self._model))
+        bodies, parents = names[1:], [names[parent] for parent in self._model.body_parentid[1:]]
         every = range(len(bodies))
         self._fixed = robot.has_fixed_base
         self._columns = [list(every), [body for body in every if bodies[body] != robot.root]]

@@ -5,7 +5,7 @@ import json
 import platform
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import astuple
+from dataclasses import asdict, astuple
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
@@ -230,7 +230,7 @@ class TrialWriter:
                 "orientation_unknown": _unknown(rows["base_orientation"]),
                 "turning_unknown": _unknown(rows["base_angular_velocity"]),
             }
-        drawn = np.flatnonzero(steps % messages.frames_stride(period) == 0)
+        drawn = np.flatnonzero(steps % max(1, round(messages.FRAMES_PERIOD / period)) == 0)
         poses = self._kinematics.transforms({part: values[drawn] for part, values in rows.items()})
         content: list[tuple[IndexArray, Mapping[Part, FloatArray]]] = []
         content += [(np.arange(len(steps)), parts)] * (len(self._topics) - len(poses))
@@ -302,7 +302,7 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         log.attach(name, data)
     if controller:
         log.attach(records.CONTROLLER_FILE, controller)
-    log.attach(records.SETTINGS_FILE, records.settings_json(header.settings))
+    log.attach(records.SETTINGS_FILE, json.dumps(asdict(header.settings), indent=1).encode())
     if header.imported is not None:
         log.metadata(records.IMPORT, header.imported.facts)
         log.attach(records.MAPPING_FILE, header.imported.mapping.encode())

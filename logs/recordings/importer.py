@@ -104,10 +104,6 @@ def import_recording(
         signals = _signals(mapping.trial, tracks, robot, origin, steps)
     except ValueError as error:
         raise mapping.error(("start",), f"{error}: set another start") from error
-    acceleration = None
-    if mapping.trial.imu is not None:
-        track = tracks.get(("imu_linear_acceleration", ""), NOTHING)
-        acceleration = frozen(at_steps(track, origin, steps, resample.linear, 3))
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
     trajectory = Trajectory(
         robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
@@ -126,9 +122,8 @@ def import_recording(
         *no_measurements(recording, mapping.places.values()),
         *notes(mapping.trial, trajectory, qualities, robot),
     )
-    return ImportedTrial(
-        trajectory, qualities, recording.digests, clock, origin, acceleration, warnings
-    )
+    felt = None if mapping.trial.imu is None else frozen(signals["acceleration"])
+    return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, felt, warnings)
 
 
 def write_recording(
@@ -322,7 +317,7 @@ def _lasting(needed: Tracks, step: float) -> list[Track]:
 def _signals(
     trial: Trial, tracks: Tracks, robot: Robot, origin: int, steps: IntArray
 ) -> dict[str, FloatArray]:
-    """Signals of a trial at steps after the first one, the origin, ns; NaN where not observed."""
+    """Signals and acceleration at steps after the origin, the first one; NaN if not observed."""
     anatomy = robot.anatomy
 
     def at(quantity: str, part: str, method: Method, width: int = 1) -> FloatArray:
@@ -367,6 +362,7 @@ def _signals(
         "sensors": readings,
         **_in_frame(trial, pose, observed),
         "base_angular_velocity": at(f"{turning}_angular_velocity", "", resample.linear, 3),
+        "acceleration": at("imu_linear_acceleration", "", resample.linear, 3),
     }
 
 

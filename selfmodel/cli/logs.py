@@ -7,7 +7,6 @@ from typing import Any
 
 import typer
 
-from selfmodel.arrays import finite_or_none
 from selfmodel.cli.commands import LogInfo, SalvageLog, Verify
 from selfmodel.cli.inputs import check_log_name
 from selfmodel.cli.output import print_json, print_lines
@@ -47,42 +46,12 @@ def layout_path() -> Path:
 def _info(path: Path) -> dict[str, Any]:
     """Returns the summary of a log as JSON values, or its damage."""
     try:
-        found = inspection.read_info(path)
+        return inspection.read_info(path)
     except (LogError, InputError) as error:
         is_log = isinstance(error, LogError)
         return _error(path, error) | {
             "salvageable_steps": salvaging.salvageable_steps(path) if is_log else 0
         }
-    log, trial, timing = found.log, found.log.trial, found.log.timing
-    counts = ("late", "missing")
-    clock = timing and {name: int(getattr(timing, name).sum()) for name in counts}
-    return {
-        "file": str(path),
-        "bytes": found.bytes,
-        "robot": trial.robot,
-        "trial": trial.plan.name,
-        "stage": trial.plan.stage,
-        "status": log.status,
-        "reason": log.reason,
-        "steps": trial.trajectory.steps,
-        "planned_steps": trial.plan.steps,
-        "control_timestep": log.control_timestep,
-        "seed": trial.plan.seed,
-        "displacement": finite_or_none(trial.displacement),
-        "driver": found.driver,
-        "software": dict(log.software),
-        "topics": {
-            name: {"type": topic.type, "messages": topic.messages, "rate": round(topic.rate, 3)}
-            for name, topic in found.topics.items()
-        },
-        "attachments": dict(found.attachments),
-        "records": list(found.records),
-        "observed": {signal: round(share, 6) for signal, share in found.observed.items()},
-        "clock": clock,
-        "truth": "hidden" if found.has_truth else "unknown",
-        "source": dict(found.source),
-        "digest": found.digest,
-    }
 
 
 def _error(path: Path, error: Exception) -> dict[str, Any]:

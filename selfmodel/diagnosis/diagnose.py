@@ -142,12 +142,6 @@ class DiagnosticSearch:
         after = self._after_change(best, starts, trials, problem)
         return after or diagnosis_of(problem, compared, best)
 
-    def check(self, trials: Sequence[Trial]) -> None:
-        """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
-        self.losses.check([*self._healthy_trials, *trials])
-        cheaper, its_trials = self.losses.surrogate(trials)
-        cheaper.check(its_trials)
-
     @property
     def distinct_hypotheses(self) -> int:
         """Number of distinct hypotheses that were proposed, by all searches so far."""

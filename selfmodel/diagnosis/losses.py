@@ -68,20 +68,6 @@ class LossTable:
         """Returns an empty table of the same comparator, with another self-model."""
         return LossTable(Simulator(robot, self._simulator.threads), self._comparator)
 
-    def check(self, trials: Sequence[Trial]) -> None:
-        """Raises an ``InputError`` with every trial that the comparator refuses, and the reason."""
-        if problems := self._refusals(trials):
-            raise InputError("; ".join(problems))
-
-    def _refusals(self, trials: Sequence[Trial]) -> list[str]:
-        problems = []
-        for trial in trials:
-            try:
-                self._of(trial)
-            except InputError as error:
-                problems.append(str(error))
-        return problems
-
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the distances are means of losses, so that paired tests are possible."""
         return all(isinstance(self._of(trial), PiecewiseTrial) for trial in trials)
@@ -166,7 +152,7 @@ class LossTable:
             return self, [self._opening(trial) for trial in trials]
         cheapest = self._cheaper._cheaper if len(trials) >= MANY_TRIALS else None  # noqa: SLF001
         for table in (cheapest, self._cheaper):
-            if table is not None and not table._refusals(trials):  # noqa: SLF001
+            if table is not None and table._accepts(trials):  # noqa: SLF001
                 return table, trials
         return self, trials
 
@@ -180,7 +166,15 @@ class LossTable:
         whole_steps = trial.trajectory.steps
         steps = max(round(OPENING * whole_steps), min(MIN_OPENING, whole_steps))
         opening = replace(trial, trajectory=trial.trajectory.first(steps))
-        return trial if self._refusals([opening]) else opening
+        return opening if self._accepts([opening]) else trial
+
+    def _accepts(self, trials: Sequence[Trial]) -> bool:
+        try:
+            for trial in trials:
+                self._of(trial)
+        except InputError:
+            return False
+        return True
 
     def _of(self, trial: Trial) -> PreparedTrial | PiecewiseTrial:
         """Returns the prepared trial."""

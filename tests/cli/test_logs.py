@@ -111,7 +111,7 @@ def test_verify_says_ok_or_what_is_wrong_a_line_a_file(folder: Path):
     bad = selfmodel("logs", "verify", "cut.mcap.part", "a.mcap", "no.mcap", cwd=folder)
 
     assert (good.returncode, bad.returncode) == (0, 1)
-    digests = [read_info(folder / f"{n}.mcap").digest for n in "ab"]
+    digests = [read_info(folder / f"{n}.mcap")["digest"] for n in "ab"]
     assert good.stdout.splitlines() == [
         f"ok: {n}.mcap: 1000 steps, finished; SHA-256 {digest}"
         for n, digest in zip("ab", digests, strict=True)

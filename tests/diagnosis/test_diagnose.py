@@ -114,7 +114,7 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
     evidence = LossTable(Simulator(quadruped, 1), COMPARATORS[name])
 
     with pytest.raises(InputError, match=r"is 1e\+300 at step 7, expected at"):
-        evidence.check([trial])
+        evidence.is_piecewise([trial])
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
-from tests.helpers.hostile import exploding, lacking
+from tests.helpers.hostile import exploding
 from tests.helpers.memory import in_memory
 from tests.helpers.robots.arms import arm_mjcf, robot_of
 
@@ -221,17 +221,6 @@ def test_a_comparator_that_breaks_its_contract_is_named_with_what_it_did(
 
     with pytest.raises(InputError, match=f"the comparator 'plain' .*{message}.*check_comparator"):
         table.distances(three[:2], trials)
-
-
-def test_all_trials_that_are_refused_are_named_at_once(quadruped: Robot, trials: list[Trial]):
-    first, second = (
-        dataclasses.replace(lacking(trial, ("base_position",)), path=f"{k}.mcap")
-        for k, trial in enumerate(trials)
-    )
-    table = LossTable(Simulator(quadruped, 1), FORWARD_DISPLACEMENT)
-
-    with pytest.raises(InputError, match=r"0\.mcap: .* needs .*; 1\.mcap: .* needs "):
-        table.check([first, trials[0], second])
 
 
 @settings(max_examples=10)

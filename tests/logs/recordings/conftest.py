@@ -73,7 +73,8 @@ def recorded(seconds: float = 1.0) -> list[Item]:
         stamp = T0 + k * 10_000_000
         items.append(("/commands", stamp, array([angle(3 - j, k / 100) for j in range(4)])))
         items.append(("/left_foot", stamp + 10**6, wrench(stamp, (3, 0, 4 if k % 20 < 10 else 9))))
-        items.append(("/imu", stamp + 10**6, imu(stamp, (1, 0, 0, 0), (0, 0, k / 100), (k, 0, 9))))
+        felt = None if 20 <= k < 30 else (k, 0, 9)
+        items.append(("/imu", stamp + 10**6, imu(stamp, (1, 0, 0, 0), (0, 0, k / 100), felt)))
     for k in range(round(seconds * 50)):
         stamp = T0 + k * 20_000_000
         half = 0.5 + k / 500
