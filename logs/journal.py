@@ -16,8 +16,8 @@ from selfmodel.logs.errors import CorruptError, SchemaMismatchError
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.results import MAX_BYTES, parse_json, read_result, result_bytes
-from selfmodel.recovery.result import Database
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.trials.trial import Trial
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
@@ -48,7 +48,7 @@ class FolderJournal:
         text = json.dumps(values, indent=1, allow_nan=False)
         replace_file(self.folder / DIAGNOSES, text.encode())
 
-    def read(self) -> Database:
+    def read(self) -> tuple[tuple[Trial, ...], tuple[Diagnosis, ...]]:
         """Returns the finished trials and the diagnoses in the folder, read and verified.
 
         A ``.part`` file, the log of an interrupted trial, is ignored.
@@ -67,7 +67,7 @@ class FolderJournal:
                     f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
                     advice="give the folder of a run of one robot",
                 )
-        return Database(trials, read_diagnoses(self.folder, self.space))
+        return trials, read_diagnoses(self.folder, self.space)
 
 
 def create_journal(

@@ -12,7 +12,7 @@ from .recover import (
 )
 from .repair import RepairSearch as RepairSearch
 from .repertoire import Repertoire as Repertoire
-from .result import Database as Database, Event as Event, Recovery as Recovery
+from .result import Event as Event, Recovery as Recovery
 from .scores import (
     DISPLACEMENT as DISPLACEMENT,
     ENERGY as ENERGY,

@@ -48,14 +48,14 @@ def by_disagreement(loop: RecoveryLoop) -> Controller:
     trial did not resolve. The last trial is always a repair: only a repair that is tried restores
     the robot.
     """
-    *earlier, diagnosis = loop.known.diagnoses
+    *earlier, diagnosis = loop.diagnoses
     unresolved = bool(earlier) and earlier[-1].undetectable == diagnosis.undetectable
     is_certain = diagnosis.verdict in ("intact", "explained")
     certain = is_certain and (unresolved or not diagnosis.undetectable)
     if certain or loop.trials_left == 1:
         return by_repair(loop)
     loop.on_event(DiscriminatingTrial(candidates_to_separate(diagnosis)))
-    known = loop.known.controllers
+    known = loop.controllers
     return discriminating_controller(diagnosis, known, loop.simulator, loop.settings, loop.rng)
 
 
@@ -74,7 +74,7 @@ def discriminating_controller(
     same_design = [controller for controller in known if controller.design == known[0].design]
     pool = untried_mutants(same_design, known, settings, rng)
     for _ in range(GENERATIONS):
-        best = disagreement.most_discriminative_first(pool)[: settings.survivors]
+        best = [pool[i] for i in disagreement.ordered(pool)[1][: settings.survivors]]
         children = mutants(best, settings.population, settings, rng)
         distinct = dict.fromkeys([*best, *children])
         pool = [controller for controller in distinct if controller not in known]
@@ -107,9 +107,6 @@ class Disagreement:
     steps: int
     _cache: Cache[Controller] = field(default_factory=Cache, init=False)
 
-    def __post_init__(self) -> None:
-        self._early = min(self.steps, EARLY_STEPS)
-
     def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to separate the hypotheses best.
 
@@ -117,36 +114,32 @@ class Disagreement:
         are excluded. If no controller remains, the controller with the latest first fall is
         returned. The first of equals is.
         """
-        falls, order = self._ordered(candidates)
+        falls, order = self.ordered(candidates)
         for i in order:
-            if falls[i] < self._early:
+            if falls[i] < min(self.steps, EARLY_STEPS):
                 break  # the remaining ones fall early, too
             falls[i] = self._first_falls([candidates[i]], self.steps)[0][0]
             if falls[i] == self.steps:
                 return candidates[i]
         return candidates[int(falls.argmax())]
 
-    def most_discriminative_first(self, candidates: Sequence[Controller]) -> list[Controller]:
-        """Returns the controllers in order of decreasing disagreement.
+    def ordered(self, candidates: Sequence[Controller]) -> tuple[FloatArray, list[int]]:
+        """Returns the first early fall per controller, and their indices, the best one first.
 
-        Controllers with which the robot falls in the first ``EARLY_STEPS`` are last, the earliest
-        fall at the end.
+        The order is of decreasing disagreement. Controllers with which the robot falls in the first
+        ``EARLY_STEPS`` are last, the earliest fall at the end.
         """
-        return [candidates[i] for i in self._ordered(candidates)[1]]
-
-    def _ordered(self, candidates: Sequence[Controller]) -> tuple[IndexArray, list[int]]:
-        """First fall per controller, and the controllers' indices by decreasing disagreement."""
-        rows = self._cache.get_or_compute(candidates, self._evaluate)
-        falls, disagreement = np.array(rows).T
-        return falls.astype(np.intp), np.lexsort((-disagreement, -falls)).tolist()
+        falls, disagreement = np.array(self._cache.get_or_compute(candidates, self._evaluate)).T
+        return falls, np.lexsort((-disagreement, -falls)).tolist()
 
     def _evaluate(self, candidates: Sequence[Controller]) -> FloatArray:
         """First fall and disagreement per controller, ``(controllers, 2)``."""
-        falls, early = self._first_falls(candidates, self._early)
-        upright = np.flatnonzero(falls == self._early)
+        early = min(self.steps, EARLY_STEPS)
+        falls, trajectory = self._first_falls(candidates, early)
+        upright = np.flatnonzero(falls == early)
         disagreement = np.zeros(len(candidates))
         if upright.size:
-            commands = early["commands"][upright, 0]
+            commands = trajectory["commands"][upright, 0]
             known = disagreements_on(commands, self.hypotheses, self.simulator)
             disagreement[upright] = np.where(np.isnan(known), -1.0, known)
         return np.stack([falls, disagreement], axis=1)

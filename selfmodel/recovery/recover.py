@@ -5,14 +5,14 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from selfmodel.controllers.controller import Controller, Design
-from selfmodel.diagnosis.choice import ComparatorChoice
+from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -23,7 +23,7 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.result import Database, Event, Recovery, SearchBegins
+from selfmodel.recovery.result import Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
@@ -39,8 +39,7 @@ RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 
 def by_repair(loop: "RecoveryLoop") -> Controller:
     """Returns the best candidate of the repair that was not tried yet, or a mutant of the best."""
-    candidates = [candidate.controller for candidate in loop.repaired()]
-    tried = loop.known.controllers
+    candidates, tried = [each.controller for each in loop.repaired()], loop.controllers
     untried = [controller for controller in candidates if controller not in tried]
     return (untried or repairs.untried_mutants(candidates[:1], tried, loop.settings, loop.rng))[0]
 
@@ -67,8 +66,8 @@ class RecoveryLoop:
         next_trial: Chooses the controller of each trial after the failing one.
         score: Fitness of the repair.
         make_repair: Makes the repair, which evolves the controllers.
-        known: Trials and diagnoses so far; while a trial is chosen, the last diagnosis is of all
-            trials.
+        trials: Trials so far, the first one before the failure.
+        diagnoses: Diagnoses so far; while a trial is chosen, the last one is of all trials.
         trials_left: Number of trials that remain, including the one that is chosen.
         rng: Random number generator of the choice of a trial.
     """
@@ -87,9 +86,16 @@ class RecoveryLoop:
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair
-    known: Database = field(default_factory=Database, init=False)
+    trials: tuple[Trial, ...] = field(default=(), init=False)
+    diagnoses: tuple[Diagnosis, ...] = field(default=(), init=False)
     trials_left: int = field(default=0, init=False)
     rng: np.random.Generator = field(init=False)
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """Distinct controllers that the physical robot has run, newest first."""
+        drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
+        return tuple(driver for driver in drivers if isinstance(driver, Controller))
 
     def run(self, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
         """Runs the recovery, once, with a robot before its failure and after it.
@@ -99,118 +105,104 @@ class RecoveryLoop:
         the diagnosis explains all logs since the failure, and the next trial tries a controller
         that the repair evolved in simulation for the diagnosed robot.
         """
-        self._begin()
-        gait = self.gait or self._evolve_gait()
+        robot = self.simulator.robot
+        HypothesisSpace.of(self.kinds, robot.anatomy)  # refused before any trial
+        # From the nominal robot: the numbers of the calibrated model are rounded.
+        self._design = self.design or network_for(robot)
+        self._repairs = [self._repair_in_simulator()]
+        self._predictions: dict[Controller, float] = {}
+        self._predicted: list[float] = []
+        assumed = partial(assumed_uncertainty, robot)
+        gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
         self._log_trial(healthy, "before", gait)
-        self._fit_self_model()
+        calibration = self._fit_self_model()
         self._log_trial(damaged, "after", gait)
-        self._choose_comparator()
+        comparator = self.choose_comparator(self.simulator.robot, self.trials)
+        self.on_event(comparator)
+        search = DiagnosticSearch(
+            *(self.simulator, comparator.comparator, self.settings, self.kinds),
+            healthy_trials=self.trials[:1],
+            calibrate=self.calibrate,
+        )
         for left in range(self.settings.trials, 0, -1):
             self.trials_left = left
-            self._diagnose()
+            self._diagnose(search)
             controller = self.next_trial(self)  # by default, the first of ``repaired``
             self._log_trial(damaged, "recovery", controller)
-        self._diagnose()
-        return self._result()
+        self._diagnose(search)
+        return self._result(comparator, calibration, search)
 
     def repaired(self) -> tuple[repairs.CandidateController, ...]:
         """Evolves controllers that compensate for the last diagnosis; returns them best first."""
-        diagnosis = self.known.diagnoses[-1]
-        uncertainty = partial(self._posterior.after, self.known.trials, diagnosis.best)
+        diagnosis = self.diagnoses[-1]
+        uncertainty = partial(self._posterior.after, self.trials, diagnosis.best)
         return self._evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
 
-    def _begin(self) -> None:
-        HypothesisSpace.of(self.kinds, self.simulator.robot.anatomy)  # refused before any trial
-        # From the nominal robot: the numbers of the calibrated model are rounded.
-        self._design = self.design or network_for(self.simulator.robot)
-        self._repairs: list[repairs.Repair] = []
-        self._begin_repair()
-        self._predictions: dict[Controller, float] = {}
-        self._predicted: list[float] = []
-
-    def _begin_repair(self) -> None:
-        """Adds a repair in the simulator of now."""
-        repair = self.make_repair(self.simulator, self.settings, self._design, self.score)
-        self._repairs.append(repair)
-
-    def _evolve_gait(self) -> Controller:
-        assumed = partial(assumed_uncertainty, self.simulator.robot)
-        return self._evolved((INTACT,), assumed)[0].controller
+    def _repair_in_simulator(self) -> repairs.Repair:
+        return self.make_repair(self.simulator, self.settings, self._design, self.score)
 
     def _evolved(
         self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
     ) -> tuple[repairs.CandidateController, ...]:
         """Evolves controllers for hypotheses, best first; returns them best first."""
         self.on_event(SearchBegins("repair", hypotheses[0]))
-        rng = random_stream(self.seed, "repair", len(self.known.diagnoses))
-        repair, seeds = self._repairs[-1], self.known.controllers
-        candidates = repair(hypotheses, uncertainty, seeds, rng, self.on_event)
+        rng = random_stream(self.seed, "repair", len(self.diagnoses))
+        repair = self._repairs[-1]
+        candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
         self._predictions.update({each.controller: each.predicted for each in candidates})
         return candidates
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
-        name = f"{len(self.known.trials):02d}-{stage}"
         predicted = math.nan if stage == "after" else self._predictions.get(controller, math.nan)
         self._predicted.append(predicted)
+        name = f"{len(self.trials):02d}-{stage}"
         plan = TrialPlan(name, stage, controller, self.settings.steps, self.seed)
         trial = self.run_trial(robot, plan)
-        self.known = replace(self.known, trials=(*self.known.trials, trial))
+        self.trials = (*self.trials, trial)
         self.on_event(trial)
 
-    def _fit_self_model(self) -> None:
+    def _fit_self_model(self) -> Calibration | None:
         """Fits the self-model to the healthy trials; a new repair simulates the fitted one."""
-        healthy_trials, nominal = self.known.trials, self.simulator
+        healthy_trials, nominal = self.trials, self.simulator
         # Refused before the failure.
         check_measurable(self.score, nominal.robot, observed_in(healthy_trials[0]))
         self.choose_comparator(nominal.robot, healthy_trials)
-        self._calibration = self.calibrate(healthy_trials) if self.calibrate else None
-        if self._calibration is not None:
-            self.on_event(self._calibration)
-            if self._calibration.robot is not nominal.robot:
-                self.simulator = Simulator(self._calibration.robot, nominal.threads, nominal.stats)
-                self._begin_repair()
+        calibration = self.calibrate(healthy_trials) if self.calibrate else None
+        if calibration is not None:
+            self.on_event(calibration)
+            if calibration.robot is not nominal.robot:
+                self.simulator = Simulator(calibration.robot, nominal.threads, nominal.stats)
+                self._repairs.append(self._repair_in_simulator())
         rng = random_stream(self.seed, "posterior")
-        self._posterior = Posterior(
-            self.simulator, healthy_trials, self._calibration, self.settings, rng
-        )
+        self._posterior = Posterior(self.simulator, healthy_trials, calibration, self.settings, rng)
+        return calibration
 
-    def _choose_comparator(self) -> None:
-        robot, trials = self.simulator.robot, self.known.trials
-        self._comparator = self.choose_comparator(robot, trials)
-        self.on_event(self._comparator)
-        self._search = DiagnosticSearch(
-            self.simulator,
-            self._comparator.comparator,
-            self.settings,
-            self.kinds,
-            healthy_trials=trials[:1],
-            calibrate=self.calibrate,
-        )
-
-    def _diagnose(self) -> None:
+    def _diagnose(self, search: DiagnosticSearch) -> None:
         """Explains all trials since the failure; the last hypotheses seed the search."""
-        self.on_event(SearchBegins("diagnostic"))
-        number, known = len(self.known.diagnoses) + 1, self.known
-        rng = random_stream(self.seed, "diagnosis", number)
-        diagnosis = self._search(known.evidence, known.hypotheses, rng, self.on_event)
+        evidence = self.trials[1:]
+        diagnosis = _diagnosed(search, evidence, self.diagnoses, self.seed, self.on_event)
         self.store_diagnosis(diagnosis)
-        self.known = replace(known, diagnoses=(*known.diagnoses, diagnosis))
-        self.rng = random_stream(self.seed, "choice", number)
+        self.diagnoses = (*self.diagnoses, diagnosis)
+        self.rng = random_stream(self.seed, "choice", len(self.diagnoses))
         self.on_event(diagnosis)
 
-    def _result(self) -> Recovery:
-        trials, diagnoses = self.known.trials, self.known.diagnoses
-        robot, best = self.simulator.robot, diagnoses[-1].best
+    def _result(
+        self,
+        comparator: ChosenComparator,
+        calibration: Calibration | None,
+        search: DiagnosticSearch,
+    ) -> Recovery:
+        trials, robot, best = self.trials, self.simulator.robot, self.diagnoses[-1].best
         faults = [INTACT, *[best] * (len(trials) - 1)]  # the first trial is of the healthy robot
         return Recovery(
             trials=trials,
-            tried=(INTACT, INTACT, *(diagnosis.best for diagnosis in diagnoses[:-1])),
-            diagnosis=diagnoses[-1],
+            tried=(INTACT, INTACT, *(diagnosis.best for diagnosis in self.diagnoses[:-1])),
+            diagnosis=self.diagnoses[-1],
             repair_evaluations=sum(repair.evaluations for repair in self._repairs),
-            diagnostic_evaluations=self._search.evaluations,
-            distinct_hypotheses=self._search.distinct_hypotheses,
-            comparator=self._comparator,
-            calibration=self._calibration,
+            diagnostic_evaluations=search.evaluations,
+            distinct_hypotheses=search.distinct_hypotheses,
+            comparator=comparator,
+            calibration=calibration,
             score=self.score,
             predicted=tuple(self._predicted),
             scores=tuple(map(partial(self.score.of_trial, robot), faults, trials)),
@@ -244,14 +236,25 @@ def diagnose_trials(
     """
     if not trials:
         raise InputError("expected at least one trial to explain, got none")
-    known = Database()
+    diagnoses: tuple[Diagnosis, ...] = ()
     for number in range(1, len(trials) + 1) if after is None else sorted(after):
-        on_event(SearchBegins("diagnostic"))
-        rng = random_stream(seed, "diagnosis", number)
-        diagnosis = diagnose(trials[:number], known.hypotheses, rng, on_event)
-        known = Database(diagnoses=(diagnosis,))
-        on_event(diagnosis)
-    return diagnosis
+        diagnoses = (_diagnosed(diagnose, trials[:number], diagnoses, seed, on_event),)
+        on_event(diagnoses[-1])
+    return diagnoses[-1]
+
+
+def _diagnosed(
+    search: DiagnosticSearch,
+    trials: Sequence[Trial],
+    earlier: Sequence[Diagnosis],
+    seed: int,
+    on_event: Callable[[Event], None],
+) -> Diagnosis:
+    """Returns the diagnosis of trials; the search begins from the last of the earlier ones."""
+    on_event(SearchBegins("diagnostic"))
+    known = [each.hypothesis for each in earlier[-1].ranked] if earlier else []
+    rng = random_stream(seed, "diagnosis", len(trials))
+    return search(trials, known, rng, on_event)
 
 
 Purpose = Literal["repair", "diagnosis", "choice", "posterior", "gap"]

@@ -1,11 +1,10 @@
-"""Events of a recovery, what is known in it so far, and its result."""
+"""Events of a recovery, and its result."""
 
 import math
 from dataclasses import dataclass
 from typing import Any
 
 from selfmodel.arrays import data_frame, finite_or_none
-from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
@@ -13,7 +12,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
 from selfmodel.recovery.scores import DISPLACEMENT, Score
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.trials.trial import Trial, by_stage
+from selfmodel.trials.trial import Trial
 
 
 @dataclass(frozen=True)
@@ -44,34 +43,6 @@ Event = (
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
 a search, the progress of another stage, the chosen comparator, the calibration, a finished trial, a
 diagnosis."""
-
-
-@dataclass(frozen=True, eq=False)
-class Database:
-    """Logged trials with their controllers, and the diagnoses, in order: the seeds of the next EA.
-
-    Source: the paper, section III.
-    """
-
-    trials: tuple[Trial, ...] = ()
-    diagnoses: tuple[Diagnosis, ...] = ()
-
-    @property
-    def controllers(self) -> tuple[Controller, ...]:
-        """Distinct controllers that a physical robot has run, newest first."""
-        drivers = dict.fromkeys(trial.plan.controller for trial in reversed(self.trials))
-        return tuple(driver for driver in drivers if isinstance(driver, Controller))
-
-    @property
-    def evidence(self) -> tuple[Trial, ...]:
-        """Trials that a diagnosis has to explain, once the robot failed: all since then."""
-        return by_stage(self.trials)[0]
-
-    @property
-    def hypotheses(self) -> tuple[Hypothesis, ...]:
-        """Hypotheses of the newest diagnosis, best first; empty before the first diagnosis."""
-        ranked = self.diagnoses[-1].ranked if self.diagnoses else ()
-        return tuple(candidate.hypothesis for candidate in ranked)
 
 
 @dataclass(frozen=True)

@@ -81,11 +81,13 @@ def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(short: tuple[Pa
 
 def test_the_database_is_read_back_from_the_folder(short: tuple[Path, dict], quadruped: Robot):
     folder, told = short
-    database = FolderJournal(folder / "run", HypothesisSpace(quadruped.anatomy, ())).read()
+    trials, diagnoses = FolderJournal(folder / "run", HypothesisSpace(quadruped.anatomy, ())).read()
 
-    assert [t.displacement for t in database.trials] == [t["displacement"] for t in told["trials"]]
-    assert [t.plan.stage for t in database.evidence] == ["after", "recovery"]
-    assert [str(h) for h in database.hypotheses] == [d["hypothesis"] for d in told["diagnosis"]]
+    assert [t.displacement for t in trials] == [t["displacement"] for t in told["trials"]]
+    assert [t.plan.stage for t in trials] == ["before", "after", "recovery"]
+    assert [str(each.hypothesis) for each in diagnoses[-1].ranked] == [
+        d["hypothesis"] for d in told["diagnosis"]
+    ]
 
 
 def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(short: tuple[Path, dict]):

@@ -161,13 +161,12 @@ def test_the_logs_of_a_run_give_the_diagnosis_that_the_run_found(
 
 @pytest.mark.parametrize(("run", "robot"), [("recovery", "quadruped"), ("cpg", "hexapod")])
 def test_a_run_is_read_from_its_folder(run: str, robot: str):
-    database = FolderJournal(DATA / run, HypothesisSpace(ROBOTS[robot].robot().anatomy, ())).read()
+    space = HypothesisSpace(ROBOTS[robot].robot().anatomy, ())
+    trials, diagnoses = FolderJournal(DATA / run, space).read()
     result = json.loads((DATA / run / "result.json").read_text(encoding="utf-8"))
 
-    assert [t.displacement for t in database.trials] == [
-        trial["displacement"] for trial in result["trials"]
-    ]
-    assert [str(h) for h in database.hypotheses] == [
+    assert [t.displacement for t in trials] == [trial["displacement"] for trial in result["trials"]]
+    assert [str(each.hypothesis) for each in diagnoses[-1].ranked] == [
         ranked["hypothesis"] for ranked in result["diagnosis"]
     ]
 

@@ -28,7 +28,7 @@ from selfmodel.recovery.next_trial import (
 )
 from selfmodel.recovery.recover import RecoveryLoop, by_repair
 from selfmodel.recovery.repair import CandidateController, untried_mutants
-from selfmodel.recovery.result import Database, DiscriminatingTrial, Event
+from selfmodel.recovery.result import DiscriminatingTrial, Event
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
@@ -161,7 +161,7 @@ def loop_of(
     loop = RecoveryLoop(
         simulator=Simulator(robot, 1), settings=SMALL, seed=0, on_event=on_event, **unused
     )
-    loop.known = Database(tuple(trials), tuple(diagnoses))
+    loop.trials, loop.diagnoses = tuple(trials), tuple(diagnoses)
     loop.trials_left, loop.rng = 1, np.random.default_rng(0)
     loop.repaired = lambda: tuple(CandidateController(one, np.zeros(1)) for one in found)
     return loop

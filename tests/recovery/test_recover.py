@@ -226,10 +226,10 @@ def test_the_logs_are_all_that_is_known_and_what_they_hide_changes_nothing(
     assert outcomes[0].diagnosis == outcomes[1].diagnosis
     logs = [journal.trials / "01-after.mcap" for journal in journals]
     assert [read_truth(log) for log in logs] == [TRUTH, None]
-    stored = journals[0].read()
-    assert stored.diagnoses[-1] == outcomes[0].diagnosis
-    assert len(stored.diagnoses) == 2
-    for trial, again in zip(outcomes[0].trials, stored.trials, strict=True):
+    trials, diagnoses = journals[0].read()
+    assert diagnoses[-1] == outcomes[0].diagnosis
+    assert len(diagnoses) == 2
+    for trial, again in zip(outcomes[0].trials, trials, strict=True):
         assert (trial.path, trial.plan) == (again.path, again.plan)
         for signal, rows in trial.trajectory.signals.items():
             assert rows.tobytes() == again.trajectory[signal].tobytes()
@@ -240,9 +240,8 @@ def test_the_choice_of_the_next_trial_is_asked_before_each_and_obeyed(quadruped:
     given, events = random_controllers(quadruped, 3), []
 
     def choose(loop: RecoveryLoop) -> Controller:
-        known = loop.known
         draw = loop.rng.random()
-        asked.append((loop.trials_left, len(known.diagnoses), len(known.evidence), draw))
+        asked.append((loop.trials_left, len(loop.diagnoses), len(loop.trials) - 1, draw))
         return given[len(asked) - 1]
 
     outcome = recovery(quadruped, on_event=events.append, next_trial=choose)
@@ -368,8 +367,8 @@ def test_a_recovery_has_one_design_though_a_fitted_model_is_rounded(
     fitted = with_parameters(robot, dataclasses.replace(nominal(robot), friction=1.1))
 
     def separating(loop: RecoveryLoop) -> Controller:
-        known, rest = loop.known, (loop.simulator, loop.settings, loop.rng)
-        return discriminating_controller(known.diagnoses[-1], known.controllers, *rest)
+        rest = loop.simulator, loop.settings, loop.rng
+        return discriminating_controller(loop.diagnoses[-1], loop.controllers, *rest)
 
     outcome = recovery(
         robot,
