@@ -3,7 +3,7 @@
 import importlib
 import math
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandSource
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
@@ -36,7 +35,7 @@ from selfmodel.robot.state import (
 from selfmodel.simulation.prediction import activations
 from selfmodel.tasks.entry import Entry
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.trajectory import Sample, Trajectory
+from selfmodel.trials.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from dm_control.mujoco import Physics
@@ -77,7 +76,7 @@ def entry(domain: str, task: str) -> Entry:
     """Returns the registry entry of the body of a task, with its environment and its return."""
     return Entry(
         robot=partial(robot, domain, task),
-        physical=partial(SuiteRobot, domain, task),
+        physical=partial(suite_robot, domain, task),
         episode_return=episode_return(domain, task),
     )
 
@@ -167,37 +166,30 @@ class SuiteTask:
         self._task.before_step(self._delayed.popleft(), physics)
 
 
-class SuiteRobot:
-    """A physical robot in an environment of the suite, stepped through the dm_env interface.
-
-    Attributes:
-        returns: Sum of the environment's rewards, per run so far.
-    """
-
-    def __init__(self, domain: str, task: str, robot: Robot, hidden: Hypothesis) -> None:
-        variant = build(robot, hidden, OWN_SEED)
-        physics, rewarding = episode_parts(domain, task)
-        observed = _ObservedTask(rewarding, robot, variant)
-        control = importlib.import_module("dm_control.rl.control")
-        env = control.Environment(physics(variant.model), observed, n_sub_steps=robot.substeps)
-        self.returns = observed.returns
-        # A simulation needs no stop command, whose step would add a reward.
-        self._robot = EnvironmentRobot(
-            env,
-            robot,
-            stop=lambda: None,
-            signals=SIGNALS,
-            silent_neurons=variant.silent_neurons,
-        )
-        self.clock = self._robot.clock
-
-    def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
-        """Runs a controller; see ``PhysicalRobot``."""
-        return self._robot.run(controller, steps)
+def suite_robot(domain: str, task: str, robot: Robot, hidden: Hypothesis) -> EnvironmentRobot:
+    """Returns a physical robot in an environment of the suite, stepped by the dm_env interface."""
+    variant = build(robot, hidden, OWN_SEED)
+    physics, rewarding = episode_parts(domain, task)
+    control = importlib.import_module("dm_control.rl.control")
+    env = control.Environment(
+        physics(variant.model),
+        _ObservedTask(rewarding, robot, variant),
+        n_sub_steps=robot.substeps,
+    )
+    return EnvironmentRobot(
+        *(env, robot),
+        stop=lambda: None,  # a simulation needs no stop command, whose step would add a reward
+        signals=SIGNALS,
+        silent_neurons=variant.silent_neurons,
+    )
 
 
 class _ObservedTask(SuiteTask):
-    """A task of the suite, which was reset once, with the robot's initial pose and observations."""
+    """A task of the suite, which was reset once, with the robot's initial pose and observations.
+
+    Attributes:
+        returns: Sum of the rewards, per run so far.
+    """
 
     def __init__(self, task: "Task", robot: Robot, variant: ModelVariant) -> None:
         super().__init__(task, added_steps(robot.control_delay, float(variant.added_delay[0])))

@@ -9,7 +9,7 @@ from typing import Literal
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import BoolArray, FloatArray, IndexArray
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray, held
 from selfmodel.robot.contacts import touching_geoms
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer, with_known_base
@@ -73,7 +73,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, trajectory: Trajectory) -> Pos
         trajectory: One run with the signals of ``POSE``.
     """
     trajectory = with_known_base(robot, trajectory)
-    held = np.zeros(trajectory.steps, dtype=bool)
+    held_steps = np.zeros(trajectory.steps, dtype=bool)
     missing: list[str] = []
     state: dict[Signal, FloatArray] = {}
     for signal in POSE:
@@ -83,7 +83,7 @@ def poses_of(robot: Robot, model: mujoco.MjModel, trajectory: Trajectory) -> Pos
             # A position or a quaternion with a missing component is missing.
             seen[:] = seen.all(axis=1, keepdims=True)
         known: BoolArray = np.any(seen, axis=0)
-        held |= (~seen & known).any(axis=1)
+        held_steps |= (~seen & known).any(axis=1)
         if signal == "joint_positions":
             names = trajectory.names.columns(signal)
             missing += [name for column, name in enumerate(names) if not known[column]]
@@ -93,18 +93,10 @@ def poses_of(robot: Robot, model: mujoco.MjModel, trajectory: Trajectory) -> Pos
             state[signal] = _filled(values, seen)
         else:
             missing.append(signal)
-    forward = trajectory["base_position"][:, 0]
-    return Poses(positions_of(robot, model, state, trajectory.steps), held, tuple(missing), forward)
-
-
-def positions_of(
-    robot: Robot, model: mujoco.MjModel, state: dict[Signal, FloatArray], steps: int
-) -> FloatArray:
-    """Returns the positions of a model with these signals, ``(steps, nq)``; others are qpos0's."""
-    qpos = np.tile(model.qpos0, (steps, 1))
-    unmoved = np.zeros((steps, model.nv))
+    qpos = np.tile(model.qpos0, (trajectory.steps, 1))
+    unmoved = np.zeros((trajectory.steps, model.nv))
     state_writer(robot, {"qpos": qpos, "qvel": unmoved}.__getitem__, model)(state)
-    return qpos
+    return Poses(qpos, held_steps, tuple(missing), trajectory["base_position"][:, 0])
 
 
 def body_poses(data: mujoco.MjData, qpos: FloatArray) -> FloatArray:
@@ -222,7 +214,5 @@ def _covered(model: mujoco.MjModel, seen: BoolArray) -> BoolArray:
 
 def _filled(values: FloatArray, seen: BoolArray) -> FloatArray:
     """Returns each value, or else the last observation before it, or else the first one."""
-    rows = np.arange(len(values))[:, np.newaxis]
-    last = np.maximum.accumulate(np.where(seen, rows, -1), axis=0)
-    chosen = np.where(last < 0, seen.argmax(axis=0), last)
-    return np.asarray(np.take_along_axis(values, chosen, axis=0))
+    forward = held(np.where(seen, values, np.nan))
+    return np.where(np.isfinite(forward), forward, held(forward[::-1])[::-1])

@@ -61,8 +61,6 @@ class Robot:
 
     def __post_init__(self) -> None:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
-        if not model.opt.timestep > 0:
-            raise ValueError(f"the physics time step must be above 0 s, got {model.opt.timestep}")
         root = anatomy_reader.find_root_body(model, anatomy_reader.driven_joints(model))
         check_model(model, root)
         object.__setattr__(self, "model", model)
@@ -155,6 +153,10 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
         ValueError: The model has an unsupported part, or a number that is not finite or absurdly
             large; the message contains the name of the part.
     """
+    if not model.opt.timestep > 0:
+        raise ValueError(
+            f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
+        )
     numbers = [(f"option {name}", getattr(model.opt, name)) for name in _OPTIONS]
     numbers += [(name.replace("_", " "), getattr(model, name)) for name in _NUMBERS]
     for name, values in numbers:
@@ -242,10 +244,6 @@ def check_usable(model: mujoco.MjModel) -> None:
     Raises:
         InputError: The model cannot be a robot; the message has the reason and the part.
     """
-    if not model.opt.timestep > 0 or not np.isfinite(model.opt.timestep):
-        raise InputError(
-            f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
-        )
     tops = sorted({int(model.body_rootid[body]) for body in model.jnt_bodyid})
     if len(tops) > 1:  # a log contains the state of one robot
         raise InputError(

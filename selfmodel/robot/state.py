@@ -182,35 +182,35 @@ class SlidingBase:
             velocity = velocity + qvel[..., v, np.newaxis] * axis
         return rotated(velocity, self._orientation)
 
-    def _orientations(self, qpos: FloatArray, _qvel: FloatArray) -> FloatArray:
-        half = self._angles(qpos) / 2
+    def _orientations(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        half = self._turn(qpos, qvel)[0] / 2
         turned = np.concatenate([np.cos(half), np.sin(half) * self._axis], axis=-1)
         return product(self._orientation, turned)
 
-    def _rates(self, _qpos: FloatArray, qvel: FloatArray) -> FloatArray:
-        if self._hinge is None:
-            return np.zeros((*qvel.shape[:-1], 3))
-        return np.asarray(qvel[..., self._hinge[1], np.newaxis] * self._axis)
+    def _rates(self, qpos: FloatArray, qvel: FloatArray) -> FloatArray:
+        return np.asarray(self._turn(qpos, qvel)[1] * self._axis)
 
-    def _angles(self, qpos: FloatArray) -> FloatArray:
-        """Returns the angle of the hinge from its reference, ``(..., n, 1)`` rad."""
+    def _turn(self, qpos: FloatArray, qvel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Returns the angle of the hinge from its reference, rad, and its rate; 0 without it.
+
+        Both are ``(..., n, 1)``.
+        """
         if self._hinge is None:
-            return np.zeros((*qpos.shape[:-1], 1))
-        q, _, reference = self._hinge
-        return np.asarray(qpos[..., q, np.newaxis] - reference)
+            return np.zeros((*qpos.shape[:-1], 1)), np.zeros((*qvel.shape[:-1], 1))
+        q, v, reference = self._hinge
+        return qpos[..., q, np.newaxis] - reference, qvel[..., v, np.newaxis]
 
     def _origin_shift(self, qpos: FloatArray, qvel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns displacement and velocity of the body's origin due to the hinge.
 
         Both are ``(..., n, 3)``, m and m/s, in the body's reference frame.
         """
-        angle = self._angles(qpos)
-        if self._hinge is None or not self._anchor.any():
+        angle, rate = self._turn(qpos, qvel)
+        if not self._anchor.any():
             return np.zeros((*angle.shape[:-1], 3)), np.zeros((*angle.shape[:-1], 3))
         outward = self._anchor - self._axis * (self._axis @ self._anchor)
         across = np.cross(self._axis, self._anchor)
         cosine, sine = np.cos(angle), np.sin(angle)
-        rate = qvel[..., self._hinge[1], np.newaxis]
         return (
             outward * (1 - cosine) - across * sine,
             rate * (outward * sine - across * cosine),

@@ -70,7 +70,7 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
     assert not got.late.any()
     batch = {signal: got[signal][np.newaxis] for signal in score.record}
     worth = score.of(robot, truth, Trajectory(got.names, got.time, batch))
-    assert physical.returns == pytest.approx([worth[0]] * 2, rel=1e-9)
+    assert physical.env.task.returns == pytest.approx([worth[0]] * 2, rel=1e-9)
 
 
 @pytest.mark.parametrize(("domain", "task"), FIRST)
