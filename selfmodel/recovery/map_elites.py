@@ -5,7 +5,6 @@ Source: J.-B. Mouret and J. Clune, *Illuminating search spaces by mapping elites
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from time import perf_counter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -152,13 +151,13 @@ def _archive(
     return archive, emitter
 
 
-def feet_of(anatomy: Anatomy) -> tuple[str, ...]:
-    """Returns the names of the touch sensors, one per foot.
+def feet_of(anatomy: Anatomy) -> list[int]:
+    """Returns the columns of the touch sensors, one per foot.
 
     Raises:
         InputError: The robot has no touch sensors, or more than the grid can have axes.
     """
-    feet = tuple(sensor.name for sensor in anatomy.sensors if sensor.kind == "touch")
+    feet = [k for k, sensor in enumerate(anatomy.sensors) if sensor.kind == "touch"]
     if not feet:
         raise InputError(
             "a repertoire needs the touch sensors of feet, and this robot has none: add sites "
@@ -172,45 +171,32 @@ def feet_of(anatomy: Anatomy) -> tuple[str, ...]:
     return feet
 
 
-def duty_factors(anatomy: Anatomy, readings: FloatArray) -> FloatArray:
-    """Returns the duty factor of each foot: the fraction of the steps with ground contact.
-
-    Source: A. Cully, J. Clune, D. Tarapore and J.-B. Mouret, *Robots that can adapt like animals*
-    (Nature 521:503, 2015), Methods: the behavioural descriptor of the hexapod.
-
-    Args:
-        anatomy: Parts of the robot.
-        readings: Readings of all sensors, ``(..., steps, sensors)``; touch is 0 or 1.
-    """
-    touch = [k for k, sensor in enumerate(anatomy.sensors) if sensor.kind == "touch"]
-    return np.asarray(readings[..., touch].mean(axis=-2))
-
-
 def simulated_evaluation(simulator: Simulator, hypothesis: Hypothesis, steps: int) -> Evaluate:
     """Returns the evaluation of gaits by their forward displacement in simulation, m.
 
-    The score is negative infinity for a gait that falls, diverges, or does not move forward.
+    The score is negative infinity for a gait that falls, diverges, or does not move forward. The
+    duty factor of a foot is the fraction of the steps with ground contact. Source: A. Cully,
+    J. Clune, D. Tarapore and J.-B. Mouret, *Robots that can adapt like animals* (Nature 521:503,
+    2015), Methods: the behavioural descriptor of the hexapod.
 
     Raises:
         InputError: The robot has no touch sensors.
     """
-    feet_of(simulator.robot.anatomy)
-    return partial(_evaluate, simulator, hypothesis, steps)
+    robot, feet = simulator.robot, feet_of(simulator.robot.anatomy)
 
+    def evaluate(controllers: Sequence[Controller]) -> tuple[FloatArray, FloatArray]:
+        scores, duty = [], []
+        for start in range(0, len(controllers), BATCH):
+            runs = [(hypothesis, one) for one in controllers[start : start + BATCH]]
+            outcome = simulator.run(runs, steps, RECORD)
+            moved = np.array(forward_displacement(outcome.trajectory))
+            fell = falls_of(robot, hypothesis, outcome.trajectory) < steps
+            moved[outcome.diverged | fell | ~(moved > 0)] = -np.inf
+            scores.append(moved)
+            duty.append(outcome.trajectory["sensors"][..., feet].mean(axis=-2))
+        return np.concatenate(scores), np.concatenate(duty)
 
-def _evaluate(
-    simulator: Simulator, hypothesis: Hypothesis, steps: int, controllers: Sequence[Controller]
-) -> tuple[FloatArray, FloatArray]:
-    robot, scores, duty = simulator.robot, [], []
-    for start in range(0, len(controllers), BATCH):
-        runs = [(hypothesis, one) for one in controllers[start : start + BATCH]]
-        outcome = simulator.run(runs, steps, RECORD)
-        moved = np.array(forward_displacement(outcome.trajectory))
-        fell = falls_of(robot, hypothesis, outcome.trajectory) < steps
-        moved[outcome.diverged | fell | ~(moved > 0)] = -np.inf
-        scores.append(moved)
-        duty.append(duty_factors(robot.anatomy, outcome.trajectory["sensors"]))
-    return np.concatenate(scores), np.concatenate(duty)
+    return evaluate
 
 
 def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, ...]:

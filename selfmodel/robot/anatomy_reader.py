@@ -151,7 +151,7 @@ def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:
     return tuple(touch + angle)
 
 
-def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
+def find_root_body(model: mujoco.MjModel) -> int:
     """Returns the id of the root body of a robot.
 
     The root body is the body with a free joint or with slide joints. Without such a body the base
@@ -162,7 +162,7 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         ValueError: The model has several floating bases; or none, and slide joints on a body of the
             world, or no static body below the world that carries all driven joints.
     """
-    floating = floating_bodies(model, driven)
+    floating = floating_bodies(model)
     if len(floating) > 1:
         names = ", ".join(model.body(body).name or f"number {body}" for body in floating)
         raise ValueError(
@@ -171,7 +171,7 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
         )
     if floating:
         return floating[0]
-    if not driven:
+    if not driven_joints(model):
         raise ValueError("the motors drive no joint: give the joints of the limbs motors")
     for joint in np.flatnonzero(model.jnt_type != _HINGE):
         body = model.body(model.jnt_bodyid[joint])
@@ -182,7 +182,7 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
                 f"the body {body.name or 'without a name'} has other joints: give the root body a "
                 f"<freejoint/>, or only hinges to its parent"
             )
-    carrier = common_carrier(model, driven)
+    carrier = common_carrier(model)
     if not carrier:
         raise ValueError(
             "the driven joints are on several bodies of the world, or directly on one, and the "
@@ -191,7 +191,7 @@ def find_root_body(model: mujoco.MjModel, driven: frozenset[int]) -> int:
     return carrier
 
 
-def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
+def floating_bodies(model: mujoco.MjModel) -> list[int]:
     """Returns the ids of the bodies that can be a floating base.
 
     They have a free joint; or else they are bodies of the world with independent slide joints and
@@ -208,17 +208,17 @@ def floating_bodies(model: mujoco.MjModel, driven: frozenset[int]) -> list[int]:
         in_order = kinds in ([_SLIDE] * slides, [_SLIDE] * slides + [_HINGE])
         axes = model.jnt_axis[joints[:slides]]
         if slides and in_order and np.linalg.matrix_rank(axes) == slides:
-            sliding += [] if driven.intersection(joints) else [body]
+            sliding += [] if driven_joints(model).intersection(joints) else [body]
     return sliding
 
 
-def common_carrier(model: mujoco.MjModel, joints: frozenset[int]) -> int:
-    """Returns the id of the static body nearest to some joints that carries all of them.
+def common_carrier(model: mujoco.MjModel) -> int:
+    """Returns the id of the static body nearest to the driven joints that carries all of them.
 
     It is 0, the world, if no other static body does.
     """
     chains = [
         {0}.union(b for b in ancestors(model, int(body))[1:] if not model.body_weldid[b])
-        for body in model.jnt_bodyid[list(joints)]
+        for body in model.jnt_bodyid[list(driven_joints(model))]
     ]
     return max(set.intersection(*chains))

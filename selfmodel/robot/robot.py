@@ -61,7 +61,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
-        root = anatomy_reader.find_root_body(model, anatomy_reader.driven_joints(model))
+        root = anatomy_reader.find_root_body(model)
         check_model(model, root)
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", anatomy_reader.read_anatomy(model, root))
@@ -251,14 +251,13 @@ def check_usable(model: mujoco.MjModel) -> None:
             f"{listed([model.body(body).name for body in tops], 12)}: keep the robot, and remove "
             f"the other bodies or fix them to the world"
         )
-    driven = anatomy_reader.driven_joints(model)
-    if not driven:
+    if not anatomy_reader.driven_joints(model):
         raise InputError(
             "the model has no actuators, or its motors drive no joint, so no fault could be "
             "diagnosed: give the joints of its limbs motors in <actuator>"
         )
     try:
-        root = anatomy_reader.find_root_body(model, driven)
+        root = anatomy_reader.find_root_body(model)
         check_model(model, root)
     except ValueError as error:
         raise InputError(str(error)) from error

@@ -42,7 +42,7 @@ def free_base(work: Work) -> None:
     """Gives the root body of a fixed robot a free joint; a floating base stays as it is."""
     model = work.model
     driven = anatomy.driven_joints(model)
-    if not driven or anatomy.floating_bodies(model, driven):
+    if not driven or anatomy.floating_bodies(model):
         return
     tops = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in driven}
     body = min(tops)
@@ -64,9 +64,7 @@ def carry_hinges(work: Work) -> None:
     """Adds the root body of a fixed base if hinges are directly on bodies of the world."""
     model = work.model
     driven = anatomy.driven_joints(model)
-    if not driven:
-        return
-    if anatomy.floating_bodies(model, driven) or anatomy.common_carrier(model, driven):
+    if not driven or anatomy.floating_bodies(model) or anatomy.common_carrier(model):
         return
     tops = {model.body(model.body_rootid[model.jnt_bodyid[joint]]).name for joint in driven}
     name = UniqueNames(element.get("name") for element in work.bodies()).new("base")
@@ -201,9 +199,8 @@ def fix_base(work: Work) -> None:
     which the robot cannot touch the ground if that is larger.
     """
     model, height = work.model, work.settings.base_height
-    driven = anatomy.driven_joints(model)
-    floating = anatomy.floating_bodies(model, driven)
-    root = floating[0] if floating else anatomy.common_carrier(model, driven)
+    floating = anatomy.floating_bodies(model)
+    root = floating[0] if floating else anatomy.common_carrier(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     wanted = float(data.xpos[root, 2]) if height is None else height
@@ -286,7 +283,7 @@ def add_ground(work: Work) -> None:
     swims = model.opt.density or model.opt.viscosity
     if swims or not contacts.contacts_enabled(model) or contacts.ground_contact_geoms(model):
         return
-    if not anatomy.floating_bodies(model, anatomy.driven_joints(model)):
+    if not anatomy.floating_bodies(model):
         return
     moving = ~contacts.static_geoms(model)
     contype, conaffinity = (
