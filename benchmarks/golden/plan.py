@@ -141,7 +141,7 @@ def _imports() -> Iterator[Scenario]:
 
 
 def _pair(robot: str, damage: str, options: str, gait: int = 0, steps: int = 400) -> Commands:
-    """Returns the commands of a healthy trial and of one with a failure, in one reality gap."""
+    """Returns the commands of a healthy trial and of one with a failure, each in its own gap."""
     common = f"--steps {steps} {_gait(robot, gait)} {options}"
     before, after = f"--stage before --seed 3 {common}", f"--damage {damage} --seed 4 {common}"
     return {
