@@ -11,7 +11,7 @@ from selfmodel.diagnosis.losses import LossTable, Parts
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.joints import JAMMED_AT_ANGLE, OF_MOTORS, SERVO_GAIN, WEAK_MOTOR
+from selfmodel.faults.joints import JAMMED_AT_ANGLE, SERVO_GAIN, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
 from selfmodel.robot.anatomy import Anatomy
@@ -88,7 +88,8 @@ class Problem:
         parts = space.parts(SERVO_GAIN) if is_asked and WEAK_MOTOR in space.kinds else ()
         alike = []
         for part in parts:
-            faults = [Fault(kind, part, value) for kind in OF_MOTORS for value in TOLD_APART]
+            kinds = (WEAK_MOTOR, SERVO_GAIN)
+            faults = [Fault(kind, part, value) for kind in kinds for value in TOLD_APART]
             losses = self.losses([Hypothesis((fault,)) for fault in faults])
             one, other = np.split(losses, 2)
             if np.isfinite(losses).all() and np.array_equal(one, other):

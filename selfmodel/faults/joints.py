@@ -144,6 +144,27 @@ class WeakMotor(MotorFault):
         return not fault.severity and other.part == fault.part and other.kind == SERVO_GAIN
 
 
+class MotorOff(MotorFault):
+    """A joint whose motors are off: no torque, and only a part of the joint's resistance.
+
+    What a healthy trial shows as damping and dry friction of a joint is partly that of its motors:
+    the voltage that they induce, and the friction of gears, which grows with the torque that they
+    transmit. Both go with the torque. The severity is the share of damping and dry friction that is
+    left; with all of it, the motor is a weak one without torque.
+    """
+
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
+        """Zeroes the forces of the motors, and scales the resistance of the hinges."""
+        joint = anatomy.joint(fault.part)
+        variant.weaken_motors([anatomy.motors.index(motor) for motor in joint.motors], 0.0)
+        for hinge in joint.hinges:
+            variant.scale_resistance(hinge, fault.severity)
+
+    def absorbs(self, fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
+        """Returns whether the other fault is of the torque of the same motors."""
+        return other.part == fault.part and other.kind in (WEAK_MOTOR, SERVO_GAIN)
+
+
 class ServoGain(MotorFault):
     """A joint whose servos have a lower gain, such as that of a firmware, with the same limits.
 
@@ -269,6 +290,18 @@ WEAK_MOTOR = WeakMotor(
     words="the motor of the joint {part} has only {severity:.0%} of its torque left",
     is_of_joint=True,
 )
+MOTOR_OFF = MotorOff(
+    name="motor-off",
+    keyword="motor",
+    prefix="off",
+    base="fixed",
+    bounds=(0.0, 1.0),
+    levels=(0.0, 0.1, 0.2, 0.5),
+    degenerates_to={1.0: WEAK_MOTOR},
+    unit="of the joint's resistance",
+    words="the motor of the joint {part} is off, with {severity:.0%} of the joint's friction left",
+    is_of_joint=True,
+)
 SERVO_GAIN = ServoGain(
     name="servo-gain",
     base="fixed",
@@ -336,5 +369,5 @@ LOADED_LINK = LoadedLink(
     unit="kg",
     words="the link of the joint {part} carries {severity:.3g} kg more",
 )
-OF_MOTORS = (WEAK_MOTOR, SERVO_GAIN)
-"""Kinds without effect on a motor that moves nothing; equal where no force limit is reached."""
+OF_MOTORS = (WEAK_MOTOR, MOTOR_OFF, SERVO_GAIN)
+"""Kinds without effect on a motor that moves nothing."""

@@ -16,7 +16,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(world.FRICTION, world.SLOPE, world.ROUGHNESS, world.WIND, world.CROSSWIND),
         *(world.PAYLOAD, joints.DAMPED_JOINT, joints.JOINT_FRICTION, joints.LOST_GRIP),
         *(world.GROWN_DELAY, joints.ENCODER_OFFSET, joints.ENCODER_SLIP, joints.LOADED_LINK),
-        joints.SERVO_GAIN,
+        *(joints.SERVO_GAIN, joints.MOTOR_OFF),
     )
 }
 """All built-in kinds by name."""
@@ -34,7 +34,7 @@ KIND_SETS: Mapping[str, tuple[FaultKind, ...]] = {
     "paper": PAPER_KINDS,
     "body": _BODY_KINDS,
     "environment": _ENVIRONMENT_KINDS,
-    "default": (*_BODY_KINDS, joints.SERVO_GAIN, *_ENVIRONMENT_KINDS),
+    "default": (*_BODY_KINDS, joints.SERVO_GAIN, joints.MOTOR_OFF, *_ENVIRONMENT_KINDS),
     "all": ALL_KINDS,
 }
 """Sets of kinds, by the names that ``--kinds`` accepts in place of their kinds. ``body`` and

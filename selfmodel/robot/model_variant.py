@@ -156,9 +156,11 @@ class ModelVariant:
         self.model.actuator_biasprm[motors] *= factor
 
     def weaken_motors(self, motors: Sequence[int], factor: float) -> None:
-        """Scales the forces and the force limits of motors, given by id."""
+        """Scales the forces, the force limits and the damping of motors, given by id."""
         self.scale_gains(motors, factor)
         self.model.actuator_forcerange[motors] *= factor
+        self.model.actuator_damping[motors] *= factor
+        self.model.actuator_dampingpoly[motors] *= factor
         # A joint that several of the motors drive is scaled once.
         joints = {joint for motor in motors for joint in actuators.motor_joints(self.model, motor)}
         self.model.jnt_actfrcrange[sorted(joints)] *= factor
@@ -188,6 +190,13 @@ class ModelVariant:
             model.dof_dampingpoly[dof] *= factor
         else:
             model.dof_damping[dof] = max(factor - 1, 0.0) * model.dof_M0[dof]
+
+    def scale_resistance(self, hinge: str, factor: float) -> None:
+        """Scales the viscous damping and the dry friction that a hinge has."""
+        model, dof = self.model, int(self.model.joint(hinge).dofadr[0])
+        model.dof_damping[dof] *= factor
+        model.dof_dampingpoly[dof] *= factor
+        model.dof_frictionloss[dof] *= factor
 
     def add_dry_friction(self, hinge: str, fraction: float) -> None:
         """Adds dry friction to a hinge: a fraction of the largest torque of its motors."""
