@@ -54,6 +54,8 @@ def test_canonical_form_is_a_fixed_point(name: str, data: st.DataObject):
         ("jam:front_left_knee+damping:front_left_knee=8", "jam:front_left_knee"),
         ("break:front_left_knee+joint-friction:front_left_knee=0.4", "break:front_left_knee"),
         ("motor:front_left_knee=0+servo-gain:front_left_knee=0.5", "motor:front_left_knee=0.0"),
+        ("motor:front_left_knee=off0.1+motor:front_left_knee=0.5", "motor:front_left_knee=off0.1"),
+        ("jam:front_left_knee+motor:front_left_knee=off0.1", "jam:front_left_knee"),
         ("break:front_left_knee+servo-gain:front_left_knee=0.5", "break:front_left_knee"),
         ("break:front_left_shoulder+grip:front_left_knee=0.2", "break:front_left_shoulder"),
         ("break:front_left_knee+encoder-offset:front_left_knee=slip0.1", "break:front_left_knee"),

@@ -97,6 +97,30 @@ def test_the_gain_of_a_servo_holds_less_at_the_same_error_and_as_much_at_most(qu
     )
 
 
+def test_a_motor_that_is_off_takes_its_share_of_the_resistance_of_its_own_joint(quadruped: Robot):
+    def perturb(model: mujoco.MjModel) -> mujoco.MjModel:
+        model.dof_frictionloss[6:], model.actuator_damping[:] = 0.2, 0.1
+        return model
+
+    joint, motor = "front_left_knee", quadruped.anatomy.motors.index("front_left_knee")
+    before = perturb(copy.copy(quadruped.model))
+    space = quadruped.anatomy
+    off = build(quadruped, parse(f"motor:{joint}=off0.1", space), perturb=perturb).model
+    weak = build(quadruped, parse(f"motor:{joint}=0.5", space), perturb=perturb).model
+
+    for model, share, torque in ((off, 0.1, 0.0), (weak, 1.0, 0.5)):
+        resistance, strength = np.ones(model.nv), np.ones(model.nu)
+        resistance[model.joint(joint).dofadr[0]], strength[motor] = share, torque
+        for name in ("damping", "frictionloss"):
+            assert getattr(model, f"dof_{name}") == pytest.approx(
+                resistance * getattr(before, f"dof_{name}")
+            )
+        for name in ("damping", "gainprm", "biasprm", "forcerange"):
+            scaled = strength * getattr(before, f"actuator_{name}").T
+            assert pytest.approx(scaled) == getattr(model, f"actuator_{name}").T
+    assert str(parse(f"motor:{joint}=off1", space)) == f"motor:{joint}=0.0"
+
+
 def test_the_largest_torque_of_a_motor_without_a_limit_is_that_of_its_largest_command():
     mjcf = with_motor('gear="-3"').mjcf.replace("-1 1", "-0.5 2")
     robot = Robot("geared", mjcf, 0.02)

@@ -174,7 +174,7 @@ def test_a_set_of_kinds_has_a_name_that_mixes_with_single_kinds():
     assert names_of("paper") == paper
     assert names_of("paper,motor") == (*paper, "motor")
     assert names_of("motor,paper,break") == ("motor", *paper)
-    assert names_of("default") == names_of("body,servo-gain,environment")
+    assert names_of("default") == names_of("body,servo-gain,motor-off,environment")
     assert {"jam-angle", "motor"} <= set(names_of("body")) - set(names_of("environment"))
     assert {"friction", "slope", "wind"} <= set(names_of("environment"))
     assert set(names_of("default")) < set(names_of("all"))
@@ -192,7 +192,7 @@ def names_of(names: str) -> tuple[str, ...]:
     [
         ("brake", "unknown kind 'brake': did you mean break"),
         ("papr", "unknown kind 'papr': did you mean paper"),
-        ("brake", "load, servo-gain, paper, body, environment, default, all$"),
+        ("brake", "load, servo-gain, motor-off, paper, body, environment, default, all$"),
         ("", "unknown kind ''"),
         ("break,", "unknown kind ''"),
         ("neuron", "unknown kind 'neuron'"),
