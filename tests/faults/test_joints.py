@@ -99,11 +99,12 @@ def test_the_gain_of_a_servo_holds_less_at_the_same_error_and_as_much_at_most(qu
 
 def test_a_motor_that_is_off_takes_its_share_of_the_resistance_of_its_own_joint(quadruped: Robot):
     def perturb(model: mujoco.MjModel) -> mujoco.MjModel:
+        model = copy.copy(model)
         model.dof_frictionloss[6:], model.actuator_damping[:] = 0.2, 0.1
         return model
 
     joint, motor = "front_left_knee", quadruped.anatomy.motors.index("front_left_knee")
-    before = perturb(copy.copy(quadruped.model))
+    before = perturb(quadruped.model)
     space = quadruped.anatomy
     off = build(quadruped, parse(f"motor:{joint}=off0.1", space), perturb=perturb).model
     weak = build(quadruped, parse(f"motor:{joint}=0.5", space), perturb=perturb).model
