@@ -63,6 +63,10 @@ class LoggedMotion(NamedTuple):
     tolerance: FloatArray
     known: BoolArray
 
+    def of(self, own: slice) -> "LoggedMotion":
+        """Returns the motion in some of the segments."""
+        return LoggedMotion(self.within[own], self.overall[own], self.tolerance, self.known[own])
+
 
 def logged_motion(positions: FloatArray, starts: IndexArray, horizon: int) -> LoggedMotion:
     """Returns the motion of the encoders in the segments of a trial.
@@ -169,6 +173,12 @@ class LooseEncoders(NamedTuple):
     sensors: IndexArray
     readings: FloatArray
     source: IndexArray
+
+    def of(self, own: slice) -> "LooseEncoders":
+        """Returns the encoders in some of the segments."""
+        return self._replace(
+            angles=self.angles[own], velocities=self.velocities[own], readings=self.readings[own]
+        )
 
 
 def loose_encoders(

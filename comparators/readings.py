@@ -46,6 +46,10 @@ class LoggedReadings(NamedTuple):
     binary: BoolArray
     mid_trial: BoolArray
 
+    def of(self, own: slice) -> "LoggedReadings":
+        """Returns the readings in some of the segments."""
+        return LoggedReadings(self.values[own], self.binary, self.mid_trial[own])
+
 
 def logged_readings(logged: FloatArray, starts: IndexArray, horizon: int) -> LoggedReadings:
     """Returns the readings in the segments of a trial, of all readings ``(steps, sensors)``."""

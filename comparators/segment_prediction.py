@@ -3,13 +3,14 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators import encoders, readings
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
-from selfmodel.simulation.requests import chained, command_steps, cut_segments
+from selfmodel.simulation.requests import MAX_CHAIN, chained, command_steps, cut_segments
 from selfmodel.trials.estimation import (
     BASE,
     JOINTS,
@@ -96,32 +97,47 @@ class SegmentPrediction:
         loose = encoders.loose_encoders(trajectory, starts, horizon)
         arithmetic = readings.arithmetic_loss(trial, starts, horizon)
 
-        def losses(simulated: Trajectory) -> Losses:
-            """Returns the losses of each segment that has any."""
+        def losses(simulated: Trajectory, own: slice) -> Losses:
+            """Returns the losses of each segment that has any, of some that were simulated."""
+            counted, followed = steady[own], loose and loose.of(own)
             predicted = (
-                encoders.with_loose_encoders(simulated, loose) if loose else simulated.signals
+                encoders.with_loose_encoders(simulated, followed) if followed else simulated.signals
             )
             shape = predicted["sensors"].shape[:2]
-            terms = {"commands": np.broadcast_to(arithmetic, shape)}
+            terms = {"commands": np.broadcast_to(arithmetic[own], shape)}
             for signal, values in logged.items():
-                error = difference(signal, predicted[signal][:, :, compared], values)
+                error = difference(signal, predicted[signal][:, :, compared], values[own])
                 scaled = error / PREDICTION_ERROR_SCALES[signal]
                 terms[signal] = readings.finite_mean(np.log1p(np.square(scaled)))
-            terms["sensors"] = readings.readings_loss(predicted["sensors"], reading_log, steady)
-            terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion)
+            terms["sensors"] = readings.readings_loss(
+                predicted["sensors"], reading_log.of(own), counted
+            )
+            terms["encoder motion"] = encoders.encoder_motion_loss(simulated, motion.of(own))
             total = np.zeros(shape)
             for term in terms.values():
                 total += term
+            at_compared = {signal: values[own] for signal, values in logged.items()}
             return Losses(
-                total=total if steady.all() else np.ascontiguousarray(total[:, steady]),
-                by_signal={signal: term[:, steady] for signal, term in terms.items()},
-                by_hinge=encoders.hinge_losses(simulated, logged, compared)[:, steady],
+                total=total if counted.all() else np.ascontiguousarray(total[:, counted]),
+                by_signal={signal: term[:, counted] for signal, term in terms.items()},
+                by_hinge=encoders.hinge_losses(simulated, at_compared, compared)[:, counted],
             )
 
         record: tuple[Signal, ...] = (*self.state, "sensors")
-        request = cut_segments(trajectory, states, starts, horizon, record, chains=chains)
-        piece_steps = (starts[:, np.newaxis] + np.array([0, horizon]))[steady]
-        return Prepared(request, losses, piece_steps)
+
+        def prepared(own: slice, chains: int) -> Prepared:
+            begins = starts[own]
+            request = cut_segments(trajectory, states, begins, horizon, record, chains=chains)
+            piece_steps = (begins[:, np.newaxis] + np.array([0, horizon]))[steady[own]]
+            return Prepared(request, partial(losses, own=own), piece_steps)
+
+        whole = prepared(slice(None), chains)
+        if chains == 1 or trajectory.time[-1] <= MAX_CHAIN:
+            return whole
+        size = len(starts) // chains
+        parts = [slice(first, first + size) for first in range(0, len(starts), size)]
+        sections = [prepared(own, 1) for own in parts if steady[own].any()]
+        return dataclasses.replace(whole, sections=sections)
 
     def _starts(
         self, trial: Trial, states: Mapping[Signal, FloatArray]

@@ -1,14 +1,16 @@
 """Comparator interface: losses of simulated trajectories against a logged trial."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-from selfmodel.arrays import FloatArray, IndexArray
+import numpy as np
+
+from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.simulation.requests import Request
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, TrialPart
 
 
 @runtime_checkable
@@ -69,7 +71,8 @@ class PiecewiseTrial(Protocol):
     The losses make a paired test possible: whether one hypothesis is *significantly* closer to
     the trial than another. An attribute ``piece_steps`` is optional: the first and the last
     control step of each piece, ``(pieces, 2)``, in increasing order. With it, a change in time can
-    be found.
+    be found. ``sections`` is optional too: prepared trials of parts of a long trial, which together
+    have these pieces in this order; of a part of the trial, only its sections are simulated.
     """
 
     @property
@@ -118,6 +121,26 @@ class Prepared:
     request: Request
     losses: Callable[[Trajectory], FloatArray | Losses]
     piece_steps: IndexArray | None = None
+    sections: Sequence["Prepared"] = ()
+
+
+PreparedPart = PreparedTrial | PiecewiseTrial
+"""A prepared trial, or a section of one."""
+
+
+def piece_steps_of(prepared: PreparedPart) -> IndexArray | None:
+    """Returns the first and the last step of each piece, ``(pieces, 2)``; None without any."""
+    steps: IndexArray | None = getattr(prepared, "piece_steps", None)
+    return steps
+
+
+def pieces_within(part: TrialPart, prepared: PreparedPart) -> BoolArray | slice:
+    """Returns which pieces lie within a part of a trial."""
+    steps = piece_steps_of(prepared)
+    if part.is_whole or steps is None:
+        return slice(None)
+    times = part.trial.trajectory.time[steps]
+    return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
 
 
 class TrialRefusedError(InputError):

@@ -14,8 +14,10 @@ from selfmodel.diagnosis.comparator import (
     Comparator,
     Losses,
     PiecewiseTrial,
-    PreparedTrial,
+    PreparedPart,
     as_comparator,
+    piece_steps_of,
+    pieces_within,
 )
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
@@ -53,16 +55,17 @@ class Timeline(NamedTuple):
 class LossTable:
     """Losses of hypotheses on trials, by the content of the trial and the hypothesis.
 
-    A trial is prepared once, and a hypothesis is simulated once for each trial: the total, the
-    parts of signals and the losses of hinges are of one simulation. They are independent of the
-    hypotheses computed before.
+    A trial is prepared once, and a hypothesis is simulated once for each trial, or each section of
+    a long one: the total, the parts of signals and the losses of hinges are of one simulation. They
+    are independent of the hypotheses computed before. Of a part of a trial, the sections that have
+    a piece in it are simulated.
     """
 
     def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
         self._simulator = simulator
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
-        self._prepared: dict[Hashable, PreparedTrial | PiecewiseTrial] = {}
-        self._known: dict[tuple[Hashable, Hypothesis], Losses] = {}
+        self._prepared: dict[Hashable, PreparedPart] = {}
+        self._known: dict[tuple[Hashable, int, Hypothesis], Losses] = {}
 
     def of_robot(self, robot: Robot) -> "LossTable":
         """Returns an empty table of the same comparator, with another self-model."""
@@ -82,10 +85,10 @@ class LossTable:
         It is infinite for a hypothesis whose simulation diverges.
         """
         total = np.zeros(len(hypotheses))
-        for rows, pieces in self._rows_of(hypotheses, trials):
-            losses = (row.total[pieces] for row in rows)
+        for part in trials:
+            losses = self.losses(hypotheses, [part])
             # A change near the end of a trial leaves no piece of it.
-            total += [one.mean() if len(one) else 0.0 for one in losses]
+            total += losses.mean(axis=1) if losses.shape[1] else 0.0
         return total
 
     def losses(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
@@ -130,10 +133,10 @@ class LossTable:
         """Returns the times of the columns of ``losses``; None if the comparator has no times."""
         times = []
         for part in map(whole, trials):
-            steps = self._piece_steps(part.trial)
-            if steps is None:
+            prepared, time = self._of(part.trial), part.trial.trajectory.time
+            if (steps := piece_steps_of(prepared)) is None:
                 return None
-            times.append(part.trial.trajectory.time[steps][self._pieces(part)])
+            times.append(time[steps][pieces_within(part, prepared)])
         begin, end = np.concatenate(times).T
         return Timeline(np.repeat(np.arange(len(times)), [*map(len, times)]), begin, end)
 
@@ -176,46 +179,41 @@ class LossTable:
             return False
         return True
 
-    def _of(self, trial: Trial) -> PreparedTrial | PiecewiseTrial:
+    def _of(self, trial: Trial) -> PreparedPart:
         """Returns the prepared trial."""
         if trial.content not in self._prepared:
             prepared = prepared_trial(self._comparator, self._simulator.robot, trial)
             self._prepared[trial.content] = prepared
         return self._prepared[trial.content]
 
-    def _piece_steps(self, trial: Trial) -> IndexArray | None:
-        steps: IndexArray | None = getattr(self._of(trial), "piece_steps", None)
-        return steps
-
-    def _pieces(self, part: TrialPart) -> BoolArray | slice:
-        """Returns the pieces of a trial that lie within a part of it."""
-        steps = self._piece_steps(part.trial)
-        if part.is_whole or steps is None:
-            return slice(None)
-        times = part.trial.trajectory.time[steps]
-        return np.asarray((times[:, 0] >= part.begin) & (times[:, 1] <= part.end))
-
     def _rows_of(
         self, hypotheses: Sequence[Hypothesis], trials: Parts
     ) -> Iterator[tuple[list[Losses], BoolArray | slice]]:
-        """Returns for each trial the losses of each hypothesis, and the pieces that count."""
+        """Returns for each section the losses of each hypothesis, and the pieces that count."""
         for part in map(whole, trials):
-            yield self._rows(hypotheses, part.trial), self._pieces(part)
+            prepared = self._of(part.trial)
+            sections = [*enumerate(getattr(prepared, "sections", ()) or [prepared])]
+            masks = [pieces_within(part, own) for _, own in sections]
+            used = [k for k, mask in enumerate(masks) if isinstance(mask, slice) or mask.any()]
+            for k in used or [len(sections) - 1]:
+                yield self._rows(hypotheses, part.trial, *sections[k]), masks[k]
 
-    def _rows(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> list[Losses]:
-        known, content = self._known, trial.content
-        missing = list(dict.fromkeys(one for one in hypotheses if (content, one) not in known))
-        steps = trial.trajectory.steps
-        size = largest_batch(self._simulator.robot, self._of(trial).request, steps)
+    def _rows(
+        self, hypotheses: Sequence[Hypothesis], trial: Trial, number: int, section: PreparedPart
+    ) -> list[Losses]:
+        known, key = self._known, (trial.content, number)
+        missing = list(dict.fromkeys(one for one in hypotheses if (*key, one) not in known))
+        size = largest_batch(self._simulator.robot, section.request, trial.trajectory.steps)
         for first in range(0, len(missing), size):
             batch = missing[first : first + size]
-            losses = self._simulated(batch, trial)
-            known.update(((content, one), losses[row]) for row, one in enumerate(batch))
-        return [known[content, one] for one in hypotheses]
+            losses = self._simulated(batch, trial, section)
+            known.update(((*key, one), losses[row]) for row, one in enumerate(batch))
+        return [known[*key, one] for one in hypotheses]
 
-    def _simulated(self, hypotheses: Sequence[Hypothesis], trial: Trial) -> Losses:
+    def _simulated(
+        self, hypotheses: Sequence[Hypothesis], trial: Trial, prepared: PreparedPart
+    ) -> Losses:
         """Returns the checked losses of simulations; infinite where one diverged."""
-        prepared, piece_steps = self._of(trial), self._piece_steps(trial)
         result = simulate(self._simulator, prepared.request, trial, hypotheses)
         diverged = result.diverged[:, np.newaxis]
         with np.errstate(all="ignore") if diverged.any() else nullcontext():
@@ -234,7 +232,7 @@ class LossTable:
             problem = f"returned losses of hinges {by_hinge.shape} in place of {hinges}"
         if problem:
             raise contract_error(self._comparator, problem)
-        if piece_steps is not None:
+        if (piece_steps := piece_steps_of(prepared)) is not None:
             total = total + contradiction_losses(hypotheses, trial.trajectory, piece_steps)
         if by_hinge is not None:
             by_hinge = np.where(diverged[:, np.newaxis], np.inf, by_hinge)

@@ -116,7 +116,8 @@ def chained(count: int, most: int, length: float) -> tuple[IndexArray, BoolArray
     Of up to ``most`` segments, each ``length`` s long, all are; of more, parts of the trial as long
     as that: a segment that follows another one tells more than one after a gap, whose base begins
     in a state of another time. In chains that begin in mid-trial, the segments of the first
-    ``WARM_UP`` s do not count.
+    ``WARM_UP`` s do not count. A part has at least twice as many; of a short trial, in which two
+    parts would have more than ``most`` segments, there is one.
 
     Returns:
         Numbers of the segments, ``(chains * size,)``; a mask of those that count, likewise; and
@@ -128,7 +129,7 @@ def chained(count: int, most: int, length: float) -> tuple[IndexArray, BoolArray
         chains = max(1, math.ceil((count - warm_up) / (longest - warm_up)))
         size = math.ceil((count + (chains - 1) * warm_up) / chains)
     else:
-        chains = 2 if most >= 4 * warm_up else 1
+        chains = 2 if most >= 4 * warm_up or count * length > MAX_CHAIN else 1
         size = min(max(most // chains, 2 * warm_up), count)
     # A single part is at the end: a fault may begin during the trial.
     first = np.floor(np.linspace(0 if chains > 1 else count - size, count - size, chains))

@@ -15,6 +15,7 @@ from selfmodel.comparators import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
     SENSOR_SERIES,
+    segment_prediction,
 )
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
 from selfmodel.diagnosis.losses import LossTable, contradiction_losses, simulate
@@ -29,7 +30,7 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation import rollout
+from selfmodel.simulation import requests, rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Simulator
@@ -244,6 +245,29 @@ def test_losses_of_a_part_are_the_columns_of_the_whole_within_its_bounds(
     if inside.any():
         expected = whole[:, :pieces][:, inside].mean(axis=1)
         np.testing.assert_allclose(table.distances(three, [part]), expected)
+
+
+def test_of_a_part_of_a_long_trial_only_its_sections_are_simulated(
+    quadruped: Robot,
+    long: list[Trial],
+    three: list[Hypothesis],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    for module in (requests, segment_prediction):
+        monkeypatch.setattr(module, "MAX_CHAIN", 1.0)
+    comparator, trial = SEGMENT_PREDICTION_ONBOARD, long[0]
+    prepared, simulators = comparator.prepare(trial), [Simulator(quadruped, 1) for _ in range(3)]
+    hypotheses = three[::2]  # a detached limb rests where it is at the end of a section
+    together = simulate(simulators[0], prepared.request, trial, hypotheses)
+    expected = prepared.losses(together.trajectory).total
+
+    whole, part = (LossTable(simulator, comparator) for simulator in simulators[1:])
+    np.testing.assert_array_equal(whole.losses(hypotheses, [trial]), expected)
+    inside = trial.trajectory.time[prepared.piece_steps[:, 0]] >= 1.5
+    after = part.losses(hypotheses, [TrialPart(trial, begin=1.5)])
+    np.testing.assert_array_equal(after, expected[:, inside])
+    steps = [simulator.stats.steps for simulator in simulators]
+    assert steps[2] < 0.6 * steps[1] <= 0.6 * steps[0]
 
 
 def test_the_timeline_has_the_times_of_the_columns_of_the_losses(
