@@ -42,8 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
-FEW = (*SMALL, "--kinds", "break,jam-angle")
-SHORTER = {"trial": ("--steps", "140"), "diagnose": FEW, "report": FEW}
+SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 """Options by which commands take seconds for minutes; the block of Python reads the same logs."""
 
 
@@ -56,7 +55,7 @@ def test_a_reader_can_run(step: str | Block, folder: Path, monkeypatch: pytest.M
         succeeds(*words, *SHORTER.get(words[0], ()), cwd=folder)
     else:
         monkeypatch.chdir(folder)
-        small = "settings=selfmodel.Settings(generations=2).scaled(8), kinds='jam-angle', healthy="
+        small = "settings=selfmodel.Settings(generations=2).scaled(8), healthy="
         exec(step.text.replace("healthy=", small), {})  # noqa: S102  # the page's own code
 
 
