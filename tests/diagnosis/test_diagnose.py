@@ -136,7 +136,7 @@ def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_
     diagnose = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
-        dataclasses.replace(Settings().scaled(4), generations=1, genes=1),
+        dataclasses.replace(Settings().scaled(4), generations=1, genes=1 if beside else 4),
         kinds or PAPER_KINDS,
         healthy_trials=[before],
     )
