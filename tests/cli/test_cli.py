@@ -44,7 +44,7 @@ def test_recover_prints_one_json_object_with_every_key(short: tuple[Path, dict])
         *("controller", "neurons", "correct", "score", "comparator_reason", "repair", "fell"),
         *("search", "repertoire", "model", "summary"),
         *({"detectable"} & set(told)),
-        "doubt",
+        *("doubt", "also_searched"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
@@ -215,7 +215,7 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(
     def interrupted(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(RecoveryLoop, "_choose_comparator", interrupted)
+    monkeypatch.setattr(RecoveryLoop, "_diagnose", interrupted)
     run = ("recover", "quadruped", "--case", "1", *SMALL, "--kinds", "paper", "--no-calibrate")
     done = selfmodel(*run, "--steps", "40", "--out", "run", cwd=tmp_path)
 
