@@ -10,7 +10,7 @@ from selfmodel.logs import reader, records
 from selfmodel.logs.errors import CorruptError, LogError
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.log_file import Contents, LogFile, read_undamaged
-from selfmodel.logs.messages import DESCRIPTION, IMU, TRANSFORMS, topics
+from selfmodel.logs.messages import DESCRIPTION, IMU, TRANSFORMS, imu, topics
 from selfmodel.trials.trajectory import forward_displacement
 
 _SEALED = "selfmodel.manifest"
@@ -89,7 +89,9 @@ def _cut(contents: Contents, record: records.TrialRecord, reason: str) -> int:
         names, first = reader.read_names(contents, record), reader.first_stamp(contents)
     except LogError as error:
         raise nothing from error
-    every = topics(names, record.root, timed=record.format == records.TIMED_FORMAT)
+    every = [*topics(names, record.root, timed=record.format == records.TIMED_FORMAT)]
+    if IMU in contents.topics:
+        every.append(imu(record.root))
 
     def time_of(step: int) -> int:
         return first + round(step * record.control_timestep * 1e9)
@@ -103,7 +105,7 @@ def _cut(contents: Contents, record: records.TrialRecord, reason: str) -> int:
     steps = min(first_steps(topic.name) for topic in every)
     if not steps:
         raise nothing
-    kept = {*(topic.name for topic in every), IMU, TRANSFORMS, DESCRIPTION}
+    kept = {*(topic.name for topic in every), TRANSFORMS, DESCRIPTION}
     contents.topics = {name: held for name, held in contents.topics.items() if name in kept}
     for messages in contents.topics.values():
         count = sum(time < time_of(steps) for time, _ in messages.times)

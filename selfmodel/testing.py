@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
-from selfmodel.diagnosis.comparator import Comparator, Losses, PiecewiseTrial, PreparedTrial
+from selfmodel.diagnosis.comparator import (
+    Comparator,
+    Losses,
+    PiecewiseTrial,
+    PreparedTrial,
+    piece_steps_of,
+)
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -84,6 +90,16 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
     _require(
         _content(request) == _content(again.request),
         "the same trial must be prepared with the same request",
+    )
+    sections = getattr(prepared, "sections", ())
+    pieces = [piece_steps_of(one) for one in (prepared, *sections)]
+    _require(
+        not sections
+        or (
+            all(steps is not None for steps in pieces)
+            and np.array_equal(pieces[0], np.concatenate(pieces[1:]))
+        ),
+        "the sections of a trial must have its piece_steps, in their order",
     )
     requested = _as_requested(request, trial, simulated)
     before = _bits(requested.signals)

@@ -122,7 +122,8 @@ def import_recording(
         *no_measurements(recording, mapping.places.values()),
         *notes(mapping.trial, trajectory, qualities, robot),
     )
-    felt = None if mapping.trial.imu is None else frozen(signals["acceleration"])
+    felt = signals["acceleration"]
+    felt = frozen(felt) if np.isfinite(felt).any() else None
     return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, felt, warnings)
 
 

@@ -144,7 +144,9 @@ def verdict_sentences(diagnosis: Diagnosis) -> str:
         sentences.append(f"{change[0].upper()}{change[1:]}.")
     if diagnosis.also_searched:
         also = ", ".join(diagnosis.also_searched)
-        sentences.append(f"Searched as well, because it was needed: {also}.")
+        sentences.append(
+            f"Searched beyond the kinds asked for, to predict the trials better: {also}."
+        )
     if diagnosis.undetectable:
         faults = ", ".join(map(str, diagnosis.undetectable_faults))
         sentences.append(f"Undetectable in these trials: {faults}.")

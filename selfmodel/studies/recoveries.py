@@ -18,6 +18,7 @@ from selfmodel import plugins
 from selfmodel.arguments import comparator_choice, is_model, read_controller, robot_entry
 from selfmodel.arrays import finite_or_none
 from selfmodel.controllers.controller import Controller, check_silent_neurons
+from selfmodel.diagnosis.choice import chosen_comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError
@@ -217,11 +218,11 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     folder, shared = needs["trials"], parameters["shared"]
     logged = [read_log(path).trial for path in sorted(folder.glob("*.mcap"))]
     trials = logged[HEALTHY_TRIALS:]
-    robot = planned_entry(parameters).robot()
+    robot, given = planned_entry(parameters).robot(), plugins.comparator(parameters["comparator"])
     mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
     search = DiagnosticSearch(
         Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
-        plugins.comparator(parameters["comparator"]),
+        chosen_comparator((), robot, trials, given=given).comparator,  # it refuses all at once
         Settings(**shared["settings"]),
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],

@@ -1,6 +1,6 @@
 """The contract of every registered comparator: add one, and it is tested."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -103,6 +103,13 @@ def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated
     )
 
 
+@dataclass(frozen=True)
+class Sections(Prepared):
+    """A prepared trial with sections that are none."""
+
+    sections: tuple[object, ...]
+
+
 class Broken:
     """A comparator that can break its contract in one way."""
 
@@ -141,6 +148,8 @@ class Broken:
         record: tuple[Signal, ...] = () if self.way == "request" else ("base_position",)
         if self.way == "unsteady" and time > 1:
             record = ("base_position", "sensors")
+        if self.way == "sections":
+            return Sections(ClosedLoop(record), distances, ("a part without piece_steps",))
         return Prepared(ClosedLoop(record), distances)
 
 
@@ -150,6 +159,7 @@ class Broken:
         ("nothing", "prepare must return an object with request and losses or distances, got None"),
         ("request", "a request of ClosedLoop must record some of"),
         ("unsteady", "the same trial must be prepared with the same request"),
+        ("sections", "the sections of a trial must have its piece_steps"),
         ("shape", "distances must have shape .* with n = 4"),
         ("sign", "must be finite and at least 0"),
         ("nan", "must be finite and at least 0"),

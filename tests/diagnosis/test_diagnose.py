@@ -145,7 +145,10 @@ def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_
     if is_searched:
         assert (str(found.best), found.verdict) == ("delay=2.8", "explained")
         assert (found.unsearched, found.also_searched) == (None, ("delay",))
-        assert "Searched as well, because it was needed: delay." in verdict_sentences(found)
+        assert (
+            "Searched beyond the kinds asked for, to predict the trials better: delay."
+            in verdict_sentences(found)
+        )
         seeds = [candidate.hypothesis for candidate in found.ranked]
         again = diagnose([after], seeds, np.random.default_rng(1), lambda _: None)
         assert (again.best, again.also_searched) == (found.best, ("delay",))

@@ -104,6 +104,7 @@ def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("foreign")
+    # With this seed, the limb is lost early enough in a trial of 3.5 s.
     return generate(out, Plan("quadruped", "onset-break", 169, "large", duration=3.5, trials=1))
 
 
