@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import mujoco
@@ -91,16 +92,15 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
         _content(request) == _content(again.request),
         "the same trial must be prepared with the same request",
     )
-    sections = getattr(prepared, "sections", ())
-    pieces = [piece_steps_of(one) for one in (prepared, *sections)]
-    _require(
-        not sections
-        or (
-            all(steps is not None for steps in pieces)
-            and np.array_equal(pieces[0], np.concatenate(pieces[1:]))
-        ),
-        "the sections of a trial must have its piece_steps, in their order",
-    )
+    if sections := getattr(prepared, "sections", ()):
+        pieces, *of_sections = [
+            [] if (steps := piece_steps_of(one)) is None else steps.tolist()
+            for one in (prepared, *sections)
+        ]
+        _require(
+            pieces == list(chain(*of_sections)) and all(of_sections),
+            "the sections of a trial must have its piece_steps, in their order",
+        )
     requested = _as_requested(request, trial, simulated)
     before = _bits(requested.signals)
     parts = _parts(prepared, requested)

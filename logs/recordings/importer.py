@@ -122,8 +122,7 @@ def import_recording(
         *no_measurements(recording, mapping.places.values()),
         *notes(mapping.trial, trajectory, qualities, robot),
     )
-    felt = signals["acceleration"]
-    felt = frozen(felt) if np.isfinite(felt).any() else None
+    felt = frozen(signals["acceleration"]) if np.isfinite(signals["acceleration"]).any() else None
     return ImportedTrial(trajectory, qualities, recording.digests, clock, origin, felt, warnings)
 
 
