@@ -296,9 +296,9 @@ def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
     _check_words(kind, candidates)
     for other in kind.degenerate_kinds:
         _require(
-            other.bounds is None and (other.searchable or not kind.searchable),
+            0.0 in (other.bounds or (0.0,)) and (other.searchable or not kind.searchable),
             f"{kind.name} degenerates to {other.name}, which must be a searchable kind without "
-            f"severities",
+            f"severities, or with 0 as the least or largest",
         )
     _check_edits(kind, candidates, robot)
     _check_batch(candidates, robot)

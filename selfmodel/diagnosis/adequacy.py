@@ -49,7 +49,7 @@ MAX_JOINTS = 3
 
 REMEDY = (
     "give a trial of the healthy robot (from before the damage, or of another robot of the same "
-    "type) {}, or record this robot in the motions of the healthy trials"
+    "type) {}, or record this robot in the motions of the healthy trials that were given"
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
@@ -112,7 +112,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     if not faster:
-        return Doubt(reason, REMEDY.format("with the gait of these"))
+        return Doubt(reason, REMEDY.format("with the gait of these trials"))
     joint, (speed, _) = next(iter(faster.items()))
     listed = "; ".join(
         f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
@@ -120,7 +120,9 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     )
     return Doubt(
         f"{reason}, and these trials are faster than the healthy ones ({listed})",
-        REMEDY.format(f"in which {joint} is commanded as fast as in these ({speed:.2g} rad/s)"),
+        REMEDY.format(
+            f"in which {joint} is commanded as fast as in these trials ({speed:.2g} rad/s)"
+        ),
     )
 
 

@@ -28,8 +28,7 @@ def summary(diagnosis: Diagnosis) -> str:
         what = f"from {change.time:.1f} s of the trial '{change.trial}' on, {what}{before}"
     sure = ""
     if diagnosis.verdict in ("intact", "explained"):
-        none = " that there is none" if diagnosis.verdict == "intact" else ""
-        sure = _probability(diagnosis, diagnosis.best, f" sure{none}")
+        sure = _probability(diagnosis, diagnosis.best, " sure")
     elif diagnosis.verdict == "unexplained" and diagnosis.probability:
         sure = f" ({_percent(1 - sum(diagnosis.probability.values()))} sure)"
     return f"{what[0].upper()}{what[1:]}{sure}. {_advice(diagnosis)}"
@@ -105,15 +104,14 @@ def _advice(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"Check this; to be surer, {surer}."
         case "ambiguous":
-            these = "the most probable first" if diagnosis.probability else "these"
-            return f"Check {these}; to tell the causes apart, {surer}."
+            order = " in this order" if diagnosis.probability else ""
+            return f"Check these{order}; to tell the causes apart, {surer}."
         case "unexplained":
             return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
         case "not judged":
             return (
-                f"It may have one, or its model may be wrong for such motions. "
-                f"To decide, {(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the "
-                f"diagnosis."
+                f"It may have one, or its model may be wrong for motions like these. To decide, "
+                f"{(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the diagnosis."
             )
 
 
@@ -132,7 +130,10 @@ def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> s
         return f"The difference is largest at the joint {joints[0]}: inspect it, then {repeat}"
     if best:
         words = f"{in_words(best)}{_probability(diagnosis, best)}"
-        return f"The nearest of them is that {words}: check this; if it is not so, {repeat}"
+        return (
+            f"If it is one of them after all, then most probably this: {words}. Check it; if it is "
+            f"not so, {repeat}"
+        )
     return f"{repeat[0].upper()}{repeat[1:]}"
 
 

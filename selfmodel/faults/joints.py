@@ -297,6 +297,7 @@ MOTOR_OFF = MotorOff(
     base="fixed",
     bounds=(0.0, 1.0),
     levels=(0.0, 0.1, 0.2, 0.5),
+    degenerates_to={1.0: WEAK_MOTOR},
     unit="of the joint's resistance",
     words="the motor of the joint {part} is off, with {severity:.0%} of the joint's friction left",
     is_of_joint=True,

@@ -45,7 +45,7 @@ class FaultKind:
             ``at`` (" at the " and the part, empty without one), such as "the joint {part} is
             stuck"; "" for the notation.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
-            a severity, or to no fault (None).
+            a severity or of severity 0, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
             without a severity, unless the hypothesis has a fault that the equivalent would absorb:
             a sensor with a gain of 0 has failed, but with a gain of 0 and a bias it is stuck.

@@ -264,9 +264,11 @@ WIND, CROSSWIND = (
         levels=_SPEEDS,
         degenerates_to={0.0: None},
         unit="m/s",
-        words=f"there is a {name} of {{severity:.2g}} m/s",
+        words=f"there is a {name} of {{severity:.2g}} m/s {direction}",
     )
-    for axis, name in enumerate(("wind", "crosswind"))
+    for axis, (name, direction) in enumerate(
+        (("wind", "in the forward direction"), ("crosswind", "to the left"))
+    )
 )
 PAYLOAD = Payload(
     name="payload",

@@ -198,9 +198,9 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
             (
-                "No fault was found that is large enough to show in these trials (95 % sure that "
-                "there is none). To find smaller faults, record a longer trial, or one with other "
-                "movements (such as another gait)."
+                "No fault was found that is large enough to show in these trials (95 % sure). "
+                "To find smaller faults, record a longer trial, or one with other movements (such "
+                "as another gait)."
             ),
         ),
         (
@@ -220,7 +220,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             (
                 "One of these is true: the joint front_left_knee is stuck (60 %), or the joint "
                 "back_left_knee is stuck (30 %), or nothing is wrong (5 %), or something not named "
-                "here (5 %). Check the most probable first; to tell the causes apart, record a "
+                "here (5 %). Check these in this order; to tell the causes apart, record a "
                 "longer trial, or one with other movements (such as another gait)."
             ),
         ),
@@ -242,7 +242,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             (
                 "The joint front_left_knee is stuck (90 % sure). In addition, one of these is "
                 "true: the joint back_left_knee is stuck (60 %), or nothing else (20 %), or "
-                "something not named here (20 %). Check the most probable first; to tell the "
+                "something not named here (20 %). Check these in this order; to tell the "
                 "causes apart, record a longer trial, or one with other movements (such as another "
                 "gait)."
             ),
@@ -269,9 +269,9 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
             (
                 "The robot differs from its model, and none of the faults tried explains it (60 % "
-                "sure). The nearest of them is that the joint front_left_knee is stuck (30 %): "
-                "check this; if it is not so, repeat the diagnosis with all kinds of faults "
-                "(--kinds all)."
+                "sure). If it is one of them after all, then most probably this: the joint "
+                "front_left_knee is stuck (30 %). Check it; if it is not so, repeat the diagnosis "
+                "with all kinds of faults (--kinds all)."
             ),
         ),
         (
@@ -282,7 +282,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"verdict": "not judged", "doubt": DOUBT},
             (
                 "These trials do not show whether the robot has a fault. It may have one, or its "
-                "model may be wrong for such motions. To decide, DO THIS; then repeat the "
+                "model may be wrong for motions like these. To decide, DO THIS; then repeat the "
                 "diagnosis."
             ),
         ),
