@@ -129,7 +129,7 @@ def test_the_seed_of_the_search_does_not_change_the_verdict(
         Simulator(quadruped, 1), SEGMENT_PREDICTION, SMALL, PAPER_KINDS, healthy_trials=before
     )
     trials = [trial(quadruped, CASES[8], gait)]
-    seeds = map(np.random.default_rng, range(4))
+    seeds = map(np.random.default_rng, range(10))
     first, *others = (search(trials, [], rng, lambda _: None) for rng in seeds)
 
     for one in others:
