@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
-from selfmodel.faults.registry import ALL_KINDS, DEFAULT_KINDS, KIND_SETS, PAPER_KINDS
+from selfmodel.faults.registry import ALL_KINDS, KIND_SETS
 from selfmodel.settings import Settings
 from selfmodel.trials.trial import STAGES
 
-DEFAULT_KIND_NAMES = ",".join(kind.name for kind in DEFAULT_KINDS)
-PAPER_KIND_NAMES = ",".join(kind.name for kind in PAPER_KINDS)
 LISTED = {"kinds": [kind.name for kind in ALL_KINDS], "sets": KIND_SETS, "stages": STAGES}
 """Names that texts of ``options.toml`` list."""
 
@@ -58,7 +56,7 @@ class FromLogs(Command):
     healthy: list[Path] | None = None
     self_model: str | None = None
     comparator: str = "auto"
-    kinds: str = DEFAULT_KIND_NAMES
+    kinds: str = "default"
     calibrate: bool = True
     population: int | None = None
     generations: int | None = None
@@ -121,7 +119,7 @@ class Recover(Robot):
     comparator: str = "auto"
     calibrate: bool = True
     gap: float = 0.0
-    kinds: str = DEFAULT_KIND_NAMES
+    kinds: str = "default"
     next_trial: str = "repair"
     controller: str = "network"
     neurons: int | None = None
@@ -304,7 +302,7 @@ class Ablate(Study, Repair):
 
     robots: str = "all"
     damages: str = ""
-    kinds: str = DEFAULT_KIND_NAMES
+    kinds: str = "default"
     comparators: str = "all"
     gaps: str = "0"
     next_trial: str = "bank"
@@ -328,7 +326,7 @@ class RunSuite(Study, Repair):
     controller: str = "network"
     neurons: int | None = None
     comparator: str = "segment-prediction"
-    kinds: str = PAPER_KIND_NAMES
+    kinds: str = "paper"
     steps: int | None = None
 
 

@@ -1,4 +1,8 @@
-"""``selfmodel recover``: the paper's loop, from a healthy gait to one for the damaged robot."""
+"""``selfmodel recover``: options, run, result, print and report.
+
+What a recovery does, in order, is ``selfmodel.recovery.recover.RecoveryLoop.run``; the simulated
+robots that it drives here are drawn by ``selfmodel.studies.experiment.run``.
+"""
 
 import dataclasses
 from datetime import datetime

@@ -1,4 +1,8 @@
-"""The fault kinds of selfmodel by name, their sets, and the failures of the paper's Table I."""
+"""The fault kinds of selfmodel by name, their sets, and the failures of the paper's Table I.
+
+A further kind is a class of what it faults, in ``joints.py``, ``sensors.py`` or ``world.py``, and
+its row in ``KINDS``.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
