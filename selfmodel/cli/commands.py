@@ -8,12 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
-from selfmodel.faults.registry import ALL_KINDS, KIND_SETS
 from selfmodel.settings import Settings
-from selfmodel.trials.trial import STAGES
-
-LISTED = {"kinds": [kind.name for kind in ALL_KINDS], "sets": KIND_SETS, "stages": STAGES}
-"""Names that texts of ``options.toml`` list."""
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)

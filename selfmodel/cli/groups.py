@@ -156,10 +156,7 @@ def parameters_of(command: type) -> list[Parameter]:
 @cache
 def options() -> dict[str, tuple[str, Any]]:
     """Returns the heading and typer's declaration of each option, in the order of a help page."""
-    commands = import_module("selfmodel.cli.commands")
     text = resources.files(__package__).joinpath("options.toml").read_text(encoding="utf-8")
-    for name, listed in commands.LISTED.items():
-        text = text.replace(f"{{{name}}}", ", ".join(listed))
     return {
         name: (heading, _declaration(heading, **facts))
         for heading, section in tomllib.loads(text).items()

@@ -8,6 +8,9 @@ import pytest
 import typer
 
 from selfmodel import __version__, cli
+from selfmodel.cli.groups import options
+from selfmodel.faults.registry import ALL_KINDS, KIND_SETS
+from selfmodel.trials.trial import STAGES
 from tests.helpers.command import selfmodel
 
 GROUPS = {(): cli.app, ("logs",): cli.LOGS, ("suite",): cli.SUITE}
@@ -52,6 +55,15 @@ def test_a_help_page_names_every_value_and_describes_every_option(page: str):
     assert not re.search(r"<[a-z]", page), "a type in the place of a value's name"
     assert all(map(ROW.match, rows))
     assert re.fullmatch(r"  -h, --help +Show this message and exit.", rows[-1])
+
+
+def test_help_names_every_kind_set_of_kinds_and_stage():
+    """The page is text, so that it needs neither them nor numpy."""
+    (_, kinds), (_, stage) = options()["kinds"], options()["stage"]
+    named = ", ".join(kind.name for kind in ALL_KINDS)
+
+    assert f": {named}, package.module:object; or their sets: {', '.join(KIND_SETS)}." in kinds.help
+    assert f": {', '.join(STAGES)}." in stage.help
 
 
 @pytest.mark.parametrize("group", GROUPS.values(), ids=lambda group: group.info.name)
