@@ -48,7 +48,7 @@ def diagnose(options: Diagnose) -> None:
         files={str(path): file_digest(path) for path in [*(options.healthy or ()), *options.files]},
         calibration=inputs.calibration.to_dict() if inputs.calibration else None,
         **output_of(diagnosis),
-        summary=text.summary(diagnosis),
+        summary=" ".join(text.summary(diagnosis)),
         evidence=to_json(evidence),
         evaluations=search.evaluations,
         distinct_hypotheses=search.distinct_hypotheses,
@@ -57,7 +57,7 @@ def diagnose(options: Diagnose) -> None:
     if options.as_json:
         print_json(values_of(result))
         return
-    print_lines(result.summary)
+    print_lines(*text.summary(diagnosis))
     print_tables(ranking_table(values_of(result)))
     print_lines(
         f"{result.robot}, {counted(len(paths), 'log')}, {result.comparator}: "

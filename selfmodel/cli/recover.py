@@ -172,7 +172,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
             for trial, tried, score, predicted, fall in zip(*columns, strict=True)
         ),
         **output_of(recovery.diagnosis),
-        summary=summary(recovery.diagnosis),
+        summary=" ".join(summary(recovery.diagnosis)),
         calibration=recovery.calibration.to_dict() if recovery.calibration else None,
         correct=outcome.correct,
         displacement={name: getattr(recovery, name) for name in ("before", "after", "recovered")},
@@ -215,7 +215,7 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
     verdict = right_or_wrong(str(diagnosis.best), found.truth, correct=found.correct)
     print_lines(
         f"truth: {found.truth}{gap}; the diagnosis is {verdict}.",
-        found.summary,
+        *summary(diagnosis),
         verdict_sentences(diagnosis),
         f"{subject} {before} before, {after} after the failure, and {recovered} at best in "
         f"{counted(found.physical_trials, 'trial')} since.",

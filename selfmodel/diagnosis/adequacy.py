@@ -48,12 +48,12 @@ MAX_JOINTS = 3
 """Joints that are named, the fastest relative to the healthy trials first."""
 
 REMEDY = (
-    "give a trial of the healthy robot (from before the damage, or of another robot of the same "
-    "type) {}, or record this robot in the motions of the healthy trials that were given"
+    "record this robot again, moving as in the log of the healthy robot{}. Or record a healthy "
+    "robot of the same type, moving as this one did (--healthy FILE)"
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
-LONGER = "record a longer trial of this robot, in the same motions"
+LONGER = "record this robot again, with the same movements for twice as long"
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
 FASTEST = 0.95
@@ -112,17 +112,15 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     if not faster:
-        return Doubt(reason, REMEDY.format("with the gait of these trials"))
-    joint, (speed, _) = next(iter(faster.items()))
+        return Doubt(reason, REMEDY.format(""))
+    joint, (speed, covered) = next(iter(faster.items()))
     listed = "; ".join(
         f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
         for joint, (speed, covered) in list(faster.items())[:MAX_JOINTS]
     )
     return Doubt(
         f"{reason}, and these trials are faster than the healthy ones ({listed})",
-        REMEDY.format(
-            f"in which {joint} is commanded as fast as in these trials ({speed:.2g} rad/s)"
-        ),
+        REMEDY.format(f" (command {joint} at up to {covered:.2g} rad/s, not {speed:.2g} rad/s)"),
     )
 
 

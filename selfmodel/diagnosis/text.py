@@ -8,47 +8,61 @@ from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, 
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import is_too_high
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis import Hypothesis
 
 MAX_NAMED = 3
 """Causes that a summary names."""
 
-NO_DOUBT = Doubt("the diagnosis does not say why", "record a trial of the healthy robot like these")
+MIN_GUESS = 0.1
+"""Probability from which a summary names a cause that is not the most probable: 1 in 10."""
+
+NO_DOUBT = Doubt("the diagnosis does not say why", "record a log of the healthy robot, moving so")
 
 SIGMA = "\u03c3"  # standard errors
 
 _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, the number does not
 
 
-def summary(diagnosis: Diagnosis) -> str:
-    """Returns what is wrong, since when, how sure that is, and what to do, in plain words."""
-    what, change = what_is_wrong(diagnosis), diagnosis.change
-    if change is not None:
-        before = f"; before that, {in_words(change.before)}" if change.before else ""
-        what = f"from {change.time:.1f} s of the trial '{change.trial}' on, {what}{before}"
-    sure = ""
-    if diagnosis.verdict in ("intact", "explained"):
-        sure = _probability(diagnosis, diagnosis.best, " sure")
-    elif diagnosis.verdict == "unexplained" and diagnosis.probability:
-        sure = f" ({_percent(1 - sum(diagnosis.probability.values()))} sure)"
-    return f"{what[0].upper()}{what[1:]}{sure}. {_advice(diagnosis)}"
+def summary(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Returns what is wrong, since when and how sure that is; and, as a second line, what to do."""
+    facts, action = _answer(diagnosis)
+    if (change := diagnosis.change) is not None:
+        before = f". Before that: {in_words(change.before)}" if change.before else ""
+        since = f"this is so from {change.time:.1f} s into the log '{change.trial}' on{before}"
+        facts.insert(1, since)
+    return " ".join(f"{one[0].upper()}{one[1:]}." for one in facts), f"What to do: {action}."
 
 
-def what_is_wrong(diagnosis: Diagnosis) -> str:
-    """Returns what is wrong with the robot, as a clause in plain words."""
+def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
+    """Returns what is wrong and how sure that is, as clauses, and what to do."""
+    best, fit, probability = diagnosis.best, diagnosis.fit, diagnosis.probability
+    sure = _sure(probability.get(str(best)))
+    again = "record this robot again for twice as long, and repeat the diagnosis"
+    if fit is None or fit.healthy_loss is None:
+        again = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)"
     match diagnosis.verdict:
         case "intact":
-            return "no fault was found that is large enough to show in these trials"
+            action = f"nothing. To find faults too small to show in these logs, {again}"
+            return ["no fault was found", sure], action
         case "explained":
-            return in_words(diagnosis.best)
+            return [in_words(best), sure], f"check whether this is so. If it is not, {again}"
         case "ambiguous":
-            return _alternatives(diagnosis)
+            action = f"check these, in this order. If none of them is so, {again}"
+            return _alternatives(diagnosis), action
+        case "unexplained" if diagnosis.reason:
+            action = "check the model of the robot, and the units and the odometry of the logs"
+            return ["these logs cannot be simulated"], action
         case "unexplained":
-            if diagnosis.reason:
-                return "these trials cannot be simulated"
-            return "the robot differs from its model, and none of the faults tried explains it"
+            what = "something is wrong, but none of the faults that were tried explains it"
+            rest = 1 - sum(probability.values()) if probability else None
+            return [what, _sure(rest)], _search_on(diagnosis)
         case "not judged":
-            return "these trials do not show whether the robot has a fault"
+            what = "it is not known whether the robot has a fault"
+            model = "an error in its simulation model may explain these logs as well"
+            return [
+                what,
+                model,
+            ], f"{(diagnosis.doubt or NO_DOUBT).remedy}. Then repeat the diagnosis"
 
 
 def in_words(hypothesis: Hypothesis) -> str:
@@ -56,85 +70,64 @@ def in_words(hypothesis: Hypothesis) -> str:
     return ", and ".join(fault.words for fault in hypothesis.faults) or "nothing is wrong"
 
 
-def _alternatives(diagnosis: Diagnosis) -> str:
-    """Returns the faults that all alternatives have, then those in which they differ."""
+def _alternatives(diagnosis: Diagnosis) -> list[str]:
+    """Returns the faults of all alternatives, how sure they are, and what each adds, as clauses.
+
+    Without such faults, the alternatives with their probabilities.
+    """
     probability = diagnosis.probability
     alike = sorted(
         [diagnosis.best, *diagnosis.indistinguishable],
         key=lambda one: -probability.get(str(one), 0.0),
     )
-    clauses = [[fault.words for fault in one.faults] for one in alike]
-    shared = [one for one in alike[0].faults if all(one.words in each for each in clauses)]
-    common = Hypothesis(tuple(shared))
-    causes, known = [], [fault.words for fault in shared]
-    for one, each in zip(alike[:MAX_NAMED], clauses, strict=False):
-        own = ", and ".join(words for words in each if words not in known)
-        nothing = "nothing else" if shared else in_words(INTACT)
-        causes.append(f"{own or nothing}{_probability(diagnosis, one)}")
-    if probability:
+    shared = set.intersection(*(set(one.faults) for one in alike))
+    causes = []
+    for one in alike[:MAX_NAMED]:
+        own = Hypothesis(tuple(fault for fault in one.faults if fault not in shared))
+        words = in_words(own) if own or not shared else "nothing else is wrong"
+        causes.append(words if shared else words + _likely(probability.get(str(one))))
+    if probability and not shared:
         rest = 1 - sum(probability.get(str(one), 0.0) for one in alike[:MAX_NAMED])
-        causes.append(f"something not named here ({_percent(rest)})")
+        causes.append(f"something else{_likely(rest)}")
     elif len(alike) > MAX_NAMED:
         causes.append(f"one of {len(alike) - MAX_NAMED} others")
-    listed = f"one of these is true: {', or '.join(causes)}"
+    numbered = "; ".join(f"({number}) {cause}" for number, cause in enumerate(causes, start=1))
+    if not shared:
+        return [f"one of these is true: {numbered}"]
+    common = Hypothesis(tuple(sorted(shared)))
     having = [p for one, p in probability.items() if _faults(str(common)) <= _faults(one)]
-    sure = f" ({_percent(sum(having))} sure)" if having else ""
-    return f"{in_words(common)}{sure}. In addition, {listed}" if shared else listed
+    sure = _sure(sum(having) if having else None)
+    return [in_words(common), sure, f"in addition, one of these is true: {numbered}"]
 
 
-def _percent(probability: float) -> str:
-    return "< 1 %" if probability < 0.01 else f"{100 * probability:.0f} %"
+def _sure(probability: float | None) -> str:
+    if probability is None:
+        return "it is not known how sure this is"
+    wrong = round(100 * (1 - probability))
+    return f"{100 - wrong} % sure: about {wrong} of 100 such answers are wrong"
 
 
-def _probability(diagnosis: Diagnosis, hypothesis: Hypothesis, sure: str = "") -> str:
-    """Returns the probability of a hypothesis in brackets, before a word; empty without one."""
-    probability = diagnosis.probability.get(str(hypothesis))
-    return "" if probability is None else f" ({_percent(probability)}{sure})"
+def _likely(probability: float | None) -> str:
+    if probability is None:
+        return ""
+    return f" ({'< 1' if probability < 0.01 else f'{100 * probability:.0f}'} % likely)"
 
 
-def _advice(diagnosis: Diagnosis) -> str:
-    """Returns what to do, and what would make the diagnosis surer, as sentences."""
-    fit = diagnosis.fit
-    surer = "record a longer trial, or one with other movements (such as another gait)"
-    if fit is None or fit.healthy_loss is None:
-        surer = "give a trial of the healthy robot to compare with (--healthy)"
-    match diagnosis.verdict:
-        case "intact":
-            return f"To find smaller faults, {surer}."
-        case "explained":
-            return f"Check this; to be surer, {surer}."
-        case "ambiguous":
-            order = " in this order" if diagnosis.probability else ""
-            return f"Check these{order}; to tell the causes apart, {surer}."
-        case "unexplained":
-            return _advice_on_the_unexplained(diagnosis, list(fit.joints) if fit else [])
-        case "not judged":
-            return (
-                f"It may have one, or its model may be wrong for motions like these. To decide, "
-                f"{(diagnosis.doubt or NO_DOUBT).remedy}; then repeat the diagnosis."
-            )
-
-
-def _advice_on_the_unexplained(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
-    unsearched, best = diagnosis.unsearched, diagnosis.best
-    if diagnosis.reason:
-        return "Check the model of the robot and the logs."
+def _search_on(diagnosis: Diagnosis) -> str:
+    """Returns what to do about a robot that none of the faults explains that were tried."""
+    best, unsearched, fit = diagnosis.best, diagnosis.unsearched, diagnosis.fit
+    probability = diagnosis.probability.get(str(best))
     if unsearched is not None:
         return (
-            f"A kind of fault that was not tried fits better: {in_words(unsearched.hypothesis)}. "
-            f"Check this, and repeat the diagnosis with --kinds default,{unsearched.kind} (if "
-            f"other kinds than the default were tried, with these in place of default)."
+            f"repeat the diagnosis with one more kind of fault (--kinds default,{unsearched.kind})"
+            f". A fault of this kind fits better: {in_words(unsearched.hypothesis)}"
         )
-    repeat = "repeat the diagnosis with all kinds of faults (--kinds all)."
-    if joints:
-        return f"The difference is largest at the joint {joints[0]}: inspect it, then {repeat}"
-    if best:
-        words = f"{in_words(best)}{_probability(diagnosis, best)}"
-        return (
-            f"If it is one of them after all, then most probably this: {words}. Check it; if it is "
-            f"not so, {repeat}"
-        )
-    return f"{repeat[0].upper()}{repeat[1:]}"
+    first = ""
+    if fit and fit.joints:
+        first = f"check the joint {next(iter(fit.joints))}, where the difference is largest. Then "
+    elif best and (probability is None or probability >= MIN_GUESS):
+        first = f"check the best guess{_likely(probability)}: {in_words(best)}. If it is not so, "
+    return f"{first}repeat the diagnosis with all kinds of faults (--kinds all)"
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:

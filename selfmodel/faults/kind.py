@@ -41,9 +41,9 @@ class FaultKind:
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
         words: Clause about a fault in plain words, a format with ``part``, ``severity``, its
-            ``amount`` without the sign, ``side`` ("high" or "low", against the nominal one) and
-            ``at`` (" at the " and the part, empty without one), such as "the joint {part} is
-            stuck"; "" for the notation.
+            ``amount`` without the sign, ``side`` and ``at`` (" at the " and the part, empty without
+            one), such as "the joint {part} is stuck"; "" for the notation.
+        sides: ``side`` in ``words``: of a severity up to the nominal one, and of one above it.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity or of severity 0, or to no fault (None).
         degenerates_alone_to: Severities at which the fault is equivalent to one of another kind,
@@ -67,6 +67,7 @@ class FaultKind:
     levels: tuple[float, ...] = (0.0,)
     unit: str = ""
     words: str = ""
+    sides: tuple[str, str] = ("low", "high")
     degenerates_to: Mapping[float, Optional["FaultKind"]] = field(default_factory=dict)
     degenerates_alone_to: Mapping[float, "FaultKind"] = field(default_factory=dict)
     affects_dynamics: bool = True
@@ -202,7 +203,7 @@ class Fault:
         if not self.kind.words:
             return f"there is the fault {self}"
         amount, nominal = abs(self.severity), self.kind.nominal or 0.0
-        side = "high" if self.severity > nominal else "low"
+        side = self.kind.sides[self.severity > nominal]
         named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
         at = f" at the {self.part}" if self.part else ""
         return self.kind.words.format(**named, at=at).replace("%", " %")

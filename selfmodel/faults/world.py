@@ -253,7 +253,8 @@ SLOPE = Slope(
     levels=(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
-    words="the ground rises by {severity:.2g} rad in the forward direction",
+    words="the ground ahead slopes {side} by {amount:.2g} rad",
+    sides=("down", "up"),
 )
 WIND, CROSSWIND = (
     Wind(
@@ -264,10 +265,11 @@ WIND, CROSSWIND = (
         levels=_SPEEDS,
         degenerates_to={0.0: None},
         unit="m/s",
-        words=f"there is a {name} of {{severity:.2g}} m/s {direction}",
+        words="a wind of {amount:.2g} m/s blows from {side}",
+        sides=sides,
     )
-    for axis, (name, direction) in enumerate(
-        (("wind", "in the forward direction"), ("crosswind", "to the left"))
+    for axis, (name, sides) in enumerate(
+        (("wind", ("the front", "behind")), ("crosswind", ("the left", "the right")))
     )
 )
 PAYLOAD = Payload(

@@ -13,7 +13,6 @@ from selfmodel.diagnosis.text import (
     right_or_wrong,
     summary,
     verdict_sentences,
-    what_is_wrong,
 )
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -74,11 +73,11 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
 
 
 def headline(subject: Subject) -> str:
-    """Returns what happened, in one sentence."""
-    result = subject.result
+    """Returns what happened, in a few sentences."""
+    result, (what, action) = subject.result, summary(subject.diagnosis)
     if result is None:
         trials = counted(len(subject.damaged), "trial")
-        return f"{trials} of the {subject.robot.name}. {summary(subject.diagnosis)}"
+        return f"{trials} of the {subject.robot.name}. {what} {action}"
     score = result.score
     before, after, recovered = (
         f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
@@ -89,7 +88,7 @@ def headline(subject: Subject) -> str:
     fall = ", and fell" if result.fell else ""
     return (
         f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
-        f"it; {what_is_wrong(subject.diagnosis)}. It {achieved} {recovered} at best in "
+        f"it. {what} The robot {achieved} {recovered} at best in "
         f"{counted(result.physical_trials, 'trial')} since{fall}."
     )
 
@@ -99,7 +98,7 @@ def details(subject: Subject) -> tuple[str, ...]:
     diagnosis = subject.diagnosis
     sentences = [verdict_sentences(diagnosis), fit_sentence(diagnosis)]
     if subject.result is not None:
-        sentences = [summary(diagnosis), *sentences, _truth(subject.result)]
+        sentences = [summary(diagnosis)[1], *sentences, _truth(subject.result)]
     return tuple(sentence for sentence in sentences if sentence)
 
 

@@ -176,14 +176,17 @@ DOUBT = Doubt("WHY", "DO THIS")
 MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
+UNEXPLAINED = "Something is wrong, but none of the faults that were tried explains it."
+AGAIN = "record this robot again for twice as long, and repeat the diagnosis."
+HEALTHY_LOG = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)."
 
 
 def test_a_fault_before_a_change_is_not_forgotten():
     earlier = dataclasses.replace(CHANGE, before=OTHER)
-    ended = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
+    ended, _ = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
 
-    assert "; before that, the joint back_left_knee is stuck" in ended
-    assert "before that" not in summary(diagnosis(change=CHANGE))
+    assert "Before that: the joint back_left_knee is stuck" in ended
+    assert "Before that" not in summary(diagnosis(change=CHANGE))[0]
 
 
 def test_trials_that_are_not_judged_have_a_reason():
@@ -193,44 +196,46 @@ def test_trials_that_are_not_judged_have_a_reason():
 
 
 @pytest.mark.parametrize(
-    ("fields", "said"),
+    ("fields", "what", "action"),
     [
         (
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
-            (
-                "No fault was found that is large enough to show in these trials (95 % sure). "
-                "To find smaller faults, record a longer trial, or one with other movements (such "
-                "as another gait)."
-            ),
+            "No fault was found. 95 % sure: about 5 of 100 such answers are wrong.",
+            f"nothing. To find faults too small to show in these logs, {AGAIN}",
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
             (
-                "From 4.9 s of the trial '02-recovery' on, the joint front_left_knee is stuck (93 "
-                "% sure). Check this; to be surer, record a longer trial, or one with other "
-                "movements (such as another gait)."
+                "The joint front_left_knee is stuck. This is so from 4.9 s into the log "
+                "'02-recovery' on. 93 % sure: about 7 of 100 such answers are wrong."
             ),
+            f"check whether this is so. If it is not, {AGAIN}",
+        ),
+        (
+            {"fit": None},
+            "The joint front_left_knee is stuck. It is not known how sure this is.",
+            f"check whether this is so. If it is not, {HEALTHY_LOG}",
         ),
         (
             {
                 "verdict": "ambiguous",
                 "indistinguishable": (INTACT, OTHER),
-                "probability": {str(JAM): 0.6, str(OTHER): 0.3, "intact": 0.05},
+                "probability": {str(JAM): 0.6, str(OTHER): 0.346, "intact": 0.004},
             },
             (
-                "One of these is true: the joint front_left_knee is stuck (60 %), or the joint "
-                "back_left_knee is stuck (30 %), or nothing is wrong (5 %), or something not named "
-                "here (5 %). Check these in this order; to tell the causes apart, record a "
-                "longer trial, or one with other movements (such as another gait)."
+                "One of these is true: (1) the joint front_left_knee is stuck (60 % likely); (2) "
+                "the joint back_left_knee is stuck (35 % likely); (3) nothing is wrong (< 1 % "
+                "likely); (4) something else (5 % likely)."
             ),
+            f"check these, in this order. If none of them is so, {AGAIN}",
         ),
         (
             {"verdict": "ambiguous", "indistinguishable": (OTHER,), "fit": None},
             (
-                "One of these is true: the joint front_left_knee is stuck, or the joint "
-                "back_left_knee is stuck. Check these; to tell the causes apart, give a trial of "
-                "the healthy robot to compare with (--healthy)."
+                "One of these is true: (1) the joint front_left_knee is stuck; (2) the joint "
+                "back_left_knee is stuck."
             ),
+            f"check these, in this order. If none of them is so, {HEALTHY_LOG}",
         ),
         (
             {
@@ -240,58 +245,61 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "probability": {str(BOTH): 0.6, f"{JAM}=0.3": 0.1, str(JAM): 0.2, str(OTHER): 0.05},
             },
             (
-                "The joint front_left_knee is stuck (90 % sure). In addition, one of these is "
-                "true: the joint back_left_knee is stuck (60 %), or nothing else (20 %), or "
-                "something not named here (20 %). Check these in this order; to tell the "
-                "causes apart, record a longer trial, or one with other movements (such as another "
-                "gait)."
+                "The joint front_left_knee is stuck. 90 % sure: about 10 of 100 such answers are "
+                "wrong. In addition, one of these is true: (1) the joint back_left_knee is stuck; "
+                "(2) nothing else is wrong."
             ),
+            f"check these, in this order. If none of them is so, {AGAIN}",
         ),
         (
-            {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.01}},
+            {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.04}},
+            f"{UNEXPLAINED} 96 % sure: about 4 of 100 such answers are wrong.",
             (
-                "The robot differs from its model, and none of the faults tried explains it (99 % "
-                "sure). A kind of fault that was not tried fits better: the foot of the joint "
-                "front_left_knee has only 20 % of its grip left. Check this, and repeat the "
-                "diagnosis with --kinds default,grip (if other kinds than the default were tried, "
-                "with these in place of default)."
+                "repeat the diagnosis with one more kind of fault (--kinds default,grip). A fault "
+                "of this kind fits better: the foot of the joint front_left_knee has only 20 % of "
+                "its grip left."
             ),
         ),
         (
             {"verdict": "unexplained", "fit": JOINT, "best": INTACT},
+            f"{UNEXPLAINED} It is not known how sure this is.",
             (
-                "The robot differs from its model, and none of the faults tried explains it. The "
-                "difference is largest at the joint knee: inspect it, then repeat the diagnosis "
+                "check the joint knee, where the difference is largest. Then repeat the diagnosis "
                 "with all kinds of faults (--kinds all)."
             ),
         ),
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
+            f"{UNEXPLAINED} 60 % sure: about 40 of 100 such answers are wrong.",
             (
-                "The robot differs from its model, and none of the faults tried explains it (60 % "
-                "sure). If it is one of them after all, then most probably this: the joint "
-                "front_left_knee is stuck (30 %). Check it; if it is not so, repeat the diagnosis "
-                "with all kinds of faults (--kinds all)."
+                "check the best guess (30 % likely): the joint front_left_knee is stuck. If it is "
+                "not so, repeat the diagnosis with all kinds of faults (--kinds all)."
             ),
         ),
         (
+            {"verdict": "unexplained", "probability": {str(JAM): 0.04}},
+            f"{UNEXPLAINED} 96 % sure: about 4 of 100 such answers are wrong.",
+            "repeat the diagnosis with all kinds of faults (--kinds all).",
+        ),
+        (
             {"verdict": "unexplained", "reason": "no simulation works"},
-            "These trials cannot be simulated. Check the model of the robot and the logs.",
+            "These logs cannot be simulated.",
+            "check the model of the robot, and the units and the odometry of the logs.",
         ),
         (
             {"verdict": "not judged", "doubt": DOUBT},
             (
-                "These trials do not show whether the robot has a fault. It may have one, or its "
-                "model may be wrong for motions like these. To decide, DO THIS; then repeat the "
-                "diagnosis."
+                "It is not known whether the robot has a fault. An error in its simulation model "
+                "may explain these logs as well."
             ),
+            "DO THIS. Then repeat the diagnosis.",
         ),
     ],
 )
 def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
-    fields: dict[str, Any], said: str
+    fields: dict[str, Any], what: str, action: str
 ):
-    assert summary(diagnosis(**{"fit": HEALTHY, **fields})) == said
+    assert summary(diagnosis(**{"fit": HEALTHY, **fields})) == (what, f"What to do: {action}")
 
 
 @pytest.mark.parametrize(
@@ -304,6 +312,10 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
         ("payload=0.2", "a load of 20 % of its mass"),
         ("damping:front_left_knee=100.0", "is too high, 100 times that of its model"),
         ("damping:front_left_knee=0.5", "is too low, 0.5 times that of its model"),
+        ("wind=-22.27", "a wind of 22 m/s blows from the front"),
+        ("wind=12", "blows from behind"),
+        ("crosswind=-8", "blows from the left"),
+        ("slope=-0.081", "the ground ahead slopes down by 0.081 rad"),
     ],
 )
 def test_the_words_of_a_fault_say_its_direction_its_place_and_its_amount_without_a_power(

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from selfmodel.diagnosis.text import in_words
+from selfmodel.diagnosis.text import in_words, summary
 from selfmodel.faults.notation import parse
 from selfmodel.report.charts import GaitDiagram
 from selfmodel.report.content import details, gait_section, headline, report_of
@@ -30,7 +30,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     ]
     assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
     assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline
-    assert in_words(subject.diagnosis.best) in report.headline
+    assert summary(subject.diagnosis)[0] in report.headline
     assert f"True faults: {result['truth']}, at a reality gap of 0.1" in report.verdict[-1]
     trials = report.sections[0].items[1]
     assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]
@@ -43,7 +43,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     [
         ("explained", "2 trials of the quadruped. {words}"),
         ("intact", "No fault was found"),
-        ("unexplained", "none of the faults tried explains"),
+        ("unexplained", "none of the faults that were tried explains"),
     ],
 )
 def test_every_verdict_has_its_sentence(subject: Subject, verdict: str, said: str):
@@ -62,11 +62,11 @@ def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subje
 
     found = headline(with_verdict(subject, verdict="ambiguous", indistinguishable=others))
 
-    assert "or the motor of the joint back_right_knee has only 90 % of its torque left" in found
-    assert "or something not named here (" in found
+    assert "(3) the motor of the joint back_right_knee has only 90 % of its torque left" in found
+    assert "(4) something else (" in found
     without = {"indistinguishable": others, "probability": {}}
     found = headline(with_verdict(subject, verdict="ambiguous", **without))
-    assert "or one of 2 others. Check these; " in found
+    assert "(4) one of 2 others. What to do: check these" in found
 
 
 def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: tuple[Shot, ...]):
