@@ -74,10 +74,10 @@ def report_of(subject: Subject, *, finished: bool = True) -> Report:
 
 def headline(subject: Subject) -> str:
     """Returns what happened, in a few sentences."""
-    result, (what, action) = subject.result, summary(subject.diagnosis)
+    result, (what, _) = subject.result, summary(subject.diagnosis)
     if result is None:
         trials = counted(len(subject.damaged), "trial")
-        return f"{trials} of the {subject.robot.name}. {what} {action}"
+        return f"{trials} of the {subject.robot.name}. {what}"
     score = result.score
     before, after, recovered = (
         f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
@@ -94,11 +94,10 @@ def headline(subject: Subject) -> str:
 
 
 def details(subject: Subject) -> tuple[str, ...]:
-    """Returns the sentences of the verdict, and the truth where it is known."""
-    diagnosis = subject.diagnosis
-    sentences = [verdict_sentences(diagnosis), fit_sentence(diagnosis)]
-    if subject.result is not None:
-        sentences = [summary(diagnosis)[1], *sentences, _truth(subject.result)]
+    """Returns what to do, the sentences of the verdict, and the truth where it is known."""
+    diagnosis, result = subject.diagnosis, subject.result
+    sentences = [summary(diagnosis)[1], verdict_sentences(diagnosis), fit_sentence(diagnosis)]
+    sentences += [_truth(result)] if result is not None else []
     return tuple(sentence for sentence in sentences if sentence)
 
 

@@ -170,7 +170,7 @@ def test_a_loss_as_small_as_that_of_healthy_trials_has_to_beat_a_refit_in_any_ga
     for problem in (problem_of(table, same, harder, weaker), more):
         doubt = doubted(problem, WEAK, 9.0)
         assert doubt is not None
-        assert "longer" in doubt.remedy, "the healthy trials have the gait"
+        assert "twice as long" in doubt.remedy, "the healthy trials have the gait"
     assert doubted(problem_of(table, same, harder), WEAK, 9.0) is None
 
 
