@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.foreign.cases import CASES, GROUPS
+from benchmarks.foreign.diagram import diagram
 from benchmarks.foreign.generate import Plan, generate
 from benchmarks.foreign.model import LEVELS
 from benchmarks.foreign.robots import NAMES
@@ -20,6 +21,7 @@ from benchmarks.foreign.scoring import (
     table,
     write_csv,
 )
+from selfmodel.studies.figures import files_of
 
 
 def main() -> None:
@@ -48,6 +50,10 @@ def main() -> None:
     rates.add_argument("--by", choices=("group", "case"), default="group")
     rates.add_argument("--csv", type=Path, help="file to write, a row per recording")
     rates.set_defaults(run=_table)
+    drawing = commands.add_parser("diagram", help="draw the reliability of the probabilities")
+    drawing.add_argument("csv", type=Path, nargs="+", help="files of `table --csv`")
+    drawing.add_argument("--out", type=Path, required=True, help="file to write, .png or .svg")
+    drawing.set_defaults(run=_diagram)
     options = parser.parse_args()
     options.run(options)
 
@@ -110,6 +116,10 @@ def _table(options: argparse.Namespace) -> None:
     if options.csv:
         write_csv(rows, options.csv)
     print(table(rows, options.by), reliability(rows), sep="\n\n")
+
+
+def _diagram(options: argparse.Namespace) -> None:
+    options.out.write_bytes(files_of(options.out.stem, diagram(options.csv))[options.out.name])
 
 
 if __name__ == "__main__":

@@ -374,7 +374,7 @@ def reliability(rows: Sequence[Row]) -> str:
         return "No probabilities are stated."
     said = np.array([one.probability for one in found], dtype=float)
     so = np.array([one.is_so for one in found], dtype=float)
-    place = np.clip(np.searchsorted(BINS, said, side="right") - 1, 0, len(BINS) - 2)
+    place = row_of(said)
     lines = ["| probability | recordings | mean probability | so |", "|---|---|---|---|"]
     for k, (low, high) in enumerate(itertools.pairwise(BINS)):
         inside = place == k
@@ -385,13 +385,19 @@ def reliability(rows: Sequence[Row]) -> str:
             )
     rng = np.random.default_rng(0)
     drawn = rng.integers(len(said), size=(RESAMPLES, len(said)))
-    errors = [_calibration_error(said[one], so[one], place[one]) for one in drawn]
+    errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
     low, high = np.quantile(errors, (0.025, 0.975))
-    error = _calibration_error(said, so, place)
+    error = calibration_error(said, so, place)
     return "\n".join([*lines, "", f"Calibration error {error:.1%} ({low:.1%} to {high:.1%})"])
 
 
-def _calibration_error(said: FloatArray, so: FloatArray, place: IndexArray) -> float:
+def row_of(said: FloatArray) -> IndexArray:
+    """Returns the row of the reliability table of each probability."""
+    return np.clip(np.searchsorted(BINS, said, side="right") - 1, 0, len(BINS) - 2)
+
+
+def calibration_error(said: FloatArray, so: FloatArray, place: IndexArray) -> float:
+    """Returns the expected calibration error of probabilities, what was so, and their rows."""
     return float(np.abs(np.bincount(place, said - so)).sum() / len(said))
 
 

@@ -16,7 +16,7 @@ MAX_NAMED = 3
 MIN_GUESS = 0.1
 """Probability from which a summary names a cause that is not the most probable: 1 in 10."""
 
-NO_DOUBT = Doubt("the diagnosis does not say why", "record a log of the healthy robot, moving so")
+NO_DOUBT = Doubt("the diagnosis does not say why", "record a healthy robot moving like this one")
 
 SIGMA = "\u03c3"  # standard errors
 

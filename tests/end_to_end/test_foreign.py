@@ -11,6 +11,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from benchmarks.foreign.cases import CASES, NOTATION, UNKNOWN, Fault, faults_of, stream
+from benchmarks.foreign.diagram import diagram
 from benchmarks.foreign.generate import Plan, generate
 from benchmarks.foreign.model import compiled, draw_gap
 from benchmarks.foreign.robots import NAMES, Robot, robot
@@ -237,6 +238,15 @@ def test_the_calibration_error_is_the_mean_difference_of_probability_and_rate():
 
     assert "| 90% to 95% | 10 | 92.0% | 9/10, 90 %" in found
     assert "Calibration error 21.0% (" in found
+
+
+def test_the_reliability_diagram_of_the_results_is_drawn_from_their_rows():
+    results = FOLDER.parents[1] / "docs" / "results"
+    named = ("foreign-own-gaits", "foreign-again", "foreign-long")
+    (axes,) = diagram([results / "data" / f"{name}.csv" for name in named]).axes
+
+    assert len(axes.containers) == 4, "a point per row of the reliability table"
+    assert f"*{axes.get_title()};" in (results / "foreign.md").read_text()
 
 
 def test_a_row_tells_false_alarms_missed_faults_and_inventions_apart():
