@@ -105,10 +105,18 @@ results: $(READY) ## repeat the paper's experiment in runs/paper, with its figur
 	$(BIN)/selfmodel paper --out $(PAPER) --robots quadruped --case 1,2,3,5,6,9 --comparator forward-displacement --seeds 10
 
 FOREIGN ?= runs/foreign
-foreign: $(TOOLS) ## make recordings by an independent generator and score their diagnoses; takes hours
-	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --robots quadruped,hexapod,ant --gaps none,moderate,large --seeds 0
-	$(BIN)/python -m benchmarks.foreign generate $(FOREIGN) --cases healthy --gaps none,moderate,large --seeds 1-17
+GENERATE = $(BIN)/python -m benchmarks.foreign generate $(FOREIGN)
+foreign: $(TOOLS) ## make the recordings of docs/results/foreign.md and score their diagnoses; takes days
+	$(GENERATE) --cases break,jam,sensor,break+sensor,break+jam,onset --gaps none,moderate,large --seeds 50-51
+	$(GENERATE) --cases healthy --gaps none,moderate,large --seeds 50-65
+	$(GENERATE) --cases lost-encoder --gaps none,moderate,large --seeds 50
+	$(GENERATE) --cases break-debris --gaps moderate,large --seeds 50-52
+	$(GENERATE) --cases wide --gaps moderate,large --seeds 51-52
+	$(GENERATE) --cases outside --gaps moderate,large --seeds 50-51
+	$(GENERATE) --robots quadruped --cases default --gaps moderate --seeds 50-52
+	$(GENERATE) --robots hexapod --cases default --gaps moderate --seeds 51
+	$(GENERATE) --robots ant --cases break,jam,sensor,break+sensor,break+jam,healthy --gaps none,moderate,large --seeds 50
 	$(BIN)/python -m benchmarks.foreign score $(FOREIGN)
-	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl
+	$(BIN)/python -m benchmarks.foreign table $(FOREIGN)/scores.jsonl --csv $(FOREIGN)/scores.csv
 
 .PHONY: help setup page browser demo test test-slow test-all docs lint types wheel versions viewers bench results foreign
