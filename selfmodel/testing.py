@@ -347,7 +347,7 @@ def _check_words(kind: FaultKind, candidates: tuple[Fault, ...]) -> None:
         words = {fault.part: fault.words for fault in candidates}
     except (LookupError, ValueError) as error:
         raise ValueError(
-            f"expected words of {kind.name} with part, severity, amount, side and at, got "
+            f"expected words of {kind.name} with part, severity, amount, degrees, side and at, got "
             f"{kind.words!r}: {error!r}"
         ) from error
     _require(

@@ -48,12 +48,15 @@ MAX_JOINTS = 3
 """Joints that are named, the fastest relative to the healthy trials first."""
 
 REMEDY = (
-    "record this robot again, moving as in the log of the healthy robot{}. Or record a healthy "
-    "robot of the same type, moving as this one did (--healthy FILE)"
+    "record this robot again, {}, and repeat the diagnosis with the new log. Or record a healthy "
+    "robot of the same type, moving as this one did, and repeat the diagnosis with its log too "
+    "(--healthy FILE)"
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
-LONGER = "record this robot again, with the same movements for twice as long"
+LONGER = (
+    "record this robot again, with the same movements for twice as long, and repeat the diagnosis"
+)
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
 FASTEST = 0.95
@@ -112,7 +115,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     if not faster:
-        return Doubt(reason, REMEDY.format(""))
+        return Doubt(reason, REMEDY.format("with the same commands as in the healthy log"))
     joint, (speed, covered) = next(iter(faster.items()))
     listed = "; ".join(
         f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
@@ -120,7 +123,10 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
     )
     return Doubt(
         f"{reason}, and these trials are faster than the healthy ones ({listed})",
-        REMEDY.format(f" (command {joint} at up to {covered:.2g} rad/s, not {speed:.2g} rad/s)"),
+        REMEDY.format(
+            f"moving as the healthy robot did ({joint} commanded at {covered:.2g} rad/s at most, "
+            f"not at {speed:.2g} rad/s as now)"
+        ),
     )
 
 

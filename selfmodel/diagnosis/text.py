@@ -9,6 +9,7 @@ from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
 from selfmodel.diagnosis.verdict import is_too_high
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.registry import KIND_SETS, KINDS
 
 MAX_NAMED = 3
 """Causes that a summary names."""
@@ -18,51 +19,56 @@ MIN_GUESS = 0.1
 
 NO_DOUBT = Doubt("the diagnosis does not say why", "record a healthy robot moving like this one")
 
+OUTSIDE = {*KIND_SETS["environment"], KINDS["crosswind"], KINDS["roughness"]}  # not of the robot
+
 SIGMA = "\u03c3"  # standard errors
 
 _SEVERITY = re.compile(r"=([a-z]*)[^=]*$")  # the prefix belongs to the kind, the number does not
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, str]:
-    """Returns what is wrong, since when and how sure that is; and, as a second line, what to do."""
+    """Returns what is wrong, how sure that is and since when; and, as a second line, what to do."""
     facts, action = _answer(diagnosis)
     if (change := diagnosis.change) is not None:
-        before = f". Before that: {in_words(change.before)}" if change.before else ""
-        since = f"this is so from {change.time:.1f} s into the log '{change.trial}' on{before}"
-        facts.insert(1, since)
+        when = f"{change.time:.1f} s into the log '{change.trial}'"
+        if change.before or diagnosis.verdict == "not judged":
+            earlier = in_words(change.before)
+            facts[:1] = [f"until about {when}: {earlier}", f"after that: {facts[0]}"]
+        else:
+            facts.append(f"this began about {when}")
     return " ".join(f"{one[0].upper()}{one[1:]}." for one in facts), f"What to do: {action}."
 
 
 def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
     """Returns what is wrong and how sure that is, as clauses, and what to do."""
     best, fit, probability = diagnosis.best, diagnosis.fit, diagnosis.probability
-    sure = _sure(probability.get(str(best)))
+    sure = _sure(diagnosis, probability.get(str(best)))
     again = "record this robot again for twice as long, and repeat the diagnosis"
     if fit is None or fit.healthy_loss is None:
         again = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)"
     match diagnosis.verdict:
         case "intact":
             action = f"nothing. To find faults too small to show in these logs, {again}"
-            return ["no fault was found", sure], action
+            earlier = "check the earlier fault, which may come back"
+            return [f"no fault was found{sure}"], earlier if diagnosis.change else action
         case "explained":
-            return [in_words(best), sure], f"check whether this is so. If it is not, {again}"
+            is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
+            robot = "nothing is wrong with the robot itself: " if is_outside else ""
+            these = ("this is", "both are", "all are")[min(len(best), 3) - 1]
+            return [robot + in_words(best) + sure], f"check whether {these} so. If not, {again}"
         case "ambiguous":
-            action = f"check these, in this order. If none of them is so, {again}"
-            return _alternatives(diagnosis), action
+            facts, checks = _alternatives(diagnosis)
+            failed = "none of them is" if len(checks) > 1 else "it is not"
+            return facts, f"check {', then '.join(checks)}. If {failed} so, {again}"
         case "unexplained" if diagnosis.reason:
-            action = "check the model of the robot, and the units and the odometry of the logs"
-            return ["these logs cannot be simulated"], action
+            action = "check the robot model (--robot), and the logs' units (rad, m, s) and odometry"
+            return ["no diagnosis: every simulation with this robot model becomes unstable"], action
         case "unexplained":
-            what = "something is wrong, but none of the faults that were tried explains it"
-            rest = 1 - sum(probability.values()) if probability else None
-            return [what, _sure(rest)], _search_on(diagnosis)
+            return _unexplained(diagnosis)
         case "not judged":
             what = "it is not known whether the robot has a fault"
-            model = "an error in its simulation model may explain these logs as well"
-            return [
-                what,
-                model,
-            ], f"{(diagnosis.doubt or NO_DOUBT).remedy}. Then repeat the diagnosis"
+            model = "an error in the simulation model could give the same result"
+            return [what, model], (diagnosis.doubt or NO_DOUBT).remedy
 
 
 def in_words(hypothesis: Hypothesis) -> str:
@@ -70,22 +76,21 @@ def in_words(hypothesis: Hypothesis) -> str:
     return ", and ".join(fault.words for fault in hypothesis.faults) or "nothing is wrong"
 
 
-def _alternatives(diagnosis: Diagnosis) -> list[str]:
-    """Returns the faults of all alternatives, how sure they are, and what each adds, as clauses.
+def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
+    """Returns the faults of all alternatives and what each adds, as clauses, and what to check.
 
     Without such faults, the alternatives with their probabilities.
     """
     probability = diagnosis.probability
-    alike = sorted(
-        [diagnosis.best, *diagnosis.indistinguishable],
-        key=lambda one: -probability.get(str(one), 0.0),
-    )
+    alike = [diagnosis.best, *diagnosis.indistinguishable]
+    alike.sort(key=lambda one: -probability.get(str(one), 0.0))
     shared = set.intersection(*(set(one.faults) for one in alike))
-    causes = []
-    for one in alike[:MAX_NAMED]:
+    causes, checks = [], ["the first statement"] if shared else []
+    for number, one in enumerate(alike[:MAX_NAMED], start=1):
         own = Hypothesis(tuple(fault for fault in one.faults if fault not in shared))
         words = in_words(own) if own or not shared else "nothing else is wrong"
         causes.append(words if shared else words + _likely(probability.get(str(one))))
+        checks += [f"({number})"] if own else []
     if probability and not shared:
         rest = 1 - sum(probability.get(str(one), 0.0) for one in alike[:MAX_NAMED])
         causes.append(f"something else{_likely(rest)}")
@@ -93,18 +98,20 @@ def _alternatives(diagnosis: Diagnosis) -> list[str]:
         causes.append(f"one of {len(alike) - MAX_NAMED} others")
     numbered = "; ".join(f"({number}) {cause}" for number, cause in enumerate(causes, start=1))
     if not shared:
-        return [f"one of these is true: {numbered}"]
+        return [f"one of these is true: {numbered}"], checks
     common = Hypothesis(tuple(sorted(shared)))
     having = [p for one, p in probability.items() if _faults(str(common)) <= _faults(one)]
-    sure = _sure(sum(having) if having else None)
-    return [in_words(common), sure, f"in addition, one of these is true: {numbered}"]
+    what = in_words(common) + _sure(diagnosis, sum(having) if having else None)
+    return [what, f"in addition, one of these is true: {numbered}"], checks
 
 
-def _sure(probability: float | None) -> str:
-    if probability is None:
-        return "it is not known how sure this is"
-    wrong = round(100 * (1 - probability))
-    return f"{100 - wrong} % sure: about {wrong} of 100 such answers are wrong"
+def _sure(diagnosis: Diagnosis, probability: float | None) -> str:
+    if probability is not None:
+        wrong = round(100 * (1 - probability))
+        return f" ({100 - wrong} % sure: about {wrong} of 100 such answers are wrong)"
+    if diagnosis.fit is None or diagnosis.fit.healthy_loss is None:
+        return " (a log of the healthy robot is needed to say how sure this is)"
+    return " (it is not known how sure this is)"
 
 
 def _likely(probability: float | None) -> str:
@@ -113,34 +120,34 @@ def _likely(probability: float | None) -> str:
     return f" ({'< 1' if probability < 0.01 else f'{100 * probability:.0f}'} % likely)"
 
 
-def _search_on(diagnosis: Diagnosis) -> str:
-    """Returns what to do about a robot that none of the faults explains that were tried."""
+def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
+    """Returns the answer about a robot that none of the faults explains that were tried."""
     best, unsearched, fit = diagnosis.best, diagnosis.unsearched, diagnosis.fit
     probability = diagnosis.probability.get(str(best))
+    rest = 1 - sum(diagnosis.probability.values()) if diagnosis.probability else None
+    what = "probably something is wrong that is not among the faults that were tried"
+    facts = [what + _sure(diagnosis, rest)]
+    has_guess = bool(best) if probability is None else probability >= MIN_GUESS
+    facts += [f"or {in_words(best)}{_likely(probability)}"] if has_guess else []
+    kinds = "all kinds of faults (--kinds all), if you have not yet"
+    first = "check the latter. If it is not so, " if best and has_guess else ""
     if unsearched is not None:
-        return (
-            f"repeat the diagnosis with one more kind of fault (--kinds default,{unsearched.kind})"
-            f". A fault of this kind fits better: {in_words(unsearched.hypothesis)}"
-        )
-    first = ""
-    if fit and fit.joints:
-        first = f"check the joint {next(iter(fit.joints))}, where the difference is largest. Then "
-    elif best and (probability is None or probability >= MIN_GUESS):
-        first = f"check the best guess{_likely(probability)}: {in_words(best)}. If it is not so, "
-    return f"{first}repeat the diagnosis with all kinds of faults (--kinds all)"
+        kinds = f"one more kind of fault (--kinds default,{unsearched.kind})"
+        better = "fits these logs better than all that was tried"
+        first = f"check this, which {better}: {in_words(unsearched.hypothesis)}. Then "
+    elif fit and fit.joints:
+        first = f"check the joint {next(iter(fit.joints))}, where log and model differ most. Then "
+    return facts, f"{first}repeat the diagnosis with {kinds}"
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> str:
     """Returns the verdict, the change, further kinds and undetectable faults as sentences."""
     sentences = [_verdict(diagnosis)]
     if diagnosis.change is not None:
-        change = str(diagnosis.change)
-        sentences.append(f"{change[0].upper()}{change[1:]}.")
+        sentences.append(f"C{str(diagnosis.change)[1:]}.")
     if diagnosis.also_searched:
-        also = ", ".join(diagnosis.also_searched)
-        sentences.append(
-            f"Searched beyond the kinds asked for, to predict the trials better: {also}."
-        )
+        also = "Searched beyond the kinds asked for, to predict the trials better"
+        sentences.append(f"{also}: {', '.join(diagnosis.also_searched)}.")
     if diagnosis.undetectable:
         faults = ", ".join(map(str, diagnosis.undetectable_faults))
         sentences.append(f"Undetectable in these trials: {faults}.")
@@ -228,20 +235,13 @@ def _verdict(diagnosis: Diagnosis) -> str:
             alone = "" if diagnosis.undetectable else ", and no other hypothesis does as well"
             return f"Explained: {best} predicts the trials{alone}."
         case "ambiguous":
-            others = ", ".join(map(str, diagnosis.indistinguishable))
-            return (
-                f"Ambiguous: the trials do not distinguish {best} from {others} ({diagnosis.test})."
-            )
+            others = f"{', '.join(map(str, diagnosis.indistinguishable))} ({diagnosis.test})"
+            return f"Ambiguous: the trials do not distinguish {best} from {others}."
         case "unexplained":
             return f"Unexplained: {_missing(diagnosis)}"
         case "not judged":
-            return f"Not judged: {_doubt(diagnosis)}"
-
-
-def _doubt(diagnosis: Diagnosis) -> str:
-    """Returns why trials are not judged, as a sentence."""
-    reason = (diagnosis.doubt or NO_DOUBT).reason
-    return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
+            reason = f"Not judged: {(diagnosis.doubt or NO_DOUBT).reason}"
+            return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
 
 
 def _missing(diagnosis: Diagnosis) -> str:

@@ -270,7 +270,7 @@ class LoadedLink(JointFault):
         variant.load_link(anatomy.joint(fault.part).hinges[0], fault.severity)
 
 
-BROKEN = BrokenJoint(name="break", words="the limb beyond the joint {part} is missing")
+BROKEN = BrokenJoint(name="break", words="everything that the joint {part} moves is missing")
 JAMMED = Jammed(name="jam", words="the joint {part} is stuck", is_of_joint=True)
 JAMMED_AT_ANGLE = JammedAtAngle(
     name="jam-angle",
@@ -357,7 +357,7 @@ LOST_GRIP = LostGrip(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={1.0: None},
     unit="of its friction",
-    words="the foot of the joint {part} has only {severity:.0%} of its grip left",
+    words="the foot below the joint {part} has only {severity:.0%} of its grip left",
 )
 LOADED_LINK = LoadedLink(
     name="load",

@@ -1,5 +1,6 @@
 """A fault, and the base class of the kinds of faults and environments."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import total_ordering
@@ -41,8 +42,8 @@ class FaultKind:
         levels: Severities that the search proposes, in the order of a gene's fourth value.
         unit: Unit of the severity.
         words: Clause about a fault in plain words, a format with ``part``, ``severity``, its
-            ``amount`` without the sign, ``side`` and ``at`` (" at the " and the part, empty without
-            one), such as "the joint {part} is stuck"; "" for the notation.
+            ``amount`` without the sign, that in ``degrees``, ``side`` and ``at`` (" at the " and
+            the part, empty without one), such as "the joint {part} is stuck"; "" for the notation.
         sides: ``side`` in ``words``: of a severity up to the nominal one, and of one above it.
         degenerates_to: Severities at which the fault is equivalent to one of another kind, without
             a severity or of severity 0, or to no fault (None).
@@ -205,8 +206,8 @@ class Fault:
         amount, nominal = abs(self.severity), self.kind.nominal or 0.0
         side = self.kind.sides[self.severity > nominal]
         named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
-        at = f" at the {self.part}" if self.part else ""
-        return self.kind.words.format(**named, at=at).replace("%", " %")
+        at, degrees = f" at the {self.part}" if self.part else "", math.degrees(amount)
+        return self.kind.words.format(**named, at=at, degrees=degrees).replace("%", " %")
 
     @property
     def canonical(self) -> "Fault | None":

@@ -253,8 +253,8 @@ SLOPE = Slope(
     levels=(-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3),
     degenerates_to={0.0: None},
     unit="rad",
-    words="the ground ahead slopes {side} by {amount:.2g} rad",
-    sides=("down", "up"),
+    words="the robot starts facing {side}, on a slope of {degrees:.2g} degrees ({amount:.2g} rad)",
+    sides=("downhill", "uphill"),
 )
 WIND, CROSSWIND = (
     Wind(
@@ -265,11 +265,11 @@ WIND, CROSSWIND = (
         levels=_SPEEDS,
         degenerates_to={0.0: None},
         unit="m/s",
-        words="a wind of {amount:.2g} m/s blows from {side}",
+        words="a wind of {amount:.2g} m/s blows from the robot's initial {side}",
         sides=sides,
     )
     for axis, (name, sides) in enumerate(
-        (("wind", ("the front", "behind")), ("crosswind", ("the left", "the right")))
+        (("wind", ("front", "rear")), ("crosswind", ("left", "right")))
     )
 )
 PAYLOAD = Payload(

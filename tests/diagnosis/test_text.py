@@ -176,17 +176,21 @@ DOUBT = Doubt("WHY", "DO THIS")
 MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
-UNEXPLAINED = "Something is wrong, but none of the faults that were tried explains it."
+UNEXPLAINED = "Probably something is wrong that is not among the faults that were tried"
 AGAIN = "record this robot again for twice as long, and repeat the diagnosis."
+ALL_KINDS = "repeat the diagnosis with all kinds of faults (--kinds all), if you have not yet."
 HEALTHY_LOG = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)."
 
 
 def test_a_fault_before_a_change_is_not_forgotten():
     earlier = dataclasses.replace(CHANGE, before=OTHER)
-    ended, _ = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
+    ended, action = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
 
-    assert "Before that: the joint back_left_knee is stuck" in ended
-    assert "Before that" not in summary(diagnosis(change=CHANGE))[0]
+    assert ended.startswith("Until about 4.9 s into the log '02-recovery': the joint back_left_kn")
+    assert "After that: no fault was found (" in ended
+    assert "check the earlier fault" in action
+    unknown, _ = summary(diagnosis(verdict="not judged", change=CHANGE))
+    assert "'02-recovery': nothing is wrong. After that: it is not known" in unknown
 
 
 def test_trials_that_are_not_judged_have_a_reason():
@@ -200,21 +204,33 @@ def test_trials_that_are_not_judged_have_a_reason():
     [
         (
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
-            "No fault was found. 95 % sure: about 5 of 100 such answers are wrong.",
+            "No fault was found (95 % sure: about 5 of 100 such answers are wrong).",
             f"nothing. To find faults too small to show in these logs, {AGAIN}",
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
             (
-                "The joint front_left_knee is stuck. This is so from 4.9 s into the log "
-                "'02-recovery' on. 93 % sure: about 7 of 100 such answers are wrong."
+                "The joint front_left_knee is stuck (93 % sure: about 7 of 100 such answers are "
+                "wrong). This began about 4.9 s into the log '02-recovery'."
             ),
-            f"check whether this is so. If it is not, {AGAIN}",
+            f"check whether this is so. If not, {AGAIN}",
         ),
         (
             {"fit": None},
-            "The joint front_left_knee is stuck. It is not known how sure this is.",
-            f"check whether this is so. If it is not, {HEALTHY_LOG}",
+            (
+                "The joint front_left_knee is stuck (a log of the healthy robot is needed to say "
+                "how sure this is)."
+            ),
+            f"check whether this is so. If not, {HEALTHY_LOG}",
+        ),
+        (
+            {"best": parse("slope=-0.081+wind=-22.27", ANATOMY)},
+            (
+                "Nothing is wrong with the robot itself: the robot starts facing downhill, on a "
+                "slope of 4.6 degrees (0.081 rad), and a wind of 22 m/s blows from the robot's "
+                "initial front (it is not known how sure this is)."
+            ),
+            f"check whether both are so. If not, {AGAIN}",
         ),
         (
             {
@@ -227,7 +243,7 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "the joint back_left_knee is stuck (35 % likely); (3) nothing is wrong (< 1 % "
                 "likely); (4) something else (5 % likely)."
             ),
-            f"check these, in this order. If none of them is so, {AGAIN}",
+            f"check (1), then (2). If none of them is so, {AGAIN}",
         ),
         (
             {"verdict": "ambiguous", "indistinguishable": (OTHER,), "fit": None},
@@ -235,7 +251,12 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "One of these is true: (1) the joint front_left_knee is stuck; (2) the joint "
                 "back_left_knee is stuck."
             ),
-            f"check these, in this order. If none of them is so, {HEALTHY_LOG}",
+            f"check (1), then (2). If none of them is so, {HEALTHY_LOG}",
+        ),
+        (
+            {"verdict": "ambiguous", "indistinguishable": (INTACT,)},
+            ("One of these is true: (1) the joint front_left_knee is stuck; (2) nothing is wrong."),
+            f"check (1). If it is not so, {AGAIN}",
         ),
         (
             {
@@ -245,54 +266,59 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "probability": {str(BOTH): 0.6, f"{JAM}=0.3": 0.1, str(JAM): 0.2, str(OTHER): 0.05},
             },
             (
-                "The joint front_left_knee is stuck. 90 % sure: about 10 of 100 such answers are "
-                "wrong. In addition, one of these is true: (1) the joint back_left_knee is stuck; "
+                "The joint front_left_knee is stuck (90 % sure: about 10 of 100 such answers are "
+                "wrong). In addition, one of these is true: (1) the joint back_left_knee is stuck; "
                 "(2) nothing else is wrong."
             ),
-            f"check these, in this order. If none of them is so, {AGAIN}",
+            f"check the first statement, then (1). If none of them is so, {AGAIN}",
         ),
         (
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.04}},
-            f"{UNEXPLAINED} 96 % sure: about 4 of 100 such answers are wrong.",
+            f"{UNEXPLAINED} (96 % sure: about 4 of 100 such answers are wrong).",
             (
-                "repeat the diagnosis with one more kind of fault (--kinds default,grip). A fault "
-                "of this kind fits better: the foot of the joint front_left_knee has only 20 % of "
-                "its grip left."
+                "check this, which fits these logs better than all that was tried: the foot below "
+                "the joint front_left_knee has only 20 % of its grip left. Then repeat the "
+                "diagnosis with one more kind of fault (--kinds default,grip)."
             ),
         ),
         (
             {"verdict": "unexplained", "fit": JOINT, "best": INTACT},
-            f"{UNEXPLAINED} It is not known how sure this is.",
-            (
-                "check the joint knee, where the difference is largest. Then repeat the diagnosis "
-                "with all kinds of faults (--kinds all)."
-            ),
+            f"{UNEXPLAINED} (it is not known how sure this is).",
+            f"check the joint knee, where log and model differ most. Then {ALL_KINDS}",
         ),
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
-            f"{UNEXPLAINED} 60 % sure: about 40 of 100 such answers are wrong.",
             (
-                "check the best guess (30 % likely): the joint front_left_knee is stuck. If it is "
-                "not so, repeat the diagnosis with all kinds of faults (--kinds all)."
+                f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). Or the joint "
+                "front_left_knee is stuck (30 % likely)."
             ),
+            f"check the latter. If it is not so, {ALL_KINDS}",
         ),
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.04}},
-            f"{UNEXPLAINED} 96 % sure: about 4 of 100 such answers are wrong.",
-            "repeat the diagnosis with all kinds of faults (--kinds all).",
+            f"{UNEXPLAINED} (96 % sure: about 4 of 100 such answers are wrong).",
+            ALL_KINDS,
+        ),
+        (
+            {"verdict": "unexplained", "best": INTACT, "probability": {"intact": 0.36}},
+            (
+                f"{UNEXPLAINED} (64 % sure: about 36 of 100 such answers are wrong). Or nothing is "
+                "wrong (36 % likely)."
+            ),
+            ALL_KINDS,
         ),
         (
             {"verdict": "unexplained", "reason": "no simulation works"},
-            "These logs cannot be simulated.",
-            "check the model of the robot, and the units and the odometry of the logs.",
+            "No diagnosis: every simulation with this robot model becomes unstable.",
+            "check the robot model (--robot), and the logs' units (rad, m, s) and odometry.",
         ),
         (
             {"verdict": "not judged", "doubt": DOUBT},
             (
-                "It is not known whether the robot has a fault. An error in its simulation model "
-                "may explain these logs as well."
+                "It is not known whether the robot has a fault. An error in the simulation model "
+                "could give the same result."
             ),
-            "DO THIS. Then repeat the diagnosis.",
+            "DO THIS.",
         ),
     ],
 )
@@ -312,10 +338,10 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
         ("payload=0.2", "a load of 20 % of its mass"),
         ("damping:front_left_knee=100.0", "is too high, 100 times that of its model"),
         ("damping:front_left_knee=0.5", "is too low, 0.5 times that of its model"),
-        ("wind=-22.27", "a wind of 22 m/s blows from the front"),
-        ("wind=12", "blows from behind"),
-        ("crosswind=-8", "blows from the left"),
-        ("slope=-0.081", "the ground ahead slopes down by 0.081 rad"),
+        ("wind=-22.27", "a wind of 22 m/s blows from the robot's initial front"),
+        ("wind=12", "initial rear"),
+        ("crosswind=-8", "initial left"),
+        ("slope=-0.081", "facing downhill, on a slope of 4.6 degrees (0.081 rad)"),
     ],
 )
 def test_the_words_of_a_fault_say_its_direction_its_place_and_its_amount_without_a_power(

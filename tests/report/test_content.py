@@ -43,7 +43,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     [
         ("explained", "2 trials of the quadruped. {words}"),
         ("intact", "No fault was found"),
-        ("unexplained", "none of the faults that were tried explains"),
+        ("unexplained", "not among the faults that were tried"),
     ],
 )
 def test_every_verdict_has_its_sentence(subject: Subject, verdict: str, said: str):
