@@ -190,7 +190,7 @@ def loose_encoders(
     joint.
     """
     commands, logged = trajectory["commands"], trajectory["joint_positions"]
-    filtered = np.hstack([_low_pass(commands, constant) for constant in TIME_CONSTANTS])
+    filtered = _low_passes(commands)
     first = round((1 - END) * trajectory.steps)
     fits = [_following(column, filtered, first) for column in logged.T]
     hinges = np.array([i for i, fit in enumerate(fits) if fit is not None], dtype=np.intp)
@@ -238,25 +238,25 @@ def _following(angles: FloatArray, filtered: FloatArray, first: int) -> FloatArr
     encoder is not such a function, or stands.
     """
     best, fitted = MAX_REMAINDER, None
-    for column in filtered.T:
-        line = _line(angles[first:], column[first:])
+    for each in filtered:
+        line = _line(angles[first:], each[first:])
         if line is not None and line[2] < best:
-            best, fitted = line[2], line[0] + line[1] * column
+            best, fitted = line[2], line[0] + line[1] * each
     return fitted if fitted is not None and np.isfinite(fitted).all() else None
 
 
-def _low_pass(commands: FloatArray, constant: float) -> FloatArray:
-    """Returns commands after a low-pass filter of first order, ``(steps, motors)``.
+def _low_passes(commands: FloatArray) -> FloatArray:
+    """Returns commands after low-pass filters of first order, ``(constants * motors, steps)``.
 
-    Row k contains the commands up to row k - 1: command k has its effect after row k.
+    Row k of a filter contains the commands up to row k - 1: command k has its effect after row k.
     """
     known = np.nan_to_num(held(np.where(np.isfinite(commands), commands, np.nan)))  # 0 at first
-    gain = 1 - np.exp(-1 / constant) if constant else 1.0
-    filtered = np.empty_like(known)
+    gains = np.array([1 - np.exp(-1 / constant) if constant else 1.0 for constant in TIME_CONSTANTS])
+    filtered = np.empty((len(known), len(gains), known.shape[1]))
     filtered[0] = known[0]
     for k in range(1, len(known)):
-        filtered[k] = filtered[k - 1] + gain * (known[k - 1] - filtered[k - 1])
-    return filtered
+        filtered[k] = filtered[k - 1] + gains[:, np.newaxis] * (known[k - 1] - filtered[k - 1])
+    return np.ascontiguousarray(filtered.reshape(len(known), -1).T)
 
 
 def _line(values: FloatArray, over: FloatArray) -> tuple[float, float, float] | None:
@@ -265,9 +265,11 @@ def _line(values: FloatArray, over: FloatArray) -> tuple[float, float, float] | 
     if known.sum() < MIN_KNOWN:
         return None
     y, x = values[known], over[known]
-    variance, spread = float(y.var()), float(x.var())
+    mean, over_mean = y.mean(), x.mean()
+    dy, dx = y - mean, x - over_mean
+    variance, spread = float(np.square(dy).mean()), float(np.square(dx).mean())
     if min(variance, spread) < MIN_VARIANCE:
         return None
-    slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / spread
-    left = float(np.mean(np.square(y - y.mean() - slope * (x - x.mean())))) / variance
-    return float(y.mean()) - slope * float(x.mean()), slope, left
+    slope = float((dx * dy).mean()) / spread
+    left = float(np.square(dy - slope * dx).mean()) / variance
+    return float(mean) - slope * float(over_mean), slope, left

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -94,15 +94,15 @@ class SegmentPrediction:
         logged = {s: values[starts[:, np.newaxis] + compared] for s, values in states.items()}
         reading_log = readings.logged_readings(trajectory["sensors"], starts, horizon)
         motion = encoders.logged_motion(trajectory["joint_positions"], starts, horizon)
-        loose = encoders.loose_encoders(trajectory, starts, horizon)
+        # Most preparations are only to see whether the trial is accepted.
+        loose = cache(partial(encoders.loose_encoders, trajectory, starts, horizon))
         arithmetic = readings.arithmetic_loss(trial, starts, horizon)
 
         def losses(simulated: Trajectory, own: slice) -> Losses:
             """Returns the losses of each segment that has any, of some that were simulated."""
-            counted, followed = steady[own], loose and loose.of(own)
-            predicted = (
-                encoders.with_loose_encoders(simulated, followed) if followed else simulated.signals
-            )
+            counted, predicted = steady[own], simulated.signals
+            if simulated.hinge_mask("detached").any() and (followed := loose()):
+                predicted = encoders.with_loose_encoders(simulated, followed.of(own))
             shape = predicted["sensors"].shape[:2]
             terms = {"commands": np.broadcast_to(arithmetic[own], shape)}
             for signal, values in logged.items():
