@@ -15,7 +15,7 @@ from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO
-from selfmodel.diagnosis.verdict import diagnosis_of
+from selfmodel.diagnosis.verdict import _fit_of
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -271,10 +271,9 @@ def test_another_gait_is_compared_with_the_healthy_trial_that_is_predicted_worst
 ):
     problem = problem_of(table, moved(real, gait), healthy)
     losses = [table.losses([INTACT], [one]).mean() for one in healthy]
-    fit = diagnosis_of(problem, [INTACT], INTACT).fit
+    fit = _fit_of(INTACT, problem)
 
     assert losses[0] != pytest.approx(losses[1], rel=0.1)
-    assert fit is not None
     assert fit.healthy_loss == pytest.approx(reference(losses))
 
 
