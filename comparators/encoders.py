@@ -251,7 +251,9 @@ def _low_passes(commands: FloatArray) -> FloatArray:
     Row k of a filter contains the commands up to row k - 1: command k has its effect after row k.
     """
     known = np.nan_to_num(held(np.where(np.isfinite(commands), commands, np.nan)))  # 0 at first
-    gains = np.array([1 - np.exp(-1 / constant) if constant else 1.0 for constant in TIME_CONSTANTS])
+    gains = np.array(
+        [1 - np.exp(-1 / constant) if constant else 1.0 for constant in TIME_CONSTANTS]
+    )
     filtered = np.empty((len(known), len(gains), known.shape[1]))
     filtered[0] = known[0]
     for k in range(1, len(known)):

@@ -1,5 +1,6 @@
 """Fixtures of all tests, and the choice between the fast tier and everything."""
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from selfmodel.cli.render import WITHOUT_SCREEN, draws
 from selfmodel.isolation import run_isolated
 from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
@@ -28,6 +30,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored under nohup
 
 
 load.run_isolated = in_this_process
+
+gc.set_threshold(50_000, 20, 50)  # what the tests keep is not searched for garbage every second
 
 
 @pytest.fixture
@@ -49,6 +53,14 @@ def pytest_configure(config: pytest.Config) -> None:
     if is_default and any("::" in argument for argument in config.args):
         config.option.markexpr = ""
     settings.load_profile("fast" if config.option.markexpr else "full")
+
+
+@pytest.fixture(scope="session")
+def gl() -> str:
+    """The value of ``MUJOCO_GL`` with which MuJoCo draws here."""
+    for library in filter(draws, WITHOUT_SCREEN):
+        return library
+    pytest.skip("MuJoCo draws with neither EGL nor OSMesa here: apt-get install libosmesa6")
 
 
 @pytest.fixture(scope="session", params=sorted(ROBOTS))

@@ -111,6 +111,7 @@ def _app(**settings: Any) -> typer.Typer:  # noqa: ANN401  # of several types
 def _importer(name: str, work: Any, options: str = "") -> Callable[[], Any]:  # noqa: ANN401
     """Returns a function that returns the command with this work and these options, or a group."""
 
+    @cache
     def imported() -> Any:  # noqa: ANN401  # typer hides the type
         if isinstance(work, typer.Typer):
             return get_command(work)

@@ -33,7 +33,6 @@ from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import refused, selfmodel_process
 from tests.helpers.drivers import random_controllers
-from tests.helpers.opengl import WORKS, draws
 
 STEPS = 31
 """0.3 s, which are 8 frames of a film."""
@@ -88,17 +87,16 @@ def test_the_best_of_a_diagnosis_is_drawn_as_a_strip_whatever_there_is_of_opengl
     assert {p.name for p in tmp_path.iterdir()} == {"strip.png", "result.json"}
 
 
-@draws
 @pytest.mark.process
 @pytest.mark.opengl
 @pytest.mark.parametrize("log", ["a.mcap", "dark.mcap"])
 def test_a_film_is_drawn_by_mujoco_with_what_works_of_itself_and_has_light(
-    log: str, folder: Path, tmp_path: Path
+    log: str, folder: Path, gl: str, tmp_path: Path
 ):
     out = tmp_path / "film.gif"
     done = selfmodel_process("render", log, "-o", str(out), "--json", cwd=folder, MUJOCO_GL="")
     assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["gl"] == WORKS
+    assert json.loads(done.stdout)["gl"] == gl
     with Image.open(out) as image:
         assert (image.n_frames, image.info["duration"]) == (8, 40)
         frame = np.asarray(image.convert("RGB")).astype(int)
@@ -201,9 +199,11 @@ def test_steps_that_were_not_observed_are_marked_in_every_kind_of_strip(
     drawn = film(quadruped, DAMAGE, frames=3, unseen=slice(10, 20))
     begins = {"png": b"\x89PNG", "pdf": b"%PDF"}[kind]
 
+    found = strip(drawn, kind)
+
     assert drawn.shots[0].held.tolist() == [False, True, False]
-    assert strip(drawn, kind).startswith(begins)
-    assert strip(drawn, kind) != strip(film(quadruped, DAMAGE, frames=3), kind)
+    assert found.startswith(begins)
+    assert found != strip(film(quadruped, DAMAGE, frames=3), kind)
 
 
 def test_each_frame_shows_the_pose_of_its_moment(quadruped: Robot):

@@ -28,7 +28,7 @@ from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable, with_value
 from tests.helpers.memory import in_memory
 from tests.helpers.robots.arms import arm
-from tests.logs.conftest import biped  # noqa: F401 - a fixture
+from tests.logs.conftest import MJCF
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=200)
 
@@ -128,9 +128,11 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
     ],
 )
 def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_on_a_floating_base(
-    biped: Robot, base: str, kinds: tuple[FaultKind, ...], beside: str, *, is_searched: bool
+    base: str, kinds: tuple[FaultKind, ...], beside: str, *, is_searched: bool
 ):
-    robot, seed, steps = (biped, 6, 100) if base == "floating" else (arm(), 1, 80)
+    robot, seed, steps = (
+        (Robot("biped", MJCF, 0.01), 6, 100) if base == "floating" else (arm(), 1, 80)
+    )
     (controller,) = random_cpgs(robot, 1, seed)
     faults = "+".join(filter(None, (beside, "delay=2.8")))
     before, after = (logged(robot, one, controller, steps) for one in ("intact", faults))

@@ -91,15 +91,13 @@ def test_a_gap_changes_each_limb_and_motor_independently_and_none_changes_nothin
     assert real.opt.timestep == 0.001
 
 
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(
-    case: object, machine: Robot
-):
-    faults = faults_of(case, machine, 3)
+def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(machine: Robot):
+    for name, case in CASES.items():
+        faults = faults_of(case, machine, 3)
 
-    assert faults == () or model_of(machine, *faults).nq
-    for fault in faults:
-        assert fault.kind in {*NOTATION, *UNKNOWN, "encoder"}
+        assert faults == () or model_of(machine, *faults).nq, name
+        for fault in faults:
+            assert fault.kind in {*NOTATION, *UNKNOWN, "encoder"}, name
 
 
 @pytest.fixture(scope="module")

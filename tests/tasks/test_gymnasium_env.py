@@ -17,7 +17,6 @@ from gymnasium.utils.env_checker import check_env
 from selfmodel import tasks
 from selfmodel.errors import InputError
 from selfmodel.tasks.gymnasium_env import FILE_ID, env_id, register
-from tests.helpers.opengl import WORKS, draws
 
 ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
 ID = "selfmodel/Quadruped-walk-v0"
@@ -164,9 +163,8 @@ os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 
 
 @pytest.mark.opengl
-@draws
-def test_pictures_pass_gymnasiums_checks(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MUJOCO_GL", str(WORKS))
+def test_pictures_pass_gymnasiums_checks(gl: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MUJOCO_GL", gl)
     done = subprocess.run(
         [sys.executable, "-c", DRAWN], capture_output=True, text=True, check=False, timeout=300
     )
