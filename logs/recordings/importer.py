@@ -105,6 +105,9 @@ def import_recording(
     except ValueError as error:
         raise mapping.error(("start",), f"{error}: set another start") from error
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
+    for begin, end in mapping.trial.leave_out:
+        for name in signals.keys() - {"commands"}:
+            signals[name][(time >= begin) & (time <= end)] = np.nan
     trajectory = Trajectory(
         robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
     )

@@ -206,6 +206,8 @@ class Trial(Section, kw_only=True):
         stage: Stage of the trial: ``before`` for a healthy robot.
         start: Start of the trial after the first time at which every role has data, s.
         duration: Duration, s; None for as long as every role has data.
+        leave_out: First and last time of parts that are as if nothing but the commands had been
+            recorded, s since the start of the trial.
         clock: Whether the times of a bag are time stamps or log times.
         time: Time column of a table; None for a bag.
         joints: Joint angles.
@@ -222,6 +224,7 @@ class Trial(Section, kw_only=True):
     stage: Stage = "single"
     start: Annotated[float, Meta(ge=0, lt=1e15)] = 0.0
     duration: Positive | None = None
+    leave_out: tuple[tuple[Number, Number], ...] = ()
     clock: Literal["header", "log"] = "header"
     time: TimeColumn | None = None
     joints: Joints
@@ -230,6 +233,12 @@ class Trial(Section, kw_only=True):
     imu: Imu | None = None
     touch: dict[str, Touch] = {}
     sensors: dict[str, str] = {}
+
+    def __post_init__(self) -> None:
+        """Checks the parts that are left out."""
+        for begin, end in self.leave_out:
+            if not 0 <= begin < end:
+                raise ValueError(f"leave_out must be [[first, last], ...], got [{begin:g}, {end:g}]")
 
     def places(self) -> Places:
         """Yields quantities and parts with their places.

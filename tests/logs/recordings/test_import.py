@@ -77,6 +77,17 @@ def test_start_and_duration_choose_a_part(bag: Path, biped: Robot):
             imported(bag, biped, f"{wrong}\n{MAPPING}")
 
 
+def test_of_parts_that_are_left_out_the_commands_alone_are_known(bag: Path, biped: Robot):
+    whole = imported(bag, biped).trajectory
+    part = imported(bag, biped, "leave_out = [[0.2, 0.3], [0.5, 9]]\n" + MAPPING).trajectory
+    out = (abs(whole.time - 0.25) < 0.051) | (whole.time > 0.499)
+    for signal, values in whole.signals.items():
+        kept = values if signal == "commands" else np.where(out[:, np.newaxis], np.nan, values)
+        np.testing.assert_array_equal(part[signal], kept)
+    with pytest.raises(InputError, match=r"MAP\.toml:1: .*leave_out.*\[2, 1\]"):
+        imported(bag, biped, "leave_out = [[2, 1]]\n" + MAPPING)
+
+
 def test_messages_may_be_partial_and_in_any_order(biped: Robot, tmp_path: Path):
     items = without("/joint_states", recorded())
     for k in range(200):
