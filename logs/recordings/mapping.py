@@ -238,7 +238,9 @@ class Trial(Section, kw_only=True):
         """Checks the parts that are left out."""
         for begin, end in self.leave_out:
             if not 0 <= begin < end:
-                raise ValueError(f"leave_out must be [[first, last], ...], got [{begin:g}, {end:g}]")
+                raise ValueError(
+                    f"leave_out must be [[first, last], ...], got [{begin:g}, {end:g}]"
+                )
 
     def places(self) -> Places:
         """Yields quantities and parts with their places.

@@ -19,7 +19,7 @@ trials, the following is asked before a robot is called damaged:
    free in it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -58,6 +58,13 @@ LONGER = (
     "record this robot again, with the same movements for twice as long, and repeat the diagnosis"
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
+
+LEFT_OUT = ", or leave {} out (leave_out in the mapping of its import) and repeat the diagnosis"
+"""What decides too, if the healthy trials cover all but a part of an imported one."""
+
+MAX_LEFT_OUT, MIN_PAUSE = 0.5, 1.0
+"""Largest share of a trial that it is advised to leave out; and shortest time without fast commands
+between two parts of it, s."""
 
 FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
@@ -110,10 +117,10 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
             )
         else:
             reason = refit_reason(accused, problem)
-    return _doubt(reason, faster) if reason else None
+    return _doubt(reason, faster, problem) if reason else None
 
 
-def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
+def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Problem) -> Doubt:
     if not faster:
         return Doubt(reason, REMEDY.format("with the same commands as in the healthy log"))
     joint, (speed, covered) = next(iter(faster.items()))
@@ -126,7 +133,8 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]]) -> Doubt:
         REMEDY.format(
             f"moving as the healthy robot did ({joint} commanded at {covered:.2g} rad/s at most, "
             f"not at {speed:.2g} rad/s as now)"
-        ),
+        )
+        + (LEFT_OUT.format(" and ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
     )
 
 
@@ -190,10 +198,7 @@ def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tu
     trials and in the healthy trials, rad/s.
     """
     anatomy = problem.space.anatomy
-    speeds, covered = (
-        np.max([_speeds(part.rows.trajectory) for part in each], axis=0)
-        for each in (trials, problem.healthy_motions)
-    )
+    speeds, covered = (_fastest(each) for each in (trials, problem.healthy_motions))
     joints = {}
     for joint in anatomy.joints:
         motors = [anatomy.motors.index(motor) for motor in joint.servos]
@@ -203,9 +208,48 @@ def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tu
     return dict(sorted(joints.items(), key=lambda one: one[1][1] / one[1][0]))
 
 
+def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
+    """Returns the parts of imported trials in which joints move faster than healthy trials cover.
+
+    Each is named with its times. The result is empty if that is most of a trial.
+    """
+    anatomy, names = problem.space.anatomy, []
+    servos = [motor for joint in anatomy.joints if joint.name in joints for motor in joint.servos]
+    motors = [anatomy.motors.index(motor) for motor in servos]
+    covered = _fastest(problem.healthy_motions)[motors]
+    for part in problem.trials:
+        trajectory = part.rows.trajectory
+        times, trial = trajectory.time, part.trial
+        ends = 1 + np.flatnonzero((_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1))
+        groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
+        spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
+        left_out = sum(end - begin for begin, end in spans)
+        if left_out > MAX_LEFT_OUT * (times[-1] - times[0]) or trial.plan.name != "imported":
+            return []
+        names += [
+            f"{np.floor(10 * begin) / 10:.1f} to {np.ceil(10 * end) / 10:.1f} s of "
+            f"{problem.names[trial.path]}"
+            for begin, end in spans
+        ]
+    return names
+
+
+def _fastest(parts: Sequence[TrialPart]) -> FloatArray:
+    """Returns the speed of each motor's commands where any joint was measured, ``(motors,)``."""
+    quantiles = []
+    for speeds in (_speeds(part.rows.trajectory) for part in parts):
+        known = speeds[np.isfinite(speeds).all(axis=1)]
+        nothing = np.zeros(speeds.shape[1])
+        quantiles.append(np.quantile(known, FASTEST, axis=0) if len(known) else nothing)
+    return np.asarray(np.max(quantiles, axis=0))
+
+
 def _speeds(trajectory: Trajectory) -> FloatArray:
-    """Returns the speed of each motor's commands, rad/s, ``(motors,)``; 0 without known ones."""
+    """Returns the speeds of the motors' commands, rad/s, ``(steps - 1, motors)``.
+
+    They are NaN at steps without a measured joint, which say nothing about the robot.
+    """
     changes = np.abs(np.diff(trajectory["commands"], axis=0))
     speeds = changes / np.diff(trajectory.time)[:, np.newaxis]
-    known = speeds[np.isfinite(speeds).all(axis=1)]
-    return np.quantile(known, FASTEST, axis=0) if len(known) else np.zeros(speeds.shape[1])
+    unseen = np.isnan(trajectory["joint_positions"]).all(axis=1)[1:]
+    return np.asarray(np.where(unseen[:, np.newaxis], np.nan, speeds))

@@ -1,6 +1,7 @@
 """A robot is accused only of what its healthy trials, or a refit of the self-model, exclude."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
@@ -206,6 +207,34 @@ def test_a_joint_that_moves_faster_than_in_the_healthy_trials_is_not_accused(
 
     assert doubt is not None
     assert doubt.reason.startswith(f"the healthy trials do not cover {KNEE}")
+
+
+def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
+    table: LossTable, real: Robot, healthy: list[Trial]
+):
+    slow, fast = (
+        np.array(one.trajectory["commands"])
+        for one in (moved(real, "first"), moved(real, "first", pace=3))
+    )
+    slow[250:300] = fast[250:300]
+    plan = TrialPlan("imported", "after", played_back(real.anatomy.motors, slow), STEPS, 0)
+    physical = SimulatedRobot(real, parse(WEAK, real.anatomy))
+    trial = dataclasses.replace(in_memory(real)(physical, plan), path="logs/part.mcap")
+    problem, times = problem_of(table, trial, healthy), trial.trajectory.time
+    doubt = doubted(problem, WEAK)
+
+    assert doubt is not None
+    part = re.search(r"leave (\d\.\d) to (\d\.\d) s of part out", doubt.remedy)
+    assert part is not None
+    begin, end = map(float, part.groups())
+    assert (begin, end) == pytest.approx((times[250], times[300]), abs=0.11)
+
+    signals = {name: np.array(values) for name, values in trial.trajectory.signals.items()}
+    for name in signals.keys() - {"commands"}:
+        signals[name][(times >= begin) & (times <= end)] = np.nan
+    without = dataclasses.replace(trial, trajectory=trial.trajectory.with_signals(signals))
+    rest = problem_of(table, without, healthy)
+    assert not faster_joints(rest.trials, rest)
 
 
 def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(
