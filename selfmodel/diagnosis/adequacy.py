@@ -55,7 +55,7 @@ REMEDY = (
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
 LONGER = (
-    "record this robot again, with the same movements for twice as long, and repeat the diagnosis"
+    "record this robot again, with the movements of now for twice as long, and repeat the diagnosis"
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
@@ -251,5 +251,5 @@ def _speeds(trajectory: Trajectory) -> FloatArray:
     """
     changes = np.abs(np.diff(trajectory["commands"], axis=0))
     speeds = changes / np.diff(trajectory.time)[:, np.newaxis]
-    unseen = np.isnan(trajectory["joint_positions"]).all(axis=1)[1:]
-    return np.asarray(np.where(unseen[:, np.newaxis], np.nan, speeds))
+    unseen = np.isnan(trajectory["joint_positions"][1:]).all(axis=1, keepdims=True)
+    return np.asarray(np.where(unseen, np.nan, speeds))

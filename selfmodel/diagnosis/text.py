@@ -54,8 +54,8 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "explained":
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
-            these = ("this is", "both are", "all are")[min(len(best), 3) - 1]
-            return [robot + in_words(best) + sure], f"check whether {these} so. If not, {again}"
+            checks = "whether this is so. If not" if len(best) == 1 else "each. If one is not so"
+            return [robot + in_words(best) + sure], f"check {checks}, {again}"
         case "ambiguous":
             facts, checks = _alternatives(diagnosis)
             failed = "none of them is" if len(checks) > 1 else "it is not"
@@ -67,7 +67,7 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
             return _unexplained(diagnosis)
         case "not judged":
             what = "it is not known whether the robot has a fault"
-            model = "an error in the simulation model could give the same result"
+            model = "an error in the simulation model could explain these logs too"
             return [what, model], (diagnosis.doubt or NO_DOUBT).remedy
 
 
@@ -130,11 +130,11 @@ def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
     has_guess = bool(best) if probability is None else probability >= MIN_GUESS
     facts += [f"or {in_words(best)}{_likely(probability)}"] if has_guess else []
     kinds = "all kinds of faults (--kinds all), if you have not yet"
-    first = "check the latter. If it is not so, " if best and has_guess else ""
+    first = "check the second statement. If it is not so, " if best and has_guess else ""
     if unsearched is not None:
         kinds = f"one more kind of fault (--kinds default,{unsearched.kind})"
-        better = "fits these logs better than all that was tried"
-        first = f"check this, which {better}: {in_words(unsearched.hypothesis)}. Then "
+        better = "a kind of fault that was not asked for fits these logs best. Check whether"
+        first = f"{better} {in_words(unsearched.hypothesis)}. Then "
     elif fit and fit.joints:
         first = f"check the joint {next(iter(fit.joints))}, where log and model differ most. Then "
     return facts, f"{first}repeat the diagnosis with {kinds}"

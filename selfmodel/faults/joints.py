@@ -270,7 +270,7 @@ class LoadedLink(JointFault):
         variant.load_link(anatomy.joint(fault.part).hinges[0], fault.severity)
 
 
-BROKEN = BrokenJoint(name="break", words="everything that the joint {part} moves is missing")
+BROKEN = BrokenJoint(name="break", words="the limb has come off at the joint {part}")
 JAMMED = Jammed(name="jam", words="the joint {part} is stuck", is_of_joint=True)
 JAMMED_AT_ANGLE = JammedAtAngle(
     name="jam-angle",

@@ -265,7 +265,7 @@ WIND, CROSSWIND = (
         levels=_SPEEDS,
         degenerates_to={0.0: None},
         unit="m/s",
-        words="a wind of {amount:.2g} m/s blows from the robot's initial {side}",
+        words="a wind of {amount:.2g} m/s blows from the {side}, as seen at the start",
         sides=sides,
     )
     for axis, (name, sides) in enumerate(

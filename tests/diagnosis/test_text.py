@@ -227,10 +227,10 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"best": parse("slope=-0.081+wind=-22.27", ANATOMY)},
             (
                 "Nothing is wrong with the robot itself: the robot starts facing downhill, on a "
-                "slope of 4.6 degrees (0.081 rad), and a wind of 22 m/s blows from the robot's "
-                "initial front (it is not known how sure this is)."
+                "slope of 4.6 degrees (0.081 rad), and a wind of 22 m/s blows from the front, as "
+                "seen at the start (it is not known how sure this is)."
             ),
-            f"check whether both are so. If not, {AGAIN}",
+            f"check each. If one is not so, {AGAIN}",
         ),
         (
             {
@@ -276,9 +276,9 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.04}},
             f"{UNEXPLAINED} (96 % sure: about 4 of 100 such answers are wrong).",
             (
-                "check this, which fits these logs better than all that was tried: the foot below "
-                "the joint front_left_knee has only 20 % of its grip left. Then repeat the "
-                "diagnosis with one more kind of fault (--kinds default,grip)."
+                "a kind of fault that was not asked for fits these logs best. Check whether the "
+                "foot below the joint front_left_knee has only 20 % of its grip left. Then repeat "
+                "the diagnosis with one more kind of fault (--kinds default,grip)."
             ),
         ),
         (
@@ -292,7 +292,7 @@ def test_trials_that_are_not_judged_have_a_reason():
                 f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). Or the joint "
                 "front_left_knee is stuck (30 % likely)."
             ),
-            f"check the latter. If it is not so, {ALL_KINDS}",
+            f"check the second statement. If it is not so, {ALL_KINDS}",
         ),
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.04}},
@@ -316,7 +316,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"verdict": "not judged", "doubt": DOUBT},
             (
                 "It is not known whether the robot has a fault. An error in the simulation model "
-                "could give the same result."
+                "could explain these logs too."
             ),
             "DO THIS.",
         ),
@@ -338,9 +338,9 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
         ("payload=0.2", "a load of 20 % of its mass"),
         ("damping:front_left_knee=100.0", "is too high, 100 times that of its model"),
         ("damping:front_left_knee=0.5", "is too low, 0.5 times that of its model"),
-        ("wind=-22.27", "a wind of 22 m/s blows from the robot's initial front"),
-        ("wind=12", "initial rear"),
-        ("crosswind=-8", "initial left"),
+        ("wind=-22.27", "a wind of 22 m/s blows from the front, as seen at the start"),
+        ("wind=12", "from the rear, as seen at the start"),
+        ("crosswind=-8", "from the left, as seen at the start"),
         ("slope=-0.081", "facing downhill, on a slope of 4.6 degrees (0.081 rad)"),
     ],
 )
