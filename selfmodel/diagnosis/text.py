@@ -54,8 +54,8 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "explained":
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
-            checks = "whether this is so. If not" if len(best) == 1 else "each. If one is not so"
-            return [robot + in_words(best) + sure], f"check {checks}, {again}"
+            each = "whether this is so. If not" if len(best) == 1 else "each. If one is not so"
+            return [robot + in_words(best) + sure], f"check {each}, {again}"
         case "ambiguous":
             facts, checks = _alternatives(diagnosis)
             failed = "none of them is" if len(checks) > 1 else "it is not"
