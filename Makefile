@@ -60,9 +60,9 @@ types: $(TOOLS) ## check types, strictly
 	$(BIN)/mypy
 	$(BIN)/mypy benchmarks examples .ci
 
-wheel: $(TOOLS) ## build the wheel and check what it holds
-	rm -rf build dist
-	$(BIN)/python -m build --quiet --wheel
+wheel: $(READY) ## build the wheel and check what it holds
+	rm -rf dist
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
 versions: wheel ## use the wheel with the lowest and the highest versions of what it needs
