@@ -381,7 +381,7 @@ def recover(
         on_event=on_event,
         design=drawn,
         kinds=searched,
-        calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event)
+        calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
         if calibrate
         else None,
         next_trial=next_trial,
@@ -464,7 +464,7 @@ def set_up_diagnosis(
     """
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
     on_event(chosen)
-    fitted = partial(arguments.fitted, robot, threads=count, observer=on_event)
+    fitted = partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
     fit = fitted(healthy) if calibrate and healthy else None
     if fit is not None:
         on_event(fit)

@@ -28,7 +28,7 @@ from selfmodel.robot.mjcf.load import check_compiles, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.calibration import Calibration, calibrate
+from selfmodel.simulation.calibration import Calibration, Known, calibrate
 from selfmodel.tasks import Entry, entry
 from selfmodel.trials.signals import Names
 from selfmodel.trials.trial import Trial
@@ -212,7 +212,11 @@ def repertoire_of(
 
 
 def fitted(
-    robot: Robot, trials: Sequence[Trial], threads: int, observer: Observer = ignore
+    robot: Robot,
+    trials: Sequence[Trial],
+    threads: int,
+    observer: Observer = ignore,
+    known: Known | None = None,
 ) -> Calibration:
     """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
@@ -220,7 +224,7 @@ def fitted(
         InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
-        return calibrate(robot, trials, threads, observer)
+        return calibrate(robot, trials, threads, observer, known)
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

@@ -3,7 +3,7 @@
 See ``fit`` for the sets of parameters, their fit and its test.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -18,12 +18,22 @@ from selfmodel.simulation import model_factors
 from selfmodel.simulation.fit import NOMINAL, Fit, expected_models, is_determined, nested_fits
 from selfmodel.simulation.log_check import Suspicion, suspicion
 from selfmodel.simulation.model_factors import Parameters, nominal
-from selfmodel.simulation.segments import SegmentErrors, observed_segments, root_mean_square
+from selfmodel.simulation.requests import MAX_CHAIN
+from selfmodel.simulation.segments import (
+    MAX_FOLLOWING,
+    ObservedSegments,
+    SegmentErrors,
+    observed_segments,
+    root_mean_square,
+)
 from selfmodel.trials.trial import Trial
 
 EXACT_ERROR = 0.01
 """Root mean square error, in ``CALIBRATION_ERROR_SCALES``, below which the model counts as
 exact."""
+
+Known = dict[Hashable, ObservedSegments]
+"""Segments of trials with the errors of their predictions, by the trial and their time."""
 
 STAGE = "calibration"
 """Name of the calibration in its progress."""
@@ -133,7 +143,11 @@ class Calibration:
 
 
 def calibrate(
-    robot: Robot, trials: Sequence[Trial], threads: int, observer: Observer = ignore
+    robot: Robot,
+    trials: Sequence[Trial],
+    threads: int,
+    observer: Observer = ignore,
+    known: Known | None = None,
 ) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
@@ -149,7 +163,8 @@ def calibrate(
     With a fixed base, gain, damping, dry friction and armature are fitted to joint positions, and
     force limits that the trials reach.
 
-    The ``observer`` is called with the progress of the fit.
+    The ``observer`` is called with the progress of the fit. ``known`` are predictions of trials in
+    earlier calibrations of the same robot, to which those of this one are added.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -160,7 +175,8 @@ def calibrate(
     with threadpool_limits(1, "blas"):  # several round sums differently
         most = expected_models(robot)
         segments = _segment_errors(
-            *(robot, trials, threads), lambda done: observer(Progress(STAGE, min(done, most), most))
+            *(robot, trials, threads, {} if known is None else known),
+            lambda done: observer(Progress(STAGE, min(done, most), most)),
         )
         before = segments.of([nominal(robot)])[:, 0]
         prior = model_factors.prior_deviations(robot)
@@ -203,7 +219,7 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: Too little of a trial was observed.
     """
-    errors = _segment_errors(robot, trials, threads).of([nominal(robot)])[:, 0]
+    errors = _segment_errors(robot, trials, threads, {}).of([nominal(robot)])[:, 0]
     return float(root_mean_square(errors))
 
 
@@ -211,9 +227,19 @@ def _segment_errors(
     robot: Robot,
     trials: Sequence[Trial],
     threads: int,
+    known: Known,
     on_models: Callable[[int], None] = lambda _: None,
 ) -> SegmentErrors:
-    data = [observed_segments(robot, trial) for trial in trials]
+    # Long trials share the time that is simulated of one.
+    lengths = [float(np.ptp(trial.trajectory.time)) for trial in trials]
+    share = MAX_FOLLOWING / max(sum(length > MAX_CHAIN for length in lengths), 1)
+    data = []
+    for trial, length in zip(trials, lengths, strict=True):
+        following = share if length > MAX_CHAIN else MAX_FOLLOWING
+        key = (trial.content, following)
+        if key not in known:
+            known[key] = observed_segments(robot, trial, following)
+        data.append(known[key])
     return SegmentErrors(robot, data, threads, on_models)
 
 

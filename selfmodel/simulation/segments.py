@@ -64,11 +64,13 @@ class ObservedSegments:
             that is compared.
         valid: Mask of the steps after which the state is known, but for single hinges, and so are
             the commands that led there, ``(segments, horizon)``.
+        known: Errors of predictions so far, by the parameters of the model, ``(errors,)`` each.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     valid: BoolArray
+    known: dict[Parameters, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def compared(self) -> dict[Signal, BoolArray]:
@@ -84,7 +86,9 @@ class ObservedSegments:
         return masks
 
 
-def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
+def observed_segments(
+    robot: Robot, trial: Trial, following: float = MAX_FOLLOWING
+) -> ObservedSegments:
     """Returns segments of a trial in which the state and the commands are known.
 
     The segments are spread over the trial and known completely. If the base's position and linear
@@ -92,6 +96,7 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     are left out, and segments follow each other from the start of the trial, in the model's initial
     pose: each begins with the base in the predicted state at the end of the segment before. Of a
     trial in which a hinge is unknown most of the time, the other hinges are used in the same way.
+    Segments that follow each other are ``following`` s long together, at most.
 
     With a fixed base, segments of up to a second follow each other, and joint positions are
     compared, and joint velocities if they were measured.
@@ -108,7 +113,11 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
             f"{MIN_HORIZON} steps or more with joint positions and commands"
         )
     else:
-        cut = _spread(trajectory) or _sequential(trajectory) or _lack(trajectory)
+        cut = (
+            _spread(trajectory, following)
+            or _sequential(trajectory, following)
+            or _lack(trajectory)
+        )
         needs = (
             f"calibration needs segments of {LEAD + HORIZON + 1} steps or more, without late "
             f"steps, with {', '.join(estimation.ONBOARD)} and the commands"
@@ -119,7 +128,7 @@ def observed_segments(robot: Robot, trial: Trial) -> ObservedSegments:
     return cut
 
 
-def _spread(trajectory: Trajectory) -> ObservedSegments | None:
+def _spread(trajectory: Trajectory, following: float) -> ObservedSegments | None:
     """Returns segments of the whole state, spread over the trial; None if there are too few.
 
     With unknown hinges, which continue from the segment before, they follow each other; of a long
@@ -139,11 +148,11 @@ def _spread(trajectory: Trajectory) -> ObservedSegments | None:
     if any(np.isnan(states[signal][known]).any() for signal in estimation.JOINTS):
         begins = np.arange(LEAD, last + 1, HORIZON)
         whole = _all_known(known, begins)
-        return _chained(trajectory, states, begins[whole], estimation.STATE)
+        return _chained(trajectory, states, begins[whole], estimation.STATE, following)
     return _cut(trajectory, states, begins[whole], HORIZON, estimation.STATE)
 
 
-def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
+def _sequential(trajectory: Trajectory, following: float) -> ObservedSegments | None:
     """Returns consecutive segments of the onboard state; None if too few steps are valid.
 
     Every segment with a known initial state and known commands is simulated, because later segments
@@ -155,7 +164,7 @@ def _sequential(trajectory: Trajectory) -> ObservedSegments | None:
     states = estimation.estimated_states(trajectory, estimation.ONBOARD)
     commanded = _all_known(_complete(trajectory["commands"]), begins)
     starts = begins[_known(states)[begins] & commanded]
-    cut = _chained(trajectory, states, starts, estimation.ONBOARD)
+    cut = _chained(trajectory, states, starts, estimation.ONBOARD, following)
     return cut if cut is not None and cut.valid.sum() >= HORIZON else None
 
 
@@ -164,12 +173,13 @@ def _chained(
     states: Mapping[Signal, FloatArray],
     starts: IndexArray,
     compared: tuple[Signal, ...],
+    following: float,
 ) -> ObservedSegments | None:
-    """Returns segments that follow each other, at most for ``MAX_FOLLOWING``; None without any."""
+    """Returns segments that follow each other, at most for some s; None without any."""
     if not len(starts):
         return None
     length = HORIZON * trajectory.timestep
-    rows, counted, chains = chained(len(starts), round(MAX_FOLLOWING / length), length)
+    rows, counted, chains = chained(len(starts), round(following / length), length)
     cut = _cut(trajectory, states, starts[rows], HORIZON, compared)
     segments = replace(cut.segments, chains=chains)
     return replace(cut, segments=segments, valid=cut.valid & counted[:, np.newaxis])
@@ -351,20 +361,26 @@ class SegmentErrors:
                     begin = predicted[signal][0, :, 0]
                     known = states.get(signal, np.full_like(begin, np.nan))
                     states[signal] = np.where(np.isnan(known), begin, known)
-            data.append(replace(own, segments=replace(segments, states=states)))
+            data.append(replace(own, segments=replace(segments, states=states), known={}))
         return replace(self, data=data)
 
     def _of_batch(self, models: Sequence[Parameters]) -> FloatArray:
-        variants, rows = self._variants(models), []
+        new = [one for one in models if any(one not in own.known for own in self.data)]
+        variants = dict(zip(new, self._variants(new), strict=True))
         for own in self.data:
-            predicted = self._predicted(variants, own.segments, models[0].delay)
-            for signal, mask in own.compared.items():
-                with np.errstate(over="ignore", invalid="ignore"):  # bounded below
-                    error = difference(signal, predicted[signal][:, :, 1:], own.observed[signal])
-                    rows.append((error / CALIBRATION_ERROR_SCALES[signal])[:, mask])
+            if missing := [one for one in variants if one not in own.known]:
+                given = [variants[one] for one in missing]
+                predicted, rows = self._predicted(given, own.segments, models[0].delay), []
+                for signal, mask in own.compared.items():
+                    with np.errstate(over="ignore", invalid="ignore"):  # bounded below
+                        error = difference(
+                            signal, predicted[signal][:, :, 1:], own.observed[signal]
+                        )
+                        rows.append((error / CALIBRATION_ERROR_SCALES[signal])[:, mask])
+                errors = np.nan_to_num(np.concatenate(rows, axis=1), nan=MAX_ERROR)
+                own.known.update(zip(missing, np.clip(errors, -MAX_ERROR, MAX_ERROR), strict=True))
         self.on_models(self.stats.runs // len(self.data))
-        errors = np.nan_to_num(np.concatenate(rows, axis=1).T, nan=MAX_ERROR)
-        return np.clip(errors, -MAX_ERROR, MAX_ERROR)
+        return np.array([np.concatenate([own.known[one] for own in self.data]) for one in models]).T
 
     def _variants(self, models: Sequence[Parameters]) -> list[ModelVariant]:
         scaled = [model_with_parameters(self.robot, parameters) for parameters in models]

@@ -135,7 +135,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         gait=experiment.gait,
         design=experiment.design,
         kinds=experiment.kinds,
-        calibrate=partial(fitted, robot, threads=threads, observer=on_event)
+        calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
         if experiment.calibrated
         else None,
         next_trial=plugins.NEXT_TRIAL[experiment.next_trial],

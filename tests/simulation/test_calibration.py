@@ -1,8 +1,10 @@
 """Promises of calibration: it finds what a robot has, and leaves alone what is right."""
 
 import dataclasses
+from collections.abc import Hashable
 from functools import cache
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation import fit
+from selfmodel.simulation import calibration, fit, segments
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration, calibrate, prediction_error
 from selfmodel.simulation.fit import UNDETERMINED_SHARE, consistent_information, is_determined
 from selfmodel.simulation.model_factors import (
@@ -27,6 +29,7 @@ from selfmodel.simulation.model_factors import (
     prior_deviations,
     with_parameters,
 )
+from selfmodel.simulation.segments import ObservedSegments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import Signal
@@ -129,6 +132,35 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(name: str, lost: tupl
     assert found.robot is robot
     assert found.parameters == nominal(robot)
     assert found.deviations.tolist() == prior_of(robot).tolist()
+
+
+def test_long_trials_without_the_base_share_the_time_that_is_simulated_of_one(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(calibration, "MAX_CHAIN", 1.0)
+    monkeypatch.setattr(calibration, "MAX_FOLLOWING", 2.0)
+    known, long = (
+        dict[Hashable, ObservedSegments](),
+        [lacking(one, BASE) for one in trials(real(), 2)],
+    )
+    calibrate(QUADRUPED, long, 1, known=known)
+    steps = [one.segments.horizon * len(one.segments.starts) for one in known.values()]
+
+    assert steps == [STEPS // 2, STEPS // 2]
+
+
+def test_what_an_earlier_calibration_predicted_of_a_trial_is_not_simulated_again(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    known, given = dict[Hashable, ObservedSegments](), trials(real())
+    first = calibrate(QUADRUPED, given, 1, known=known)
+    predicted = Mock(wraps=segments.predict)
+    monkeypatch.setattr(segments, "predict", predicted)
+    again = calibrate(QUADRUPED, given, 1, known=known)
+
+    assert again.parameters == first.parameters
+    (call,) = predicted.call_args_list
+    assert len(call.args[1]) == 2 * len(PRIOR), "the independent segments around the fit"
 
 
 @search

@@ -72,20 +72,21 @@ def test_where_it_was_not_they_follow_each_other_from_the_start_on(lost: tuple[S
 
 
 @pytest.mark.parametrize(
-    ("without", "timestep"), [("base", 0.01), ("base", 0.02), ("encoder", 0.01)]
+    ("without", "timestep", "following"),
+    [("base", 0.01, MAX_FOLLOWING), ("base", 0.02, 4.0), ("encoder", 0.01, 6.0)],
 )
 def test_of_a_long_trial_without_the_base_two_parts_are_used_after_they_have_warmed_up(
-    without: str, timestep: float
+    without: str, timestep: float, following: float
 ):
     run = WHOLE.trajectory
     long = {signal: np.tile(values, (8, 1)) for signal, values in run.signals.items()}
     time = timestep * np.arange(8 * STEPS)
     tried = replace(WHOLE, trajectory=replace(run, time=time, signals=long))
     tried = lacking(tried, BASE) if without == "base" else without_encoders(tried, [3])
-    found = observed_segments(QUADRUPED, tried)
+    found = observed_segments(QUADRUPED, tried, following)
 
     length = timestep * HORIZON
-    count, warm_up = round(MAX_FOLLOWING / length), round(WARM_UP / length)
+    count, warm_up = round(following / length), round(WARM_UP / length)
     assert (found.segments.chains, len(found.segments.starts)) == (2, count)
     assert 8 * STEPS - 2 * HORIZON <= found.segments.starts[-1] < 8 * STEPS - HORIZON
     assert not found.valid[count // 2 : count // 2 + warm_up].any()
