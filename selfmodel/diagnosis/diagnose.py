@@ -22,7 +22,7 @@ from selfmodel.diagnosis.diagnosis import Change, Diagnosis
 from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
-from selfmodel.diagnosis.search import LocalSearch, evolved
+from selfmodel.diagnosis.search import LocalSearch, evolved, with_fitted_severities
 from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -138,6 +138,11 @@ class DiagnosticSearch:
     def _refined_diagnosis(
         self, starts: Sequence[Hypothesis], trials: Sequence[Trial], problem: Problem
     ) -> Diagnosis:
+        # Of a long trial, the time after a clear change costs less than all of it.
+        if self._healthy_trials and self.losses.has_sections(trials):
+            alone = LocalSearch(problem).best_alone
+            if after := self._after_change(alone, starts, trials, problem, is_refined=False):
+                return after
         best, compared = self._refined(starts, problem)
         after = self._after_change(best, starts, trials, problem)
         return after or diagnosis_of(problem, compared, best)
@@ -168,11 +173,15 @@ class DiagnosticSearch:
         starts: Sequence[Hypothesis],
         trials: Sequence[Trial],
         problem: Problem,
+        *,
+        is_refined: bool = True,
     ) -> Diagnosis | None:
         """Returns the diagnosis of the time after a change of the robot.
 
         None if no change predicts the trials significantly better than the best hypothesis, if too
-        little time follows it, or if the losses of the comparator have no times.
+        little time follows it, or if the losses of the comparator have no times. If the best
+        hypothesis is not refined yet, the robot has to be as the healthy one before the change, and
+        the change has to be better than the refined hypothesis after it is for the whole time.
         """
         timeline = self.losses.timeline(trials)
         if timeline is None:
@@ -189,16 +198,15 @@ class DiagnosticSearch:
         if problem.within(change.since) is None:
             return None
         change = self._with_refined_before(change, starts, problem)
-        later = problem.within(
-            change.since, change.until(trials) if change.before == INTACT else ()
-        )
-        if later is None:
+        is_as_healthy = change.before == INTACT
+        later = problem.within(change.since, change.until(trials) if is_as_healthy else ())
+        if later is None or not (is_refined or is_as_healthy):
             return None
         refined, compared = self._refined([change.after, *starts], later)
-        if refined == change.before:
+        split = best_split([change.before], [refined], problem.losses, problem.losses)
+        if refined == change.before or not (is_refined or is_better_than_always(split, problem)):
             return None
         diagnosis = diagnosis_of(later, compared, refined)
-        split = best_split([change.before], [diagnosis.best], problem.losses, problem.losses)
         final = change if split is None else dated(split)
         change = final if final.index == change.index else change
         return replace(diagnosis, change=change, trials=len(trials))
@@ -268,6 +276,14 @@ def is_change(split: Split, single: Hypothesis, losses: LossFunction) -> bool:
         and significance.paired_z(before[k:], after[k:]) >= significance.MIN_Z_OF_CHANGE
         and significance.is_better(changed, alone)
     )
+
+
+def is_better_than_always(split: Split | None, problem: Problem) -> bool:
+    """Returns whether a change predicts the trials better than what follows it for all the time."""
+    if split is None:
+        return False
+    always = with_fitted_severities(split.after, problem.coarse, problem.space, zooms=0)
+    return is_change(split, always, problem.losses)
 
 
 def change_at(

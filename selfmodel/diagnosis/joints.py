@@ -91,7 +91,7 @@ class _JointSearch:
 
     def __init__(self, start: Hypothesis, search: LocalSearch) -> None:
         self._start, self._problem, self._losses = start, search.problem, search.losses
-        self._space = search.problem.space
+        self._space, self._hopeless = search.problem.space, search.hopeless
 
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
@@ -156,14 +156,15 @@ class _JointSearch:
     def _best_levels(self, current: Hypothesis, joint: str) -> list[Hypothesis]:
         """The hypothesis with each kind of fault of a joint at its best level, best first.
 
-        There is none without evidence on the joint.
+        There is none without evidence on the joint, and none of a fault that is ``hopeless``.
         """
         if np.isnan(self._problem.of_joint(joint, [current])).all():
             return []
         others = [fault for fault in current.faults if fault not in _faults_at(joint, current)]
         by_kind: dict[str, list[Hypothesis]] = {}
         for fault in self._space.coarse_candidates:
-            if fault.kind.is_of_joint and fault.part == joint:
+            is_there = fault.kind.is_of_joint and fault.part == joint
+            if is_there and fault not in self._hopeless:
                 hypothesis = self._space.canonical([*others, fault])
                 if len(hypothesis) > len(others):
                     by_kind.setdefault(fault.kind.name, []).append(hypothesis)

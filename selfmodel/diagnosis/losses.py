@@ -79,6 +79,10 @@ class LossTable:
         """Returns whether the comparator compares short predictions on all trials."""
         return all(isinstance(self._of(trial).request, Segments) for trial in trials)
 
+    def has_sections(self, trials: Sequence[Trial]) -> bool:
+        """Returns whether a trial is so long that parts of it are simulated alone."""
+        return any(len(getattr(self._of(trial), "sections", ())) > 0 for trial in trials)
+
     def distances(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
         """Returns the sum over the trials of the mean loss of each hypothesis, ``(n,)``.
 

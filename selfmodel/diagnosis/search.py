@@ -166,6 +166,15 @@ class LocalSearch:
             parts.setdefault(Fault(fault.kind, fault.part), single)
         return list(parts.values())
 
+    @property
+    def best_alone(self) -> Hypothesis:
+        """The best of the empty hypothesis and the first single faults, at their best levels."""
+        singles = [
+            with_fitted_severities(single, self.coarse, self._space, zooms=0)
+            for single in self.best_single_faults[:STARTS]
+        ]
+        return self._shortlist(list(dict.fromkeys([INTACT, *singles])))[0]
+
     def local_optima(self, start: Hypothesis) -> list[Hypothesis]:
         """Pruned ends of successive descents from a start, until a hypothesis repeats.
 
@@ -195,7 +204,7 @@ class LocalSearch:
 
     def _neighbours(self, current: Hypothesis) -> list[Hypothesis]:
         """The hypotheses with one fault more (the best), replaced or less."""
-        more = self._by_surrogate(self._space.with_one_more(current))[:SHORTLIST_SIZE]
+        more = self._with_one_more(current)[:SHORTLIST_SIZE]
         return [*more, *self._replaced(current), *self._space.with_one_less(current)]
 
     def _step(self, current: Hypothesis, neighbours: Sequence[Hypothesis]) -> Hypothesis | None:
@@ -209,7 +218,7 @@ class LocalSearch:
 
     def _replaced(self, current: Hypothesis) -> list[Hypothesis]:
         """The hypotheses with a promising fault in the place of one fault."""
-        faults, more = current.faults, self._by_surrogate(self._space.with_one_more(current))
+        faults, more = current.faults, self._with_one_more(current)
         singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
         added = [fault for one in more for fault in one.faults if fault not in faults]
         promising = dict.fromkeys([*singles, *added[:PROMISING]])
@@ -219,6 +228,24 @@ class LocalSearch:
             for fault in promising
         ]
         return [one for one in dict.fromkeys(changed) if one != current]
+
+    def _with_one_more(self, current: Hypothesis) -> list[Hypothesis]:
+        """The hypotheses with one fault more that is not hopeless, best first by the surrogate."""
+        known = {*current.faults, *self.hopeless}
+        more = self._space.with_one_more(current)
+        return self._by_surrogate([one for one in more if not known.issuperset(one.faults)])
+
+    @cached_property
+    def hopeless(self) -> set[Fault]:
+        """Faults that alone have ``LOSS_RATIO`` times the loss of none, by the surrogate."""
+        intact, *rows = self.coarse([INTACT, *(singles := self._space.with_one_more(INTACT))])
+        limit = significance.LOSS_RATIO * intact.mean() + significance.NEGLIGIBLE_LOSS
+        return {
+            fault
+            for single, row in zip(singles, rows, strict=True)
+            if row.mean() > limit
+            for fault in single.faults
+        }
 
     def _by_surrogate(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         return by_total_loss(self._allowed(hypotheses), self.coarse)

@@ -6,7 +6,7 @@ the ranking are the search's.)
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -324,7 +324,7 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
         return None
     faults = _with_unsearched(best, problem.space)
     better: dict[str, Hypothesis] = {}
-    for candidate in _largest_gains(best, list(faults), problem):
+    for candidate in _largest_gains(best, faults, problem):
         fault, losses = faults[candidate], problem.losses([candidate])[0]
         # Most are no gain: what they do to the healthy trials is not needed.
         if fault.kind.name in better or not significance.is_gain(losses, best_losses):
@@ -361,18 +361,38 @@ def _with_unsearched(best: Hypothesis, space: HypothesisSpace) -> dict[Hypothesi
 
 
 def _largest_gains(
-    best: Hypothesis, candidates: list[Hypothesis], problem: Problem
+    best: Hypothesis, faults: Mapping[Hypothesis, Fault], problem: Problem
 ) -> list[Hypothesis]:
-    """The most significant gains by the surrogate, sorted by total loss of the comparator."""
-    best_losses, *rows = problem.coarse([best, *candidates])
-    z = [
-        significance.paired_z(best_losses, row)
-        if np.isfinite([best_losses, row]).all()
-        else -np.inf
-        for row in rows
-    ]
-    few = [candidates[i] for i in np.argsort(z, kind="stable")[::-1][: search.SHORTLIST_SIZE]]
-    return by_total_loss(few, problem.losses)
+    """The most significant gains by the surrogate, sorted by total loss of the comparator.
+
+    Of each fault on each side of its nominal severity, the mildest is first; a severity beyond one
+    that predicts the trials significantly worse is assumed to be worse.
+    """
+    sides: dict[Hashable, list[Hypothesis]] = {}
+    for own, fault in sorted(faults.items(), key=lambda one: _distance_from_nominal(one[1])):
+        nominal, others = fault.kind.nominal, frozenset(own.faults) - {fault}
+        side = (fault.kind, fault.part, fault.severity > (nominal or 0.0), others)
+        sides.setdefault(own if nominal is None else side, []).append(own)
+    z: dict[Hypothesis, float] = {}
+    left = [*sides.values()]
+    while left:
+        mildest = [own[0] for own in left]
+        best_losses, *rows = problem.coarse([best, *mildest])
+        for own, row in zip(mildest, rows, strict=True):
+            is_finite = np.isfinite([best_losses, row]).all()
+            z[own] = significance.paired_z(best_losses, row) if is_finite else -np.inf
+        left = [
+            own[1:]
+            for own, row in zip(left, rows, strict=True)
+            if own[1:] and not significance.is_better(best_losses, row)
+        ]
+    tried = [own for own in faults if own in z]
+    order = np.argsort([z[own] for own in tried], kind="stable")[::-1]
+    return by_total_loss([tried[i] for i in order[: search.SHORTLIST_SIZE]], problem.losses)
+
+
+def _distance_from_nominal(fault: Fault) -> float:
+    return abs(fault.severity - (fault.kind.nominal or 0.0))
 
 
 def detectable_severities(

@@ -154,6 +154,21 @@ def test_an_unsearched_fault_that_explains_more_is_returned_with_the_other_kinds
     assert found == UnsearchedFault(said("wind=12"), "wind", {"crosswind": said("crosswind=12")})
 
 
+def test_severities_beyond_one_that_is_significantly_worse_are_not_simulated():
+    mild, strong = "damping:front_left_knee=3.0", "damping:front_left_knee=10.0"
+    helpful, asked = "damping:back_left_knee=30.0", set[Hypothesis]()
+    after = of({"intact": 2.0, mild: 2.5, strong: 0.1, helpful: 1.0}, otherwise=2.0)
+
+    def coarse(hypotheses: Sequence[Hypothesis]) -> FloatArray:
+        asked.update(hypotheses)
+        return after(hypotheses)
+
+    problem = Synthetic(PAPER, after, coarse=coarse, before=of({}))
+    assert unsearched_fault(INTACT, problem) == UnsearchedFault(said(helpful), "damping", {})
+    assert said(mild) in asked
+    assert said(strong) not in asked
+
+
 def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
     after, before = of({"wind=12": 0.8}), of({"wind=12": 0.79})
 

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.comparators import SEGMENT_PREDICTION
+from selfmodel.comparators import (
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+    segment_prediction,
+)
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch, Split, best_split, change_at, is_change
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.diagnosis.losses import LossFunction as Losses, Timeline
+from selfmodel.diagnosis.losses import LossFunction as Losses, LossTable, Timeline
 from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z_OF_CHANGE
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -19,6 +23,7 @@ from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation import requests
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory
@@ -274,3 +279,27 @@ def test_a_jam_of_a_robot_that_has_lost_a_limb_before_is_found_with_both_hypothe
     assert found.change is not None
     assert str(found.change.before) == lost
     assert abs(found.change.time - 1.5) <= 0.2
+
+
+@pytest.mark.search
+def test_a_clear_change_of_a_long_trial_is_found_without_a_refinement_of_the_whole(
+    quadruped: Robot, gait: Controller, monkeypatch: pytest.MonkeyPatch
+):
+    for module in (requests, segment_prediction):
+        monkeypatch.setattr(module, "MAX_CHAIN", 1.5)
+    healthy = trial(quadruped, gait, "intact")
+    damaged = glued(healthy, trial(quadruped, gait, STUCK), 200)
+    found, simulators = [], [Simulator(quadruped, 1) for _ in range(2)]
+    for simulator in simulators:
+        search = DiagnosticSearch(
+            *(simulator, SEGMENT_PREDICTION_ONBOARD, SMALL, PAPER_KINDS), healthy_trials=[healthy]
+        )
+        found.append(search([damaged], [], np.random.default_rng(0), lambda _: None))
+        monkeypatch.setattr(LossTable, "has_sections", lambda *_: False)
+    quick, thorough = found
+
+    assert str(quick.best) == STUCK
+    assert (quick.best, quick.verdict, quick.change) == (
+        *(thorough.best, thorough.verdict, thorough.change),
+    )
+    assert simulators[0].stats.steps < simulators[1].stats.steps

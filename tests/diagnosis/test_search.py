@@ -112,6 +112,21 @@ def test_a_needle_is_found_where_only_one_of_its_faults_shows_by_itself():
     assert find(losses) == said(needle)
 
 
+def test_a_fault_that_alone_is_far_worse_than_none_is_not_tried_beside_another():
+    truth, hopeless = said("jam:back_left_knee"), said("break:front_left_knee")
+    asked = set[Hypothesis]()
+    given = counted({"intact": 1.0, str(truth): 0.1, str(hopeless): 3.5}, otherwise=1.5)
+
+    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+        asked.update(hypotheses)
+        return given(hypotheses)
+
+    assert find(losses) == truth
+    beside = {one for one in asked if len(one) > 1}
+    assert beside
+    assert not any(set(hopeless.faults) & set(one.faults) for one in beside)
+
+
 def helped(swing: float) -> Losses:
     """Losses with a broken knee as the truth; a failed sensor lowers them by a noisy gain."""
     knee, helper = said("break:front_left_knee"), said("sensor:front_right_touch").faults[0]
