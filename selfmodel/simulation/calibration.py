@@ -189,7 +189,7 @@ def calibrate(
                 f"remained finite, before and after the fit: check the model and the units of the "
                 f"log"
             )
-        deviations, known = (
+        deviations, prior_of_factors = (
             np.concatenate([own[quantity] for quantity in (*model_factors.SHARED, "motor_gains")])
             for own in (best.deviations, prior)
         )
@@ -204,7 +204,9 @@ def calibrate(
             error=float(root_mean_square(best.errors)),
             joints=_joints(segments, first, best) if is_fixed else None,
             chosen=best.name,
-            determined=tuple(is_determined(deviations, known).tolist()) if best.is_fitted else (),
+            determined=tuple(is_determined(deviations, prior_of_factors).tolist())
+            if best.is_fitted
+            else (),
             held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
             suspicion=None if is_exact or is_fixed else suspicion(segments, best),
         )
