@@ -14,7 +14,7 @@ from selfmodel.comparators.readings import (
     command_spans,
     noise_level_loss,
 )
-from selfmodel.comparators.segment_prediction import MIN_SEGMENTS
+from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPrediction
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import TrialRefusedError
@@ -48,6 +48,26 @@ def predicted(trial: Trajectory) -> np.ndarray:
     """The readings of a perfect prediction, ``(segments, 13, 4)``."""
     one = logged(trial)
     return shown(SEGMENT_PREDICTION.prepare(one).request, one)["sensors"][0].copy()
+
+
+@pytest.mark.parametrize("comparator", [SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD])
+def test_the_encoder_of_a_detached_hinge_follows_its_command_in_each_section(
+    comparator: SegmentPrediction,
+):
+    walking = gait(steps=2400)
+    commands = np.zeros_like(walking["commands"])
+    commands[:-1, 0] = walking["joint_positions"][1:, 0]
+    trial = logged(changed(walking, commands=commands))
+    whole = comparator.prepare(trial)
+    assert bool(whole.sections) == (comparator is SEGMENT_PREDICTION_ONBOARD)
+    for part in whole.sections or [whole]:
+        perfect = shown(part.request, trial)
+        both = {signal: values.repeat(2, axis=0) for signal, values in perfect.signals.items()}
+        both["joint_positions"][..., 0] += 1.0
+        detached = np.array([[True, False, False, False], [False] * 4])
+        simulated = dataclasses.replace(perfect, signals=both, detached=detached)
+        follows, moves = part.losses(simulated).by_signal["joint_positions"]
+        assert follows.max() < 1e-9 < moves.min()
 
 
 def test_a_touch_at_the_beginning_of_a_segment_is_judged_only_where_the_robot_stands():
