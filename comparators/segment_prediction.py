@@ -101,7 +101,7 @@ class SegmentPrediction:
         def losses(simulated: Trajectory, own: slice) -> Losses:
             """Returns the losses of each segment that has any, of some that were simulated."""
             counted, predicted = steady[own], simulated.signals
-            if simulated.hinge_mask("detached").all() and (followed := loose()):
+            if simulated.hinge_mask("detached").any() and (followed := loose()):
                 predicted = encoders.with_loose_encoders(simulated, followed.of(own))
             shape = predicted["sensors"].shape[:2]
             terms = {"commands": np.broadcast_to(arithmetic[own], shape)}
