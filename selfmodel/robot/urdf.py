@@ -41,6 +41,11 @@ UNLIMITED_RANGE = (-math.pi, math.pi)
 PHYSICS_TIMESTEP = 0.002
 """Physics time step of a robot from a URDF, s."""
 
+CONE = "elliptic"
+"""Cone of the friction of contacts: equal in all directions, as Coulomb's. MuJoCo's default, a
+pyramid, holds 0.71 of the force along its diagonals. The quadrupeds of MuJoCo Menagerie that are
+made from URDFs (A1, Go1, Go2) are elliptic, too."""
+
 HINGE_TYPES = ("revolute", "continuous")
 JOINT_TYPES = (*HINGE_TYPES, "fixed")
 _REMEDIES = {
@@ -105,7 +110,8 @@ def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
         )
     # Links without an <inertial> have no mass, as URDF defines.
     work.section("compiler").attrib.update(angle="radian", inertiafromgeom="false")
-    work.section("option").attrib.update(timestep=repr(PHYSICS_TIMESTEP), integrator="implicitfast")
+    option = {"timestep": repr(PHYSICS_TIMESTEP), "integrator": "implicitfast", "cone": CONE}
+    work.section("option").attrib.update(option)
     work.section("asset").extend(mesh_elements(spec))
     work.section("worldbody").extend(world_elements(spec))
     in_world = any(link.get("name") == "world" for link in urdf.findall("link"))

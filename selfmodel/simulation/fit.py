@@ -139,8 +139,10 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
 
     if not robot.has_fixed_base:
         delays = [replace(best, delay=steps) for steps in range(MAX_CONTROL_DELAY + 1)]
-        fit = _best_candidate(DELAY, segments, delays, first)
-        choose(fit, MIN_Z)
+        whole = _best_candidate(DELAY, segments, delays, first)
+        choose(whole, MIN_Z)
+        part = _part_delay(segments, whole)
+        fit = part if choose(part, MIN_Z) else whole
         best = fit.parameters
         contacts = [
             replace(best, contact_stiffness=stiffness, contact_damping=damping)
@@ -156,6 +158,7 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
+        best = _with_near_contacts(segments, best)
         errors = segments.of([best])[:, 0]
         if _cost(errors) < _cost(chosen[-1].errors):
             choose(fitter.tested(name, best, x, errors), MIN_Z)
@@ -170,7 +173,8 @@ def expected_models(robot: Robot) -> int:
         tried = delays + 2 * parts.bit_length()
     else:
         method, tried = FLOATING, 0
-        count += delays + len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS)
+        count += delays + 2 * (delay_parts(robot).bit_length() - 1)
+        count += len(CANDIDATE_STIFFNESSES) * len(CANDIDATE_DAMPINGS) + 9  # and neighbours
     for _, basis in bases(robot):
         width = len(basis.prior)
         slopes = 2 * width if method.is_central else width
@@ -219,6 +223,41 @@ def _best_candidate(
         without = min(losses, key=lambda own: float(losses[own][kept].sum()))
         held_out[parts == part] = errors[without][parts == part]
     return Fit(name, best, known.deviations, errors[best], held_out)
+
+
+def _part_delay(segments: SegmentErrors, whole: Fit) -> Fit:
+    """Returns the best delay of parts of a control step around that of a fit."""
+    fit, parts = whole, delay_parts(segments.robot)
+    delays, step = range(MAX_CONTROL_DELAY * parts + 1), parts // 2
+    while step:
+        middle = round(fit.parameters.delay * parts)
+        near = [delay for delay in (middle - step, middle + step) if delay in delays]
+        moved = [replace(fit.parameters, delay=as_delay(delay, parts)) for delay in near]
+        fit = _best_candidate(DELAY, segments, moved, fit)
+        step //= 2
+    return fit
+
+
+def _with_near_contacts(segments: SegmentErrors, start: Parameters) -> Parameters:
+    """Returns parameters with the best of fitted contacts and their neighbours in the search.
+
+    Contacts were searched with the nominal friction, and it changes which are best.
+    """
+    if not start.has_other_contacts:
+        return start
+    stiffnesses, dampings = (
+        every[max(every.index(own) - 1, 0) : every.index(own) + 2]
+        for every, own in (
+            (CANDIDATE_STIFFNESSES, start.contact_stiffness),
+            (CANDIDATE_DAMPINGS, start.contact_damping),
+        )
+    )
+    near = [
+        replace(start, contact_stiffness=stiffness, contact_damping=damping)
+        for stiffness, damping in product(stiffnesses, dampings)
+    ]
+    costs = [_cost(errors) for errors in segments.of(near).T]
+    return near[int(np.argmin(costs))]
 
 
 @dataclass(frozen=True, eq=False)
