@@ -9,6 +9,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators import encoders, readings
+from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
 from selfmodel.simulation.requests import MAX_CHAIN, chained, command_steps, cut_segments
 from selfmodel.trials.estimation import (
@@ -127,7 +128,10 @@ class SegmentPrediction:
 
         def prepared(own: slice, chains: int) -> Prepared:
             begins = starts[own]
-            request = cut_segments(trajectory, states, begins, horizon, record, chains=chains)
+            request = dataclasses.replace(
+                cut_segments(trajectory, states, begins, horizon, record, chains=chains),
+                reads_encoders=isinstance(trial.plan.controller, Playback),
+            )
             piece_steps = (begins[:, np.newaxis] + np.array([0, horizon]))[steady[own]]
             return Prepared(request, partial(losses, own=own), piece_steps)
 

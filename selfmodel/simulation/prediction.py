@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache, partial
 
 import mujoco
@@ -66,8 +67,9 @@ def predict(
     loop = _OpenLoop(robot, moving, segments, lag, threads, stats)
     together = loop.together
     qpos, sensordata = loop.bind("qpos"), loop.bind("sensordata")
+    read = [_with_encoders(own, robot) for own in variants] if segments.reads_encoders else variants
     # Independent noise per segment: a segment alone is too short to estimate a noise level.
-    reader = SensorReader(robot.model, robot.anatomy, variants, together)
+    reader = SensorReader(robot.model, robot.anatomy, read, together)
     # Row of the batch for each row of the result.
     batch_rows = (source_of[:, np.newaxis] * together + np.arange(together)).ravel()
     live = live_signals(robot, loop.bind, loop.models, segments.record)
@@ -215,6 +217,13 @@ def _resting_hinges(robot: Robot, segments: Segments) -> dict[str, tuple[int, in
         hinge.name: (int(hinge.qposadr[0]), int(hinge.dofadr[0]), float(angle))
         for hinge, angle in zip(hinges, np.where(np.isnan(medians), initial, medians), strict=True)
     }
+
+
+def _with_encoders(variant: ModelVariant, robot: Robot) -> ModelVariant:
+    """Returns a variant in which the angles of detached hinges are read, too."""
+    lost = np.array([sensor.hinge in variant.detached for sensor in robot.anatomy.sensors])
+    gain, offset = np.where(lost, 1.0, variant.gain), np.where(lost, 0.0, variant.offset)
+    return replace(variant, gain=gain, offset=offset)
 
 
 def activations(robot: Robot, commands: FloatArray, delay: int = 0) -> FloatArray:

@@ -57,6 +57,8 @@ class Segments:
             beginning. Any signal but ``commands``, which are inputs.
         chains: Number of chains of equal length, one after the other in ``starts``: without the
             whole state, a segment continues the one before in its chain.
+        reads_encoders: Whether the logged readings of angles are those of the encoders, also of a
+            detached limb, as in a recording of other software.
     """
 
     states: Mapping[Signal, FloatArray]
@@ -65,6 +67,7 @@ class Segments:
     horizon: int
     record: tuple[Signal, ...]
     chains: int = 1
+    reads_encoders: bool = False
 
     def __post_init__(self) -> None:
         if self.chains < 1 or len(self.starts) % self.chains:
