@@ -40,6 +40,10 @@ CANDIDATE_STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0)
 CANDIDATE_DAMPINGS = (0.125, 0.25, 0.5, 1.0, 2.0)
 """Factors of the stiffness and the damping of contacts in the exhaustive search."""
 
+FRICTION_STEP = 0.9
+"""Factor from one friction to the next once contacts have changed: a step of a third of the prior's
+deviation."""
+
 FOLDS = 4
 """Consecutive parts of each trial that are left out in turn."""
 
@@ -158,7 +162,9 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
-        best = _with_near_contacts(segments, best)
+        if best.has_other_contacts:
+            best = _with_near_contacts(segments, best)
+            x = basis.coordinates(best)
         errors = segments.of([best])[:, 0]
         if _cost(errors) < _cost(chosen[-1].errors):
             choose(fitter.tested(name, best, x, errors), MIN_Z)
@@ -239,12 +245,16 @@ def _part_delay(segments: SegmentErrors, whole: Fit) -> Fit:
 
 
 def _with_near_contacts(segments: SegmentErrors, start: Parameters) -> Parameters:
-    """Returns parameters with the best of fitted contacts and their neighbours in the search.
+    """Returns parameters with the best contacts beside fitted ones, then with the best friction.
 
-    Contacts were searched with the nominal friction, and it changes which are best.
+    Contacts were searched with the nominal friction, and friction was fitted with these contacts;
+    each changes which of the other is best.
     """
-    if not start.has_other_contacts:
-        return start
+
+    def best_of(candidates: list[Parameters]) -> Parameters:
+        costs = [_cost(errors) for errors in segments.of(candidates).T]
+        return candidates[int(np.argmin(costs))]
+
     stiffnesses, dampings = (
         every[max(every.index(own) - 1, 0) : every.index(own) + 2]
         for every, own in (
@@ -252,12 +262,16 @@ def _with_near_contacts(segments: SegmentErrors, start: Parameters) -> Parameter
             (CANDIDATE_DAMPINGS, start.contact_damping),
         )
     )
-    near = [
-        replace(start, contact_stiffness=stiffness, contact_damping=damping)
-        for stiffness, damping in product(stiffnesses, dampings)
-    ]
-    costs = [_cost(errors) for errors in segments.of(near).T]
-    return near[int(np.argmin(costs))]
+    best = best_of(
+        [
+            replace(start, contact_stiffness=stiffness, contact_damping=damping)
+            for stiffness, damping in product(stiffnesses, dampings)
+        ]
+    )
+    for factor in (FRICTION_STEP, 1 / FRICTION_STEP):
+        while (moved := best_of([best, replace(best, friction=best.friction * factor)])) != best:
+            best = moved
+    return best
 
 
 @dataclass(frozen=True, eq=False)
