@@ -376,6 +376,18 @@ def test_a_urdf_gives_a_robot_with_touch_sensors_on_its_feet_that_stands(tmp_pat
     assert np.abs(data.qvel).max() < 5
 
 
+def test_what_friction_holds_slides_in_no_direction(tmp_path: Path):
+    arm = joint("shoulder", "trunk", "arm", xyz="0 0 0.1")
+    model = load_mjcf(written(tmp_path, urdf(link("trunk", 1, BOX), link("arm", 0.1), arm))).model
+    slope = math.atan(0.8)  # of a friction coefficient of 1, along the diagonal of the box
+    down = [math.sin(slope) / math.sqrt(2)] * 2 + [-math.cos(slope)]
+    model.opt.gravity[:] = 9.81 * np.array(down)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 1000)
+
+    assert np.linalg.norm(data.qpos[:2]) < 0.05
+
+
 def test_a_base_on_the_link_world_is_fixed_unless_the_user_frees_it(tmp_path: Path):
     mount = joint("mount", "world", "trunk", kind="fixed", xyz="0 0 1.5")
     text = with_parts(link("world", 0), mount)

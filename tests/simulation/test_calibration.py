@@ -97,6 +97,13 @@ def test_delay_and_factors_go_from_nominal_towards_the_truth():
 
 
 @search
+def test_a_delay_of_a_part_of_a_control_step_is_found():
+    late = with_parameters(QUADRUPED, dataclasses.replace(nominal(QUADRUPED), delay=1.5))
+
+    assert calibrate(QUADRUPED, trials(late), threads=1).parameters.delay == 1.5
+
+
+@search
 def test_the_errors_are_those_of_the_models_and_lower_in_a_trial_that_was_not_seen():
     seen, unseen = trials(real()), [trial(real(), SimulatedRobot(real()), 7)]
 

@@ -122,6 +122,31 @@ def test_the_joints_of_a_lost_limb_rest_where_noise_hides_them(
     assert np.flatnonzero(predicted.hinge_mask("detached")[1]).tolist() == sorted(lost)
 
 
+def test_the_encoder_of_a_lost_limb_reads_its_angle_in_a_recording_and_0_in_our_own_trials(
+    robot: Robot,
+):
+    anatomy = robot.anatomy
+    broken = parse(f"break:{anatomy.joints[0].name}", anatomy)
+    segments = cut(*trials(robot, broken))
+    angles = np.full_like(segments.states["joint_positions"], 0.3)
+    frozen = dataclasses.replace(segments, states={**segments.states, "joint_positions": angles})
+    read, zero = (
+        Simulator(robot, 1).predict([broken], dataclasses.replace(frozen, reads_encoders=reads))
+        for reads in (True, False)
+    )
+    lost = read.trajectory.hinge_mask("detached")[0]
+    sensors = [
+        (column, sensor.reading(0.3))
+        for column, sensor in enumerate(anatomy.sensors)
+        if sensor.hinge and lost[anatomy.hinges.index(sensor.hinge)]
+    ]
+
+    assert sensors
+    for column, reading in sensors:
+        np.testing.assert_allclose(read.trajectory["sensors"][..., column], reading)
+        np.testing.assert_array_equal(zero.trajectory["sensors"][..., column], 0)
+
+
 def test_a_lost_limb_rests_wherever_it_starts():
     # The hopper's knee starts beyond its limit, which would push it all through the trial.
     robot = arguments.robot_entry("suite-hopper-hop").robot()
