@@ -162,10 +162,10 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
-        if best.has_other_contacts:
-            best = _with_near_contacts(segments, best)
-            x = basis.coordinates(best)
         errors = segments.of([best])[:, 0]
+        if best.has_other_contacts:
+            best, errors = _with_near_contacts(segments, best, errors)
+            x = basis.coordinates(best)
         if _cost(errors) < _cost(chosen[-1].errors):
             choose(fitter.tested(name, best, x, errors), MIN_Z)
     return chosen
@@ -244,17 +244,14 @@ def _part_delay(segments: SegmentErrors, whole: Fit) -> Fit:
     return fit
 
 
-def _with_near_contacts(segments: SegmentErrors, start: Parameters) -> Parameters:
-    """Returns parameters with the best contacts beside fitted ones, then with the best friction.
+def _with_near_contacts(
+    segments: SegmentErrors, start: Parameters, errors: FloatArray
+) -> tuple[Parameters, FloatArray]:
+    """Returns a fit with the best contacts beside its own, then the best friction; its errors.
 
     Contacts were searched with the nominal friction, and friction was fitted with these contacts;
     each changes which of the other is best.
     """
-
-    def best_of(candidates: list[Parameters]) -> Parameters:
-        costs = [_cost(errors) for errors in segments.of(candidates).T]
-        return candidates[int(np.argmin(costs))]
-
     stiffnesses, dampings = (
         every[max(every.index(own) - 1, 0) : every.index(own) + 2]
         for every, own in (
@@ -262,16 +259,18 @@ def _with_near_contacts(segments: SegmentErrors, start: Parameters) -> Parameter
             (CANDIDATE_DAMPINGS, start.contact_damping),
         )
     )
-    best = best_of(
-        [
-            replace(start, contact_stiffness=stiffness, contact_damping=damping)
-            for stiffness, damping in product(stiffnesses, dampings)
-        ]
-    )
+    contacts = [
+        replace(start, contact_stiffness=stiffness, contact_damping=damping)
+        for stiffness, damping in product(stiffnesses, dampings)
+    ]
+    near = [own for own in contacts if own != start]
+    found = {start: errors, **dict(zip(near, segments.of(near).T, strict=True))}
+    best = min(found, key=lambda own: _cost(found[own]))
     for factor in (FRICTION_STEP, 1 / FRICTION_STEP):
-        while (moved := best_of([best, replace(best, friction=best.friction * factor)])) != best:
-            best = moved
-    return best
+        moved = replace(best, friction=best.friction * factor)
+        while _cost(found.setdefault(moved, segments.of([moved])[:, 0])) < _cost(found[best]):
+            best, moved = moved, replace(moved, friction=moved.friction * factor)
+    return best, found[best]
 
 
 @dataclass(frozen=True, eq=False)
