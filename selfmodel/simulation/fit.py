@@ -162,12 +162,14 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             best, x = fitter.solved(fitter.with_best_delay(best))
         else:
             best, x = fitter.with_near_delay(*fitter.solved(best))
-        errors = segments.of([best])[:, 0]
+        points = [(best, x, segments.of([best])[:, 0])]
         if best.has_other_contacts:
-            best, errors = _with_near_contacts(segments, best, errors)
-            x = basis.coordinates(best)
-        if _cost(errors) < _cost(chosen[-1].errors):
-            choose(fitter.tested(name, best, x, errors), MIN_Z)
+            near, errors = _with_near_contacts(segments, best, points[0][2])
+            points[:0] = [(near, basis.coordinates(near), errors)] * (near != best)
+        for point, x, errors in points:
+            if _cost(errors) < _cost(chosen[-1].errors):
+                if choose(fitter.tested(name, point, x, errors), MIN_Z):
+                    break
     return chosen
 
 
