@@ -167,9 +167,9 @@ def nested_fits(segments: SegmentErrors, first: Fit) -> list[Fit]:
             near, errors = _with_near_contacts(segments, best, points[0][2])
             points[:0] = [(near, basis.coordinates(near), errors)] * (near != best)
         for point, x, errors in points:
-            if _cost(errors) < _cost(chosen[-1].errors):
-                if choose(fitter.tested(name, point, x, errors), MIN_Z):
-                    break
+            is_lower = _cost(errors) < _cost(chosen[-1].errors)
+            if is_lower and choose(fitter.tested(name, point, x, errors), MIN_Z):
+                break
     return chosen
 
 
