@@ -183,7 +183,7 @@ def calibrate(
         first = Fit(NOMINAL, nominal(robot), prior, before, before)
         is_exact = root_mean_square(before) < EXACT_ERROR
         best = first if is_exact else nested_fits(segments, first)[-1]
-        if segments.stats.diverged == segments.stats.runs:
+        if 0 < segments.stats.runs == segments.stats.diverged:
             raise InputError(
                 f"{', '.join(trial.path for trial in trials)}: no simulation of the healthy robot "
                 f"remained finite, before and after the fit: check the model and the units of the "
