@@ -20,10 +20,13 @@ def diagram(files: Sequence[Path]) -> Figure:
     """
     lines = [line for file in files for line in csv.DictReader(file.read_text().splitlines())]
     stated = [line for line in lines if line["probability"]]
+    if not stated:
+        raise SystemExit(f"no probabilities are stated in {', '.join(map(str, files))}")
     said = np.array([float(line["probability"]) for line in stated])
     # What `unexplained` says is that no named hypothesis is right.
     so = np.array([(one["right"] == "True") != (one["verdict"] == "unexplained") for one in stated])
     place = row_of(said)
+    lowest = min(0.4, said.min() - 0.05)
     figure = Figure(figsize=(4.4, 4.2), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], **REFERENCE)
@@ -44,8 +47,8 @@ def diagram(files: Sequence[Path]) -> Figure:
         title=f"{len(said)} diagnoses, calibration error {100 * error:.1f} %",
         xlabel="stated probability",
         ylabel="share that is so, 95 % interval",
-        xlim=(0.4, 1),
-        ylim=(0.4, 1.03),
+        xlim=(lowest, 1),
+        ylim=(lowest, 1.03),
         aspect="equal",
     )
     return figure

@@ -106,8 +106,12 @@ def import_recording(
         raise mapping.error(("start",), f"{error}: set another start") from error
     time = np.arange(len(steps), dtype=np.float64) * robot.control_timestep
     for begin, end in mapping.trial.leave_out:
+        out = (time >= begin) & (time <= end)
+        if not out.any():
+            span = f"[{begin:g}, {end:g}] is not [first, last], s, of the {time[-1]:g} s"
+            raise mapping.error(("leave_out",), f"no step is left out: {span} of the trial")
         for name in signals.keys() - {"commands"}:
-            signals[name][(time >= begin) & (time <= end)] = np.nan
+            signals[name][out] = np.nan
     trajectory = Trajectory(
         robot.anatomy.names, frozen(time), {signal: frozen(signals[signal]) for signal in SIGNALS}
     )

@@ -234,14 +234,6 @@ class Trial(Section, kw_only=True):
     touch: dict[str, Touch] = {}
     sensors: dict[str, str] = {}
 
-    def __post_init__(self) -> None:
-        """Checks the parts that are left out."""
-        for begin, end in self.leave_out:
-            if not 0 <= begin < end:
-                raise ValueError(
-                    f"leave_out must be [[first, last], ...], got [{begin:g}, {end:g}]"
-                )
-
     def places(self) -> Places:
         """Yields quantities and parts with their places.
 

@@ -59,12 +59,12 @@ LONGER = (
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
-LEFT_OUT = ", or leave {} out (leave_out in the mapping of its import) and repeat the diagnosis"
-"""What decides too, if the healthy trials cover all but a part of an imported one."""
+LEFT_OUT = ". Or cut {} with leave_out in the mapping of the import, and repeat the diagnosis"
+"""What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 
-MAX_LEFT_OUT, MIN_PAUSE = 0.5, 1.0
-"""Largest share of a trial that it is advised to leave out; and shortest time without fast commands
-between two parts of it, s."""
+MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0
+"""Largest share of a trial, and largest number of parts, that it is advised to leave out; and
+shortest time without fast commands between two parts, s."""
 
 FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
@@ -134,7 +134,7 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Prob
             f"moving as the healthy robot did ({joint} commanded at {covered:.2g} rad/s at most, "
             f"not at {speed:.2g} rad/s as now)"
         )
-        + (LEFT_OUT.format(" and ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
+        + (LEFT_OUT.format(", ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
     )
 
 
@@ -211,7 +211,7 @@ def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tu
 def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
     """Returns the parts of imported trials in which joints move faster than healthy trials cover.
 
-    Each is named with its times. The result is empty if that is most of a trial.
+    Each is named with its times. The result is empty if they are many, or most of a trial.
     """
     anatomy, names = problem.space.anatomy, []
     servos = [motor for joint in anatomy.joints if joint.name in joints for motor in joint.servos]
@@ -223,15 +223,15 @@ def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
         ends = 1 + np.flatnonzero((_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1))
         groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
         spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
-        left_out = sum(end - begin for begin, end in spans)
-        if left_out > MAX_LEFT_OUT * (times[-1] - times[0]) or trial.plan.name != "imported":
+        most = MAX_LEFT_OUT * np.ptp(times) if trial.plan.name == "imported" else 0.0
+        if sum(end - begin for begin, end in spans) > most:
             return []
         names += [
             f"{np.floor(10 * begin) / 10:.1f} to {np.ceil(10 * end) / 10:.1f} s of "
             f"{problem.names[trial.path]}"
             for begin, end in spans
         ]
-    return names
+    return names if len(names) <= MAX_PARTS else []
 
 
 def _fastest(parts: Sequence[TrialPart]) -> FloatArray:

@@ -48,9 +48,10 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         again = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)"
     match diagnosis.verdict:
         case "intact":
-            action = f"nothing. To find faults too small to show in these logs, {again}"
+            what = f"no fault was found that is large enough to show in these logs{sure}"
+            was_faulty = diagnosis.change and diagnosis.change.before
             earlier = "check the earlier fault, which may come back"
-            return [f"no fault was found{sure}"], earlier if diagnosis.change else action
+            return [what], earlier if was_faulty else f"nothing. To find smaller faults, {again}"
         case "explained":
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
@@ -85,7 +86,8 @@ def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
     alike = [diagnosis.best, *diagnosis.indistinguishable]
     alike.sort(key=lambda one: -probability.get(str(one), 0.0))
     shared = set.intersection(*(set(one.faults) for one in alike))
-    causes, checks = [], ["the first statement"] if shared else []
+    common = Hypothesis(tuple(sorted(shared)))
+    causes, checks = [], [f"whether {in_words(common)}"] if shared else []
     for number, one in enumerate(alike[:MAX_NAMED], start=1):
         own = Hypothesis(tuple(fault for fault in one.faults if fault not in shared))
         words = in_words(own) if own or not shared else "nothing else is wrong"
@@ -95,11 +97,11 @@ def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
         rest = 1 - sum(probability.get(str(one), 0.0) for one in alike[:MAX_NAMED])
         causes.append(f"something else{_likely(rest)}")
     elif len(alike) > MAX_NAMED:
-        causes.append(f"one of {len(alike) - MAX_NAMED} others")
+        others = len(alike) - MAX_NAMED
+        causes.append(f"one of {others} others" if others > 1 else "another one")
     numbered = "; ".join(f"({number}) {cause}" for number, cause in enumerate(causes, start=1))
     if not shared:
         return [f"one of these is true: {numbered}"], checks
-    common = Hypothesis(tuple(sorted(shared)))
     having = [p for one, p in probability.items() if _faults(str(common)) <= _faults(one)]
     what = in_words(common) + _sure(diagnosis, sum(having) if having else None)
     return [what, f"in addition, one of these is true: {numbered}"], checks
@@ -107,7 +109,7 @@ def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
 
 def _sure(diagnosis: Diagnosis, probability: float | None) -> str:
     if probability is not None:
-        wrong = round(100 * (1 - probability))
+        wrong = max(1, round(100 * (1 - probability)))
         return f" ({100 - wrong} % sure: about {wrong} of 100 such answers are wrong)"
     if diagnosis.fit is None or diagnosis.fit.healthy_loss is None:
         return " (a log of the healthy robot is needed to say how sure this is)"
@@ -128,11 +130,11 @@ def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
     what = "probably something is wrong that is not among the faults that were tried"
     facts = [what + _sure(diagnosis, rest)]
     has_guess = bool(best) if probability is None else probability >= MIN_GUESS
-    facts += [f"or {in_words(best)}{_likely(probability)}"] if has_guess else []
+    facts += [f"it may also be that {in_words(best)}{_likely(probability)}"] if has_guess else []
     kinds = "all kinds of faults (--kinds all), if you have not yet"
-    first = "check the second statement. If it is not so, " if best and has_guess else ""
+    first = f"check whether {in_words(best)}. If not, " if best and has_guess else ""
     if unsearched is not None:
-        kinds = f"one more kind of fault (--kinds default,{unsearched.kind})"
+        kinds = f"this kind of fault too (add {unsearched.kind} to --kinds)"
         better = "a kind of fault that was not asked for fits these logs best. Check whether"
         first = f"{better} {in_words(unsearched.hypothesis)}. Then "
     elif fit and fit.joints:

@@ -204,7 +204,7 @@ class Fault:
         if not self.kind.words:
             return f"there is the fault {self}"
         amount, nominal = abs(self.severity), self.kind.nominal or 0.0
-        side = self.kind.sides[self.severity > nominal]
+        side = self.kind.sides[bool(self.severity > nominal)]
         named = {"part": self.part, "severity": self.severity, "amount": amount, "side": side}
         at, degrees = f" at the {self.part}" if self.part else "", math.degrees(amount)
         return self.kind.words.format(**named, at=at, degrees=degrees).replace("%", " %")

@@ -11,7 +11,13 @@ import pytest
 from selfmodel import load_robot
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.playback import played_back
-from selfmodel.diagnosis.adequacy import COVERAGE, doubt_of, faster_joints, sufficient_trials
+from selfmodel.diagnosis.adequacy import (
+    COVERAGE,
+    doubt_of,
+    fast_parts,
+    faster_joints,
+    sufficient_trials,
+)
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
@@ -224,7 +230,7 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
     doubt = doubted(problem, WEAK)
 
     assert doubt is not None
-    part = re.search(r"leave (\d\.\d) to (\d\.\d) s of part out", doubt.remedy)
+    part = re.search(r"cut (\d\.\d) to (\d\.\d) s of part with leave_out", doubt.remedy)
     assert part is not None
     begin, end = map(float, part.groups())
     assert (begin, end) == pytest.approx((times[250], times[300]), abs=0.11)
@@ -235,6 +241,10 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
     without = dataclasses.replace(trial, trajectory=trial.trajectory.with_signals(signals))
     rest = problem_of(table, without, healthy)
     assert not faster_joints(rest.trials, rest)
+
+    written = dataclasses.replace(trial, plan=dataclasses.replace(plan, name="after"))
+    for other in (moved(real, "first", pace=3), written):  # fast throughout; and not imported
+        assert not fast_parts([KNEE], problem_of(table, other, healthy))
 
 
 def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(

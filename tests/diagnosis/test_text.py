@@ -177,6 +177,7 @@ MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
 UNEXPLAINED = "Probably something is wrong that is not among the faults that were tried"
+NOTHING = "No fault was found that is large enough to show in these logs"
 AGAIN = "record this robot again for twice as long, and repeat the diagnosis."
 ALL_KINDS = "repeat the diagnosis with all kinds of faults (--kinds all), if you have not yet."
 HEALTHY_LOG = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)."
@@ -187,8 +188,10 @@ def test_a_fault_before_a_change_is_not_forgotten():
     ended, action = summary(diagnosis(best=INTACT, verdict="intact", change=earlier))
 
     assert ended.startswith("Until about 4.9 s into the log '02-recovery': the joint back_left_kn")
-    assert "After that: no fault was found (" in ended
+    assert f"After that: n{NOTHING[1:]} (" in ended
     assert "check the earlier fault" in action
+    _, action = summary(diagnosis(verdict="ambiguous", indistinguishable=(BOTH,), change=earlier))
+    assert "check whether the joint front_left_knee is stuck, then (2)" in action
     unknown, _ = summary(diagnosis(verdict="not judged", change=CHANGE))
     assert "'02-recovery': nothing is wrong. After that: it is not known" in unknown
 
@@ -204,8 +207,8 @@ def test_trials_that_are_not_judged_have_a_reason():
     [
         (
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
-            "No fault was found (95 % sure: about 5 of 100 such answers are wrong).",
-            f"nothing. To find faults too small to show in these logs, {AGAIN}",
+            f"{NOTHING} (95 % sure: about 5 of 100 such answers are wrong).",
+            f"nothing. To find smaller faults, {AGAIN}",
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
@@ -229,6 +232,14 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "Nothing is wrong with the robot itself: the robot starts facing downhill, on a "
                 "slope of 4.6 degrees (0.081 rad), and a wind of 22 m/s blows from the front, as "
                 "seen at the start (it is not known how sure this is)."
+            ),
+            f"check each. If one is not so, {AGAIN}",
+        ),
+        (
+            {"best": parse("slope=-0.1+jam:front_left_knee", ANATOMY)},
+            (
+                "The joint front_left_knee is stuck, and the robot starts facing downhill, on a "
+                "slope of 5.7 degrees (0.1 rad) (it is not known how sure this is)."
             ),
             f"check each. If one is not so, {AGAIN}",
         ),
@@ -270,7 +281,10 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "wrong). In addition, one of these is true: (1) the joint back_left_knee is stuck; "
                 "(2) nothing else is wrong."
             ),
-            f"check the first statement, then (1). If none of them is so, {AGAIN}",
+            (
+                "check whether the joint front_left_knee is stuck, then (1). If none of them is "
+                f"so, {AGAIN}"
+            ),
         ),
         (
             {"verdict": "unexplained", "unsearched": MISSED, "probability": {str(JAM): 0.04}},
@@ -278,7 +292,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             (
                 "a kind of fault that was not asked for fits these logs best. Check whether the "
                 "foot below the joint front_left_knee has only 20 % of its grip left. Then repeat "
-                "the diagnosis with one more kind of fault (--kinds default,grip)."
+                "the diagnosis with this kind of fault too (add grip to --kinds)."
             ),
         ),
         (
@@ -289,10 +303,10 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
             (
-                f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). Or the joint "
-                "front_left_knee is stuck (30 % likely)."
+                f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). It may also "
+                "be that the joint front_left_knee is stuck (30 % likely)."
             ),
-            f"check the second statement. If it is not so, {ALL_KINDS}",
+            f"check whether the joint front_left_knee is stuck. If not, {ALL_KINDS}",
         ),
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.04}},
@@ -302,8 +316,8 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "best": INTACT, "probability": {"intact": 0.36}},
             (
-                f"{UNEXPLAINED} (64 % sure: about 36 of 100 such answers are wrong). Or nothing is "
-                "wrong (36 % likely)."
+                f"{UNEXPLAINED} (64 % sure: about 36 of 100 such answers are wrong). It may also "
+                "be that nothing is wrong (36 % likely)."
             ),
             ALL_KINDS,
         ),
