@@ -70,7 +70,7 @@ class ObservedSegments:
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     valid: BoolArray
-    known: dict[Parameters, FloatArray] = field(default_factory=dict)
+    known: dict[Parameters, FloatArray] = field(default_factory=dict, init=False)  # not of a copy
 
     @cached_property
     def compared(self) -> dict[Signal, BoolArray]:
@@ -361,7 +361,7 @@ class SegmentErrors:
                     begin = predicted[signal][0, :, 0]
                     known = states.get(signal, np.full_like(begin, np.nan))
                     states[signal] = np.where(np.isnan(known), begin, known)
-            data.append(replace(own, segments=replace(segments, states=states), known={}))
+            data.append(replace(own, segments=replace(segments, states=states)))
         return replace(self, data=data)
 
     def _of_batch(self, models: Sequence[Parameters]) -> FloatArray:
