@@ -45,6 +45,13 @@ def test_a_healthy_trial_is_not_suspicious():
     assert found(HEALTHY) is None
 
 
+def test_a_copy_of_segments_does_not_keep_the_predictions_of_the_original():
+    segments, _ = nominal_fit(HEALTHY)
+    for own in segments.data:
+        assert own.known
+        assert not replace(own, observed={}).known
+
+
 @pytest.mark.search
 def test_a_joint_with_the_other_sign_exchanged_joints_and_an_offset_are_named():
     signs, order = np.ones(len(QUADRUPED.anatomy.hinges)), np.arange(len(QUADRUPED.anatomy.hinges))
