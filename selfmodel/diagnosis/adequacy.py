@@ -59,7 +59,10 @@ LONGER = (
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
-LEFT_OUT = ". Or cut {} with leave_out in the mapping of the import, and repeat the diagnosis"
+LEFT_OUT = (
+    ". Or import this log again without {} (leave_out in the mapping file of the import), and "
+    "repeat the diagnosis"
+)
 """What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 
 MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0

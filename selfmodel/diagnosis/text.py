@@ -17,6 +17,13 @@ MAX_NAMED = 3
 MIN_GUESS = 0.1
 """Probability from which a summary names a cause that is not the most probable: 1 in 10."""
 
+SURE = 0.8
+"""Probability from which a summary advises to do nothing about a robot without a fault: 4 in 5."""
+
+UNKNOWN = "look over the whole robot: no kind of fault that can be simulated explains its logs"
+
+EARLIER = "check the earlier fault, which may come back"
+
 NO_DOUBT = Doubt("the diagnosis does not say why", "record a healthy robot moving like this one")
 
 OUTSIDE = {*KIND_SETS["environment"], KINDS["crosswind"], KINDS["roughness"]}  # not of the robot
@@ -43,15 +50,16 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
     """Returns what is wrong and how sure that is, as clauses, and what to do."""
     best, fit, probability = diagnosis.best, diagnosis.fit, diagnosis.probability
     sure = _sure(diagnosis, probability.get(str(best)))
-    again = "record this robot again for twice as long, and repeat the diagnosis"
+    again = "record this robot again, moving as now for twice as long, and diagnose the new log"
     if fit is None or fit.healthy_loss is None:
         again = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)"
     match diagnosis.verdict:
         case "intact":
-            what = f"no fault was found that is large enough to show in these logs{sure}"
+            what = f"nothing is wrong that is large enough to show in these logs{sure}"
             was_faulty = diagnosis.change and diagnosis.change.before
-            earlier = "check the earlier fault, which may come back"
-            return [what], earlier if was_faulty else f"nothing. To find smaller faults, {again}"
+            is_sure = probability.get(str(best), 1.0) >= SURE
+            action = f"nothing. To find smaller faults, {again}" if is_sure else again
+            return [what], EARLIER if was_faulty else action
         case "explained":
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
@@ -59,7 +67,7 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
             return [robot + in_words(best) + sure], f"check {each}, {again}"
         case "ambiguous":
             facts, checks = _alternatives(diagnosis)
-            failed = "none of them is" if len(checks) > 1 else "it is not"
+            failed = "none of these is" if len(checks) > 1 else "it is not"
             return facts, f"check {', then '.join(checks)}. If {failed} so, {again}"
         case "unexplained" if diagnosis.reason:
             action = "check the robot model (--robot), and the logs' units (rad, m, s) and odometry"
@@ -130,8 +138,8 @@ def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
     what = "probably something is wrong that is not among the faults that were tried"
     facts = [what + _sure(diagnosis, rest)]
     has_guess = bool(best) if probability is None else probability >= MIN_GUESS
-    facts += [f"it may also be that {in_words(best)}{_likely(probability)}"] if has_guess else []
-    kinds = "all kinds of faults (--kinds all), if you have not yet"
+    facts += [f"or {in_words(best)}{_likely(probability)}"] if has_guess else []
+    kinds = f"all kinds of faults (--kinds all). If this was done, {UNKNOWN}"
     first = f"check whether {in_words(best)}. If not, " if best and has_guess else ""
     if unsearched is not None:
         kinds = f"this kind of fault too (add {unsearched.kind} to --kinds)"

@@ -287,7 +287,7 @@ WEAK_MOTOR = WeakMotor(
     levels=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     degenerates_to={1.0: None},
     unit="of its torque",
-    words="the motor of the joint {part} has only {severity:.0%} of its torque left",
+    words="the motor of the joint {part} has {severity:.0%} of its torque left",
     is_of_joint=True,
 )
 MOTOR_OFF = MotorOff(
@@ -309,7 +309,7 @@ SERVO_GAIN = ServoGain(
     levels=(0.2, 0.4, 0.6, 0.8),
     degenerates_to={1.0: None},
     unit="of its gain",
-    words="the servo of the joint {part} has only {severity:.0%} of its gain",
+    words="the servo of the joint {part} has {severity:.0%} of its gain",
     is_of_joint=True,
 )
 DAMPED_JOINT = DampedJoint(
@@ -357,7 +357,7 @@ LOST_GRIP = LostGrip(
     levels=(0.1, 0.2, 0.4),
     degenerates_to={1.0: None},
     unit="of its friction",
-    words="the foot below the joint {part} has only {severity:.0%} of its grip left",
+    words="the foot below the joint {part} has {severity:.0%} of its grip left",
 )
 LOADED_LINK = LoadedLink(
     name="load",

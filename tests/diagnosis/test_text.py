@@ -177,9 +177,12 @@ MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
 UNEXPLAINED = "Probably something is wrong that is not among the faults that were tried"
-NOTHING = "No fault was found that is large enough to show in these logs"
-AGAIN = "record this robot again for twice as long, and repeat the diagnosis."
-ALL_KINDS = "repeat the diagnosis with all kinds of faults (--kinds all), if you have not yet."
+NOTHING = "Nothing is wrong that is large enough to show in these logs"
+AGAIN = "record this robot again, moving as now for twice as long, and diagnose the new log."
+ALL_KINDS = (
+    "repeat the diagnosis with all kinds of faults (--kinds all). If this was done, look over the "
+    "whole robot: no kind of fault that can be simulated explains its logs."
+)
 HEALTHY_LOG = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)."
 
 
@@ -209,6 +212,11 @@ def test_trials_that_are_not_judged_have_a_reason():
             {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.954}},
             f"{NOTHING} (95 % sure: about 5 of 100 such answers are wrong).",
             f"nothing. To find smaller faults, {AGAIN}",
+        ),
+        (
+            {"best": INTACT, "verdict": "intact", "probability": {"intact": 0.534}},
+            f"{NOTHING} (53 % sure: about 47 of 100 such answers are wrong).",
+            AGAIN,
         ),
         (
             {"change": CHANGE, "probability": {str(JAM): 0.93, str(OTHER): 0.001}},
@@ -254,7 +262,7 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "the joint back_left_knee is stuck (35 % likely); (3) nothing is wrong (< 1 % "
                 "likely); (4) something else (5 % likely)."
             ),
-            f"check (1), then (2). If none of them is so, {AGAIN}",
+            f"check (1), then (2). If none of these is so, {AGAIN}",
         ),
         (
             {"verdict": "ambiguous", "indistinguishable": (OTHER,), "fit": None},
@@ -262,7 +270,7 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "One of these is true: (1) the joint front_left_knee is stuck; (2) the joint "
                 "back_left_knee is stuck."
             ),
-            f"check (1), then (2). If none of them is so, {HEALTHY_LOG}",
+            f"check (1), then (2). If none of these is so, {HEALTHY_LOG}",
         ),
         (
             {"verdict": "ambiguous", "indistinguishable": (INTACT,)},
@@ -282,7 +290,7 @@ def test_trials_that_are_not_judged_have_a_reason():
                 "(2) nothing else is wrong."
             ),
             (
-                "check whether the joint front_left_knee is stuck, then (1). If none of them is "
+                "check whether the joint front_left_knee is stuck, then (1). If none of these is "
                 f"so, {AGAIN}"
             ),
         ),
@@ -291,7 +299,7 @@ def test_trials_that_are_not_judged_have_a_reason():
             f"{UNEXPLAINED} (96 % sure: about 4 of 100 such answers are wrong).",
             (
                 "a kind of fault that was not asked for fits these logs best. Check whether the "
-                "foot below the joint front_left_knee has only 20 % of its grip left. Then repeat "
+                "foot below the joint front_left_knee has 20 % of its grip left. Then repeat "
                 "the diagnosis with this kind of fault too (add grip to --kinds)."
             ),
         ),
@@ -303,8 +311,8 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "probability": {str(JAM): 0.3, str(OTHER): 0.1}},
             (
-                f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). It may also "
-                "be that the joint front_left_knee is stuck (30 % likely)."
+                f"{UNEXPLAINED} (60 % sure: about 40 of 100 such answers are wrong). Or the joint "
+                "front_left_knee is stuck (30 % likely)."
             ),
             f"check whether the joint front_left_knee is stuck. If not, {ALL_KINDS}",
         ),
@@ -316,8 +324,8 @@ def test_trials_that_are_not_judged_have_a_reason():
         (
             {"verdict": "unexplained", "best": INTACT, "probability": {"intact": 0.36}},
             (
-                f"{UNEXPLAINED} (64 % sure: about 36 of 100 such answers are wrong). It may also "
-                "be that nothing is wrong (36 % likely)."
+                f"{UNEXPLAINED} (64 % sure: about 36 of 100 such answers are wrong). Or nothing is "
+                "wrong (36 % likely)."
             ),
             ALL_KINDS,
         ),

@@ -42,7 +42,7 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     ("verdict", "said"),
     [
         ("explained", "2 trials of the quadruped. {words}"),
-        ("intact", "No fault was found"),
+        ("intact", "Nothing is wrong"),
         ("unexplained", "not among the faults that were tried"),
     ],
 )
@@ -62,7 +62,7 @@ def test_an_ambiguous_diagnosis_names_three_hypotheses_and_counts_the_rest(subje
 
     found = headline(with_verdict(subject, verdict="ambiguous", indistinguishable=others))
 
-    assert "(3) the motor of the joint back_right_knee has only 90 % of its torque left" in found
+    assert "(3) the motor of the joint back_right_knee has 90 % of its torque left" in found
     assert "(4) something else (" in found
     without = {"indistinguishable": others, "probability": {}}
     found = headline(with_verdict(subject, verdict="ambiguous", **without))
