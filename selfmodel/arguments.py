@@ -217,6 +217,8 @@ def fitted(
     threads: int,
     observer: Observer = ignore,
     known: Known | None = None,
+    *,
+    hypotheses: Sequence[Hypothesis] = (),
 ) -> Calibration:
     """Returns a self-model fitted to healthy trials, for callers that calibrate by default.
 
@@ -224,7 +226,7 @@ def fitted(
         InputError: The fit failed; the message names the option that omits calibration.
     """
     try:
-        return calibrate(robot, trials, threads, observer, known)
+        return calibrate(robot, trials, threads, observer, known, hypotheses=hypotheses)
     except InputError as error:
         raise InputError(
             f"{error}, or leave the calibration out (--no-calibrate, calibrate=False)"

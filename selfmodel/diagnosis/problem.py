@@ -1,6 +1,7 @@
 """The problem of a diagnosis: the trials to explain, healthy ones, and hypotheses about them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 
@@ -20,8 +21,8 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
-Calibrate = Callable[[Sequence[Trial]], Calibration]
-"""Fits the self-model to some trials of the healthy robot."""
+Calibrate = Callable[..., Calibration]
+"""Fits the self-model to trials of the healthy robot, or with the ``hypotheses`` about each."""
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator that a search in a part of the trials needs."""
@@ -76,6 +77,7 @@ class Problem:
         self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
         self.space = self._told_apart(replace(space, observed=jams))
+        self._refits: dict[Hypothesis, LossTable | None] = {}
         self.has_test = table.is_piecewise([part.trial for part in self.trials])
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
@@ -120,17 +122,21 @@ class Problem:
             observer=self.observer,
         )
 
-    @cached_property
-    def recalibrated(self) -> LossTable | None:
-        """Losses with the self-model that is fitted to the healthy trials and these together.
+    def recalibrated(self, hypothesis: Hypothesis) -> LossTable | None:
+        """Returns losses with the self-model that is fitted to the healthy trials and these.
 
-        None for a self-model that is given as it is, and if the trials are too short for a fit.
+        In these, the robot has the faults of the hypothesis. None for a self-model that is given as
+        it is, and if the trials are too short for a fit.
         """
-        every = [part.rows for part in (*self.healthy_trials, *self.trials)]
-        try:
-            return self.calibrate and self.table.of_robot(self.calibrate(every).robot)
-        except InputError:
-            return None
+        if hypothesis not in self._refits:
+            every = [part.rows for part in (*self.healthy_trials, *self.trials)]
+            faults = [INTACT] * len(self.healthy_trials) + [hypothesis] * len(self.trials)
+            refit = None
+            if self.calibrate is not None:
+                with suppress(InputError):
+                    refit = self.table.of_robot(self.calibrate(every, hypotheses=faults).robot)
+            self._refits[hypothesis] = refit
+        return self._refits[hypothesis]
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the trials to explain, ``(n, pieces)``."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmodel.diagnosis import search, significance
-from selfmodel.diagnosis.adequacy import doubt_of
+from selfmodel.diagnosis.adequacy import doubt_of, is_explained_by
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     DetectableSeverity,
@@ -90,6 +90,7 @@ def diagnosis_of(
         best = ranked[0]
     if not math.isfinite(totals[best]):
         return _all_diverged(ranked, problem)
+    best = supported(best, problem)
     order = best_severities([best, *ranked])
     leads = leads_of(best, problem) if problem.has_test else {}
     if problem.has_test:
@@ -147,6 +148,25 @@ def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
             f"odometry of {logs}"
         ),
     )
+
+
+def supported(best: Hypothesis, problem: Problem) -> Hypothesis:
+    """Returns a hypothesis without the faults that an error of the self-model explains as well.
+
+    A fault is doubted if the others predict the trials about as well as the self-model predicts the
+    healthy robot. It is left out if a self-model that is fitted to all trials, with the others in
+    these, predicts them as well without it. No fit explains a sensor that reads something else.
+    """
+    if len(best) < 2 or problem.calibrate is None or problem.healthy([INTACT]) is None:
+        return best
+    fewer = [one for one in problem.space.with_one_less(best) if len(one) < len(best)]
+    for rest in by_total_loss(fewer, problem.losses):
+        moves = all(fault.kind.affects_dynamics for fault in {*best.faults} - {*rest.faults})
+        if moves and not is_too_high(_fit_of(rest, problem)):
+            refit = problem.recalibrated(rest)
+            if refit is not None and is_explained_by(rest, refit, best, problem):
+                return supported(rest, problem)
+    return best
 
 
 def _fit_of(best: Hypothesis, problem: Problem) -> Fit:

@@ -4,7 +4,7 @@ See ``fit`` for the sets of parameters, their fit and its test.
 """
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.progress import Observer, Progress, ignore
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import model_factors
@@ -148,6 +149,8 @@ def calibrate(
     threads: int,
     observer: Observer = ignore,
     known: Known | None = None,
+    *,
+    hypotheses: Sequence[Hypothesis] = (),
 ) -> Calibration:
     """Fits the continuous parameters of a robot to trials of the healthy robot.
 
@@ -164,7 +167,8 @@ def calibrate(
     force limits that the trials reach.
 
     The ``observer`` is called with the progress of the fit. ``known`` are predictions of trials in
-    earlier calibrations of the same robot, to which those of this one are added.
+    earlier calibrations of the same robot, to which those of this one are added. ``hypotheses`` are
+    the faults of the robot in each trial; in all it was healthy by default.
 
     Raises:
         InputError: There are no trials, too little of a trial was observed, or every simulation
@@ -175,7 +179,10 @@ def calibrate(
     with threadpool_limits(1, "blas"):  # several round sums differently
         most = expected_models(robot)
         segments = _segment_errors(
-            *(robot, trials, threads, {} if known is None else known),
+            robot,
+            list(zip(trials, hypotheses or [INTACT] * len(trials), strict=True)),
+            threads,
+            {} if known is None else known,
             lambda done: observer(Progress(STAGE, min(done, most), most)),
         )
         before = segments.of([nominal(robot)])[:, 0]
@@ -221,26 +228,29 @@ def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> flo
     Raises:
         InputError: Too little of a trial was observed.
     """
-    errors = _segment_errors(robot, trials, threads, {}).of([nominal(robot)])[:, 0]
+    errors = _segment_errors(robot, [(one, INTACT) for one in trials], threads, {}).of(
+        [nominal(robot)]
+    )[:, 0]
     return float(root_mean_square(errors))
 
 
 def _segment_errors(
     robot: Robot,
-    trials: Sequence[Trial],
+    trials: Sequence[tuple[Trial, Hypothesis]],
     threads: int,
     known: Known,
     on_models: Callable[[int], None] = lambda _: None,
 ) -> SegmentErrors:
     # Long trials share the time that is simulated of one.
-    lengths = [float(np.ptp(trial.trajectory.time)) for trial in trials]
+    lengths = [float(np.ptp(trial.trajectory.time)) for trial, _ in trials]
     share = MAX_FOLLOWING / max(sum(length > MAX_CHAIN for length in lengths), 1)
     data = []
-    for trial, length in zip(trials, lengths, strict=True):
+    for (trial, hypothesis), length in zip(trials, lengths, strict=True):
         following = share if length > MAX_CHAIN else MAX_FOLLOWING
-        key = (trial.content, following)
+        key = (trial.content, following, hypothesis)
         if key not in known:
-            known[key] = observed_segments(robot, trial, following)
+            segments = observed_segments(robot, trial, following)
+            known[key] = replace(segments, hypothesis=hypothesis)
         data.append(known[key])
     return SegmentErrors(robot, data, threads, on_models)
 

@@ -16,7 +16,7 @@ import numpy as np
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.errors import InputError
 from selfmodel.faults.build import apply_faults
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import with_known_base
@@ -64,12 +64,14 @@ class ObservedSegments:
             that is compared.
         valid: Mask of the steps after which the state is known, but for single hinges, and so are
             the commands that led there, ``(segments, horizon)``.
+        hypothesis: The faults of the robot in the trial.
         known: Errors of predictions so far, by the parameters of the model, ``(errors,)`` each.
     """
 
     segments: Segments
     observed: Mapping[Signal, FloatArray]
     valid: BoolArray
+    hypothesis: Hypothesis = INTACT
     known: dict[Parameters, FloatArray] = field(default_factory=dict, init=False)  # not of a copy
 
     @cached_property
@@ -279,7 +281,7 @@ def pseudo_huber(errors: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SegmentErrors:
-    """Errors of predictions of the segments of healthy trials with models of a robot.
+    """Errors of predictions of the segments of trials with models of a robot.
 
     ``on_models`` is called with the number of models so far, after each batch.
     """
@@ -350,11 +352,11 @@ class SegmentErrors:
 
     def with_estimated_states(self, parameters: Parameters) -> "SegmentErrors":
         """Returns independent segments: an unknown state begins as the parameters predict it."""
-        variants, record = self._variants([parameters]), (*estimation.BASE, *estimation.JOINTS)
-        data = []
+        record, data = (*estimation.BASE, *estimation.JOINTS), []
         for own in self.data:
             segments, states = own.segments, dict(own.segments.states)
             if not segments.independent:
+                variants = self._variants([parameters], own.hypothesis)
                 whole = replace(segments, record=record)
                 predicted = self._predicted(variants, whole, parameters.delay)
                 for signal in record:
@@ -365,11 +367,13 @@ class SegmentErrors:
         return replace(self, data=data)
 
     def _of_batch(self, models: Sequence[Parameters]) -> FloatArray:
-        new = [one for one in models if any(one not in own.known for own in self.data)]
-        variants = dict(zip(new, self._variants(new), strict=True))
+        variants: dict[tuple[Parameters, Hypothesis], ModelVariant] = {}
         for own in self.data:
-            if missing := [one for one in variants if one not in own.known]:
-                given = [variants[one] for one in missing]
+            if missing := [one for one in dict.fromkeys(models) if one not in own.known]:
+                new = [one for one in missing if (one, own.hypothesis) not in variants]
+                for one, variant in zip(new, self._variants(new, own.hypothesis), strict=True):
+                    variants[one, own.hypothesis] = variant
+                given = [variants[one, own.hypothesis] for one in missing]
                 predicted, rows = self._predicted(given, own.segments, models[0].delay), []
                 for signal, mask in own.compared.items():
                     with np.errstate(over="ignore", invalid="ignore"):  # bounded below
@@ -382,9 +386,9 @@ class SegmentErrors:
         self.on_models(self.stats.runs // len(self.data))
         return np.array([np.concatenate([own.known[one] for own in self.data]) for one in models]).T
 
-    def _variants(self, models: Sequence[Parameters]) -> list[ModelVariant]:
+    def _variants(self, models: Sequence[Parameters], hypothesis: Hypothesis) -> list[ModelVariant]:
         scaled = [model_with_parameters(self.robot, parameters) for parameters in models]
-        return [apply_faults(model, self.robot.anatomy, INTACT) for model in scaled]
+        return [apply_faults(model, self.robot.anatomy, hypothesis) for model in scaled]
 
     def _predicted(
         self, variants: list[ModelVariant], segments: Segments, delay: float
