@@ -367,7 +367,8 @@ def reliability(rows: Sequence[Row]) -> str:
     """Returns how often what was said is so, by its probability, as Markdown.
 
     Below the table is the expected calibration error: the mean difference between probability and
-    rate over the rows of the table, weighted by their recordings, with a 95 % interval.
+    rate over the rows of the table, weighted by their recordings, with a 95 % interval; and that of
+    probabilities that are exact, which chance makes.
     """
     found = [one for one in map(judged, rows) if one.probability is not None]
     if not found:
@@ -388,7 +389,15 @@ def reliability(rows: Sequence[Row]) -> str:
     errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
     low, high = np.quantile(errors, (0.025, 0.975))
     error = calibration_error(said, so, place)
-    return "\n".join([*lines, "", f"Calibration error {error:.1%} ({low:.1%} to {high:.1%})"])
+    exact = [calibration_error(said, rng.random(said.shape) < said, place) for _ in errors]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"Calibration error {error:.1%} ({low:.1%} to {high:.1%}); if they were exact, "
+            f"{np.mean(exact):.1%}, and {np.quantile(exact, 0.95):.1%} in one of 20 cases",
+        ]
+    )
 
 
 def row_of(said: FloatArray) -> IndexArray:

@@ -12,6 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.robots import robot_of
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
@@ -94,6 +96,23 @@ def test_delay_and_factors_go_from_nominal_towards_the_truth():
     assert fitted().chosen == FACTORS
     assert 0 < fitted().held_out_gain < 1
     assert fitted().to_dict()["determined"] == [row["determined"] for row in fitted().rows()]
+
+
+@search
+def test_the_faults_of_the_robot_in_a_trial_are_no_parameters_of_its_model():
+    jam = parse("jam:back_left_knee", QUADRUPED.anatomy)
+    damaged = trial(real(), SimulatedRobot(real(), jam), 0)
+    knowing, unknowing = (
+        calibrate(QUADRUPED, [damaged], threads=1, hypotheses=[each]) for each in (jam, INTACT)
+    )
+    off, worse = (
+        np.abs(np.log(one.parameters.factors) - np.log(TRUE.factors)).sum()
+        for one in (knowing, unknowing)
+    )
+
+    assert knowing.error < 0.3 * unknowing.error
+    assert off < worse
+    assert knowing.parameters.delay == TRUE.delay
 
 
 @search
