@@ -389,15 +389,11 @@ def reliability(rows: Sequence[Row]) -> str:
     errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
     low, high = np.quantile(errors, (0.025, 0.975))
     error = calibration_error(said, so, place)
-    exact = [calibration_error(said, rng.random(said.shape) < said, place) for _ in errors]
-    return "\n".join(
-        [
-            *lines,
-            "",
-            f"Calibration error {error:.1%} ({low:.1%} to {high:.1%}); if they were exact, "
-            f"{np.mean(exact):.1%}, and {np.quantile(exact, 0.95):.1%} in one of 20 cases",
-        ]
-    )
+    chosen = (rng.random((RESAMPLES, len(said))) < said).astype(float)
+    exact = [calibration_error(said, one, place) for one in chosen]
+    chance = f"{np.mean(exact):.1%}, and {np.quantile(exact, 0.95):.1%} or more in one of 20 cases"
+    measured = f"{error:.1%} ({low:.1%} to {high:.1%})"
+    return "\n".join([*lines, "", f"Calibration error {measured}; if they were exact, {chance}"])
 
 
 def row_of(said: FloatArray) -> IndexArray:

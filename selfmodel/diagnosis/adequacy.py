@@ -54,14 +54,12 @@ REMEDY = (
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
-LONGER = (
-    "record this robot again, with the movements of now for twice as long, and repeat the diagnosis"
-)
+LONGER = "record this robot again, moving as now for twice as long, and diagnose the new log"
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
 LEFT_OUT = (
-    ". Or import this log again without {} (leave_out in the mapping file of the import), and "
-    "repeat the diagnosis"
+    ". Or import again without {} (leave_out in the mapping file of the import), and repeat the "
+    "diagnosis"
 )
 """What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 

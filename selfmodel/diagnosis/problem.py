@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -21,8 +22,15 @@ from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
-Calibrate = Callable[..., Calibration]
-"""Fits the self-model to trials of the healthy robot, or with the ``hypotheses`` about each."""
+
+class Calibrate(Protocol):
+    """Fits the self-model to trials, given the faults of the robot in each; none by default."""
+
+    def __call__(
+        self, trials: Sequence[Trial], *, hypotheses: Sequence[Hypothesis] = ()
+    ) -> Calibration:
+        """Returns the fit."""
+
 
 MIN_SURROGATE_PIECES = 2
 """Pieces of the surrogate comparator that a search in a part of the trials needs."""

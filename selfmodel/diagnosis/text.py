@@ -57,7 +57,7 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "intact":
             what = f"nothing is wrong that is large enough to show in these logs{sure}"
             was_faulty = diagnosis.change and diagnosis.change.before
-            is_sure = probability.get(str(best), 1.0) >= SURE
+            is_sure = probability.get(str(best), 0.0) >= SURE
             action = f"nothing. To find smaller faults, {again}" if is_sure else again
             return [what], EARLIER if was_faulty else action
         case "explained":

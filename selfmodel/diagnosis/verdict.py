@@ -90,7 +90,6 @@ def diagnosis_of(
         best = ranked[0]
     if not math.isfinite(totals[best]):
         return _all_diverged(ranked, problem)
-    best = supported(best, problem)
     order = best_severities([best, *ranked])
     leads = leads_of(best, problem) if problem.has_test else {}
     if problem.has_test:
@@ -153,20 +152,42 @@ def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
 def supported(best: Hypothesis, problem: Problem) -> Hypothesis:
     """Returns a hypothesis without the faults that an error of the self-model explains as well.
 
-    A fault is doubted if the others predict the trials about as well as the self-model predicts the
-    healthy robot. It is left out if a self-model that is fitted to all trials, with the others in
-    these, predicts them as well without it. No fit explains a sensor that reads something else.
+    A fault beside others is doubted if the others alone do not make the trials unexplained. It is
+    left out if a self-model that is fitted to the healthy trials and to these, with the others in
+    these, predicts both as well without it; and these as well as one that is fitted with all the
+    faults in them. A fault that only readings show, or only the motion of its joint, is not
+    doubted: the fit is to all motions. Nor is one beside a fault of the specification, as a fit has
+    the compiled model.
     """
-    if len(best) < 2 or problem.calibrate is None or problem.healthy([INTACT]) is None:
+    rest = best
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or best.spec_part:
         return best
-    fewer = [one for one in problem.space.with_one_less(best) if len(one) < len(best)]
-    for rest in by_total_loss(fewer, problem.losses):
-        moves = all(fault.kind.affects_dynamics for fault in {*best.faults} - {*rest.faults})
-        if moves and not is_too_high(_fit_of(rest, problem)):
-            refit = problem.recalibrated(rest)
-            if refit is not None and is_explained_by(rest, refit, best, problem):
-                return supported(rest, problem)
-    return best
+    while fewer := [one for one in problem.space.with_one_less(rest) if 0 < len(one) < len(rest)]:
+        ranked = by_total_loss(fewer, problem.losses)
+        found = next((one for one in ranked if _suffices(one, best, problem)), None)
+        if found is None:
+            break
+        rest = found
+    return rest
+
+
+def _suffices(rest: Hypothesis, best: Hypothesis, problem: Problem) -> bool:
+    """Returns whether fewer faults and an error of the self-model explain the trials as well."""
+    if not all(fault.kind.affects_dynamics for fault in {*best.faults} - {*rest.faults}):
+        return False
+    is_needed = significance.is_better(*problem.losses([best, rest]))
+    if not is_needed or is_too_high(_fit_of(rest, problem)):
+        return False
+    refit = problem.recalibrated(rest)
+    if refit is None or not is_explained_by(rest, refit, best, problem):
+        return False
+    # A fit to these trials predicts them better with any faults.
+    if (other := problem.recalibrated(best)) is None:
+        return False
+    ((with_all,), (without,)) = (
+        table.losses([one], problem.trials) for table, one in ((other, best), (refit, rest))
+    )
+    return not significance.is_better(with_all, without)
 
 
 def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
@@ -360,6 +381,8 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
     if not better:
         return None
     (first, hypothesis), *others = better.items()
+    if supported(hypothesis, problem) == best:
+        return None
     return UnsearchedFault(hypothesis, first, dict(others))
 
 

@@ -15,6 +15,7 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.problem import Calibrate
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -82,7 +83,7 @@ class RecoveryLoop:
     gait: Controller | None = None
     design: Design | None = None
     kinds: Sequence[FaultKind] = DEFAULT_KINDS
-    calibrate: Callable[[Sequence[Trial]], Calibration] | None = None
+    calibrate: Calibrate | None = None
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair

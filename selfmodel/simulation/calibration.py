@@ -1,4 +1,4 @@
-"""Calibration of the self-model: fits its continuous parameters to trials of the healthy robot.
+"""Calibration of the self-model: fits its continuous parameters to trials of known faults.
 
 See ``fit`` for the sets of parameters, their fit and its test.
 """
@@ -34,7 +34,7 @@ EXACT_ERROR = 0.01
 exact."""
 
 Known = dict[Hashable, ObservedSegments]
-"""Segments of trials with the errors of their predictions, by the trial and their time."""
+"""Segments of trials with the errors of their predictions, by the trial, time and faults."""
 
 STAGE = "calibration"
 """Name of the calibration in its progress."""

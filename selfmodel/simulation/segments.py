@@ -1,4 +1,4 @@
-"""Segments of healthy trials, and the errors of predicting them with models of the robot.
+"""Segments of trials, and the errors of predicting them with models of the robot.
 
 A robot that walks is predicted over a tenth of a second: contacts make longer simulations chaotic.
 The joints of a fixed base are simulated for about a second without losing the trial: position

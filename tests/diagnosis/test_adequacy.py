@@ -44,7 +44,8 @@ GAITS = {"first": (1.0, 0.3), "second": (0.3, 1.0), "third": (0.8, 0.8)}
 
 KNEE = "front_left_knee"
 WEAK = f"motor:{KNEE}=0.5"
-JAM, DEAD = "jam:back_right_knee", "sensor:front_right_touch"
+JAM, TOO = "jam:back_right_knee", "motor:back_left_shoulder=0.6"
+DEAD = "sensor:front_right_touch"
 BROKEN = f"break:{KNEE}"
 
 
@@ -154,10 +155,11 @@ def test_what_a_refit_explains_without_a_fault_is_no_fault(
         ("quadruped", "weaker", JAM, f"{JAM}+{WEAK}", "weaker", JAM),
         ("quadruped", "weaker", JAM, f"{JAM}+{WEAK}", "quadruped", f"{JAM}+{WEAK}"),
         ("real", "real", f"{JAM}+{WEAK}", f"{JAM}+{WEAK}", "weaker", f"{JAM}+{WEAK}"),
+        ("quadruped", "weaker", f"{JAM}+{TOO}", f"{JAM}+{TOO}", "weaker", f"{JAM}+{TOO}"),
         ("quadruped", "weaker", JAM, f"{JAM}+{DEAD}", "weaker", f"{JAM}+{DEAD}"),
         ("quadruped", "weaker", "intact", WEAK, "weaker", WEAK),
     ],
-    ids=["model error", "not in the fit", "fault", "sensor", "alone"],
+    ids=["model error", "not in the fit", "fault", "and error", "sensor", "alone"],
 )
 def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0917  # of a case
     request: pytest.FixtureRequest,
