@@ -41,7 +41,7 @@ class Synthetic(Problem):
     ) -> None:
         self.space, self.settings, self.has_test = space, Settings(genes=most), True
         self.trials, self.healthy_trials, self._observed = ["damaged"], [], ["healthy"]
-        self.losses, self.observer = losses, ignore
+        self.losses, self.observer, self.calibrate = losses, ignore, None
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
         self.table = SimpleNamespace(by_hinge=self._by_hinge)

@@ -2,12 +2,14 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import verdict
 from selfmodel.diagnosis.diagnosis import DetectableSeverity, UnsearchedFault
 from selfmodel.diagnosis.losses import LossFunction
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
@@ -173,6 +175,18 @@ def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
     after, before = of({"wind=12": 0.8}), of({"wind=12": 0.79})
 
     assert unsearched_fault(INTACT, Synthetic(PAPER, after, before=before)) is None
+
+
+@pytest.mark.parametrize("is_error", [False, True])
+def test_an_unsearched_fault_that_a_refit_explains_is_model_error(
+    monkeypatch: pytest.MonkeyPatch, *, is_error: bool
+):
+    monkeypatch.setattr(verdict, "_suffices", lambda *_: is_error)
+    after = of({JAM: 0.9, f"{JAM}+wind=12": 0.8})
+    problem = Synthetic(PAPER, after, before=of({}))
+    problem.calibrate = Mock()
+
+    assert (unsearched_fault(said(JAM), problem) is None) == is_error
 
 
 def never(_: Sequence[Hypothesis]) -> FloatArray:

@@ -7,6 +7,7 @@ import pytest
 
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis import diagnose as diagnosing
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import diagnosis_from_dict
@@ -116,6 +117,25 @@ def test_an_absurd_number_is_refused_without_a_warning_of_numpy(quadruped: Robot
 
     with pytest.raises(InputError, match=r"is 1e\+300 at step 7, expected at"):
         evidence.is_piecewise([trial])
+
+
+def test_what_a_refit_explains_is_left_out_before_the_verdict(monkeypatch: pytest.MonkeyPatch):
+    robot = Robot("biped", MJCF, 0.01)
+    (controller,) = random_cpgs(robot, 1, 6)
+    trials = [logged(robot, one, controller) for one in ("intact", "jam:left_hip+jam:right_hip")]
+    one = parse("jam:left_hip", robot.anatomy)
+    monkeypatch.setattr(diagnosing, "supported", lambda best, _: one if len(best) > 1 else best)
+    search = DiagnosticSearch(
+        Simulator(robot, 1),
+        SEGMENT_PREDICTION,
+        dataclasses.replace(Settings().scaled(4), generations=1),
+        healthy_trials=trials[:1],
+    )
+
+    found = search(trials[1:], [], np.random.default_rng(0), lambda _: None)
+
+    assert found.best == one
+    assert one in [candidate.hypothesis for candidate in found.ranked]
 
 
 @pytest.mark.parametrize(
