@@ -54,7 +54,9 @@ REMEDY = (
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
-LONGER = "record this robot again, moving as now for twice as long, and diagnose the new log"
+LONGER = (
+    "record this robot again, with the same movements for twice as long, and diagnose the new log"
+)
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
 LEFT_OUT = (
@@ -234,7 +236,7 @@ def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
             return []
         names += [
             f"{np.floor(10 * begin) / 10:.1f} to {np.ceil(10 * end) / 10:.1f} s of "
-            f"{problem.names[trial.path]}"
+            f"'{problem.names[trial.path]}'"
             for begin, end in spans
         ]
     return names if len(names) <= MAX_PARTS else []

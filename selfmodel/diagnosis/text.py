@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 
+from selfmodel.diagnosis.adequacy import LONGER
 from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, Fit
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
@@ -50,7 +51,7 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
     """Returns what is wrong and how sure that is, as clauses, and what to do."""
     best, fit, probability = diagnosis.best, diagnosis.fit, diagnosis.probability
     sure = _sure(diagnosis, probability.get(str(best)))
-    again = "record this robot again, moving as now for twice as long, and diagnose the new log"
+    again = LONGER
     if fit is None or fit.healthy_loss is None:
         again = "repeat the diagnosis with a log of the healthy robot (--healthy FILE)"
     match diagnosis.verdict:

@@ -178,7 +178,9 @@ JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
 UNEXPLAINED = "Probably something is wrong that is not among the faults that were tried"
 NOTHING = "Nothing is wrong that is large enough to show in these logs"
-AGAIN = "record this robot again, moving as now for twice as long, and diagnose the new log."
+AGAIN = (
+    "record this robot again, with the same movements for twice as long, and diagnose the new log."
+)
 ALL_KINDS = (
     "repeat the diagnosis with all kinds of faults (--kinds all). If this was done, look over the "
     "whole robot: no kind of fault that can be simulated explains its logs."
