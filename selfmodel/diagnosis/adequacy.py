@@ -59,14 +59,11 @@ LONGER = (
 )
 """What decides on a doubt about a gait that the healthy trials have: more of it."""
 
-LEFT_OUT = (
-    ". Or import again without {} (leave_out in the mapping file of the import), and repeat the "
-    "diagnosis"
-)
+LEFT_OUT = ". Or import again without the fast part (with {}), and repeat the diagnosis"
 """What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 
 MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0
-"""Largest share of a trial, and largest number of parts, that it is advised to leave out; and
+"""Largest share of a trial, and largest number of its parts, that it is advised to leave out; and
 shortest time without fast commands between two parts, s."""
 
 FASTEST = 0.95
@@ -137,7 +134,7 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Prob
             f"moving as the healthy robot did ({joint} commanded at {covered:.2g} rad/s at most, "
             f"not at {speed:.2g} rad/s as now)"
         )
-        + (LEFT_OUT.format(", ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
+        + (LEFT_OUT.format(" and ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
     )
 
 
@@ -217,11 +214,12 @@ def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tu
 
 
 def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
-    """Returns the parts of imported trials in which joints move faster than healthy trials cover.
+    """Returns what leaves out the parts of imported trials that healthy trials do not cover.
 
-    Each is named with its times. The result is empty if they are many, or most of a trial.
+    In these, joints are faster. The result has an entry of the mapping for each trial with such
+    parts, and is empty if they are many, or most of a trial.
     """
-    anatomy, names = problem.space.anatomy, []
+    anatomy, entries = problem.space.anatomy, []
     servos = [motor for joint in anatomy.joints if joint.name in joints for motor in joint.servos]
     motors = [anatomy.motors.index(motor) for motor in servos]
     covered = _fastest(problem.healthy_motions)[motors]
@@ -232,14 +230,15 @@ def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
         groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
         spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
         most = MAX_LEFT_OUT * np.ptp(times) if trial.plan.name == "imported" else 0.0
-        if sum(end - begin for begin, end in spans) > most:
+        if len(spans) > MAX_PARTS or sum(end - begin for begin, end in spans) > most:
             return []
-        names += [
-            f"{np.floor(10 * begin) / 10:.1f} to {np.ceil(10 * end) / 10:.1f} s of "
-            f"'{problem.names[trial.path]}'"
+        listed = ", ".join(
+            f"[{np.floor(10 * begin) / 10:.1f}, {np.ceil(10 * end) / 10:.1f}]"
             for begin, end in spans
-        ]
-    return names if len(names) <= MAX_PARTS else []
+        )
+        log = problem.names[trial.path]
+        entries += [f"leave_out = [{listed}] in the mapping file of '{log}'"] if spans else []
+    return entries
 
 
 def _fastest(parts: Sequence[TrialPart]) -> FloatArray:

@@ -272,7 +272,7 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
     doubt = doubted(problem, WEAK)
 
     assert doubt is not None
-    part = re.search(r"without (\d\.\d) to (\d\.\d) s of 'part' \(leave_out", doubt.remedy)
+    part = re.search(r"leave_out = \[\[(.*), (.*)\]\] in the mapping file of 'part'", doubt.remedy)
     assert part is not None
     begin, end = map(float, part.groups())
     assert (begin, end) == pytest.approx((times[250], times[300]), abs=0.11)
