@@ -23,7 +23,7 @@ from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.diagnosis.search import LocalSearch, evolved, with_fitted_severities
-from selfmodel.diagnosis.verdict import diagnosis_of, supported
+from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -163,7 +163,6 @@ class DiagnosticSearch:
         best = search.refined(known)
         if problem.has_joints:
             best = with_joint_faults(best, search)
-        best = supported(best, problem)
         compared = search.compared | {best, INTACT}
         self._proposed |= compared | search.proposed
         return best, compared
@@ -210,7 +209,8 @@ class DiagnosticSearch:
         diagnosis = diagnosis_of(later, compared, refined)
         final = change if split is None else dated(split)
         change = final if final.index == change.index else change
-        return replace(diagnosis, change=change, trials=len(trials))
+        is_same = diagnosis.best == change.before  # what came with the change is model error
+        return None if is_same else replace(diagnosis, change=change, trials=len(trials))
 
     def _with_refined_before(
         self, change: Change, starts: Sequence[Hypothesis], problem: Problem

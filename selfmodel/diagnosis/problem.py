@@ -130,6 +130,21 @@ class Problem:
             observer=self.observer,
         )
 
+    def by(self, table: LossTable) -> "Problem":
+        """Returns the same problem with the losses of another self-model."""
+        return Problem(
+            table,
+            self.space,
+            self.trials,
+            surrogate=self.surrogate,
+            healthy_trials=self.healthy_trials,
+            names=self.names,
+            settings=self.settings,
+            calibrate=self.calibrate,
+            healthy_parts=self.healthy_motions[len(self.healthy_trials) :],
+            observer=self.observer,
+        )
+
     def recalibrated(self, hypothesis: Hypothesis) -> LossTable | None:
         """Returns losses with the self-model that is fitted to the healthy trials and these.
 

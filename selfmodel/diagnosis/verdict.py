@@ -1,8 +1,8 @@
 """The verdict on the best hypothesis of a search: a function of the trials and the hypotheses.
 
 It does not depend on the random numbers of the search: alternatives to the best hypothesis come
-from its neighbourhood, whatever the search compared. (The best hypothesis itself and the rest of
-the ranking are the search's.)
+from its neighbourhood, whatever the search compared. (The best hypothesis, of which a refit may
+leave faults out, and the rest of the ranking are the search's.)
 """
 
 import math
@@ -41,6 +41,9 @@ NO_TEST = "none: every simulation diverged"
 
 WINDOW = 8
 """Neighbouring pieces among which the worst time of a residual is found."""
+
+MAX_SHARE = 0.1
+"""Share of the loss that a fault explains beside others, up to which it has to beat a refit."""
 
 MAX_SIGNALS = 3
 """Signals of a residual that are named."""
@@ -90,6 +93,8 @@ def diagnosis_of(
         best = ranked[0]
     if not math.isfinite(totals[best]):
         return _all_diverged(ranked, problem)
+    best, by_refit = supported(best, problem)
+    totals.setdefault(best, float(problem.table.distances([best], problem.trials)[0]))
     order = best_severities([best, *ranked])
     leads = leads_of(best, problem) if problem.has_test else {}
     if problem.has_test:
@@ -97,11 +102,11 @@ def diagnosis_of(
     else:
         equal = [one for one in order if totals[one] == totals[best]]
         alike, unsearched = [one for one in equal if not _has_more(one, best)], None
-    fit = _fit_of(best, problem)
+    fit = _fit_of(best, by_refit)
     verdict = verdict_of(best, fit, alike, unsearched)
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
-    doubt = None if verdict == "intact" else doubt_of(accused, fit, problem)
+    doubt = None if verdict == "intact" else doubt_of(accused, fit, by_refit)
     probability: dict[str, float] = {}
     if problem.has_test and doubt is None and fit.healthy_loss is not None:
         nearest = best_severities([*alike, *sorted(leads, key=lambda one: leads[one])])
@@ -125,7 +130,7 @@ def diagnosis_of(
         undetectable=tuple(undetectable(best, problem)[:kept]) if problem.has_test else (),
         detectable=tuple(severities),
         fit=fit,
-        residual=_residual_of(best, problem) if verdict == "unexplained" else None,
+        residual=_residual_of(best, by_refit) if verdict == "unexplained" else None,
         doubt=doubt,
         probability=probability,
     )
@@ -149,45 +154,55 @@ def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
     )
 
 
-def supported(best: Hypothesis, problem: Problem) -> Hypothesis:
+def supported(best: Hypothesis, problem: Problem) -> tuple[Hypothesis, Problem]:
     """Returns a hypothesis without the faults that an error of the self-model explains as well.
 
-    A fault beside others is doubted if the others alone do not make the trials unexplained. It is
-    left out if a self-model that is fitted to the healthy trials and to these, with the others in
-    these, predicts both as well without it; and these as well as one that is fitted with all the
-    faults in them. A fault that only readings show, or only the motion of its joint, is not
-    doubted: the fit is to all motions. Nor is one beside a fault of the specification, as a fit has
-    the compiled model.
+    A fault beside others is doubted if it explains little of the loss, or if the others alone do
+    not make the trials unexplained. It is left out if a self-model that is fitted to the healthy
+    trials and to these, with the others in these, predicts both as well without it; and these as
+    well as one that is fitted with all the faults in them. The losses of the problem that is
+    returned are then by that self-model: what is left out is in it.
+
+    A fault that only readings show, or only the motion of its joint, is not doubted: the fit is to
+    all motions. Nor is one beside a fault of the specification, as a fit has the compiled model.
     """
-    rest = best
+    rest, by_refit = best, problem
     if problem.calibrate is None or problem.healthy([INTACT]) is None or best.spec_part:
-        return best
+        return best, problem
     while fewer := [one for one in problem.space.with_one_less(rest) if 0 < len(one) < len(rest)]:
-        ranked = by_total_loss(fewer, problem.losses)
-        found = next((one for one in ranked if _suffices(one, best, problem)), None)
-        if found is None:
+        for fewest in by_total_loss(fewer, problem.losses):
+            one = search.with_fitted_severities(fewest, problem.coarse, problem.space)
+            if len(one) == len(fewest) and (found := _refitted(one, best, problem)):
+                rest, by_refit = one, found
+                break
+        else:
             break
-        rest = found
-    return rest
+    return rest, by_refit
 
 
-def _suffices(rest: Hypothesis, best: Hypothesis, problem: Problem) -> bool:
-    """Returns whether fewer faults and an error of the self-model explain the trials as well."""
-    if not all(fault.kind.affects_dynamics for fault in {*best.faults} - {*rest.faults}):
-        return False
-    is_needed = significance.is_better(*problem.losses([best, rest]))
-    if not is_needed or is_too_high(_fit_of(rest, problem)):
-        return False
+def _refitted(rest: Hypothesis, best: Hypothesis, problem: Problem) -> Problem | None:
+    """Returns the problem of a refit that explains the trials as well with fewer faults, if any."""
+    parts = {(fault.kind, fault.part) for fault in rest.faults}
+    others = [fault for fault in best.faults if (fault.kind, fault.part) not in parts]
+    if not all(fault.kind.affects_dynamics for fault in others):
+        return None
+    losses = problem.losses([best, rest, INTACT])
+    if not significance.is_better(losses[0], losses[1]):
+        return None
+    loss, without, intact = losses.mean(axis=1)
+    is_small = without - loss <= MAX_SHARE * (intact - loss)
+    if not is_small and is_too_high(_fit_of(rest, problem)):
+        return None
     refit = problem.recalibrated(rest)
     if refit is None or not is_explained_by(rest, refit, best, problem):
-        return False
+        return None
     # A fit to these trials predicts them better with any faults.
     if (other := problem.recalibrated(best)) is None:
-        return False
-    ((with_all,), (without,)) = (
+        return None
+    ((with_all,), (with_rest,)) = (
         table.losses([one], problem.trials) for table, one in ((other, best), (refit, rest))
     )
-    return not significance.is_better(with_all, without)
+    return None if significance.is_better(with_all, with_rest) else problem.by(refit)
 
 
 def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
@@ -381,7 +396,7 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
     if not better:
         return None
     (first, hypothesis), *others = better.items()
-    if supported(hypothesis, problem) == best:
+    if without_severities(supported(hypothesis, problem)[0]) == without_severities(best):
         return None
     return UnsearchedFault(hypothesis, first, dict(others))
 

@@ -177,7 +177,12 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
 
     hypothesis = parse(best, known.anatomy)
 
-    assert str(supported(hypothesis, problem_of(table, trials, before, fitted))) == left
+    found, by_refit = supported(hypothesis, problem_of(table, trials, before, fitted))
+
+    assert str(found) == left
+    (losses,) = by_refit.losses([found])
+    refitted = LossTable(Simulator(fitted, 1), SEGMENT_PREDICTION).losses([found], trials)
+    assert (losses == (refitted if left != best else table.losses([found], trials))).all()
 
 
 def test_one_healthy_gait_does_not_tell_how_well_another_is_predicted(

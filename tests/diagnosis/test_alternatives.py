@@ -181,7 +181,7 @@ def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
 def test_an_unsearched_fault_that_a_refit_explains_is_model_error(
     monkeypatch: pytest.MonkeyPatch, *, is_error: bool
 ):
-    monkeypatch.setattr(verdict, "_suffices", lambda *_: is_error)
+    monkeypatch.setattr(verdict, "_refitted", lambda *_: Mock() if is_error else None)
     after = of({JAM: 0.9, f"{JAM}+wind=12": 0.8})
     problem = Synthetic(PAPER, after, before=of({}))
     problem.calibrate = Mock()

@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis import diagnose as diagnosing
+from selfmodel.diagnosis import verdict
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import diagnosis_from_dict
@@ -124,7 +124,9 @@ def test_what_a_refit_explains_is_left_out_before_the_verdict(monkeypatch: pytes
     (controller,) = random_cpgs(robot, 1, 6)
     trials = [logged(robot, one, controller) for one in ("intact", "jam:left_hip+jam:right_hip")]
     one = parse("jam:left_hip", robot.anatomy)
-    monkeypatch.setattr(diagnosing, "supported", lambda best, _: one if len(best) > 1 else best)
+    monkeypatch.setattr(
+        *(verdict, "supported"), lambda best, problem: (one if len(best) > 1 else best, problem)
+    )
     search = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,
