@@ -171,28 +171,23 @@ def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
 
 def refit_reason(accused: Hypothesis, problem: Problem) -> str:
     """Returns why a self-model that is fitted to all trials leaves a doubt; empty without."""
-    if (refit := problem.recalibrated(INTACT)) is None:
+    if (refit := problem.refitted(INTACT)) is None:
         return f"the trials are too short for a fit that could explain them without {accused}"
-    if is_explained_by(INTACT, refit, accused, problem):
+    if is_explained_without(accused, refit.table, problem):
         return f"a self-model that is fitted to all trials predicts them as well without {accused}"
     return ""
 
 
-def is_explained_by(
-    rest: Hypothesis, refit: LossTable, accused: Hypothesis, problem: Problem
-) -> bool:
-    """Returns whether a self-model fitted to all trials predicts them as well with fewer faults.
+def is_explained_without(accused: Hypothesis, refit: LossTable, problem: Problem) -> bool:
+    """Returns whether a self-model fitted to all trials predicts them as well without a fault.
 
-    With ``rest`` it predicts the trials not significantly worse than the self-model does with all
-    accused faults, and the healthy trials not significantly worse than the self-model does.
+    It predicts neither the trials significantly worse than the fault does, nor the healthy trials
+    significantly worse than the self-model that is fitted to them alone.
     """
     known = problem.table
     return not any(
-        significance.is_better(known.losses([one], trials)[0], refit.losses([other], trials)[0])
-        for one, other, trials in (
-            (accused, rest, problem.trials),
-            (INTACT, INTACT, problem.healthy_trials),
-        )
+        significance.is_better(known.losses([fault], trials)[0], refit.losses([INTACT], trials)[0])
+        for fault, trials in ((accused, problem.trials), (INTACT, problem.healthy_trials))
     )
 
 

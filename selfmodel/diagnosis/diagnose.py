@@ -23,7 +23,7 @@ from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.diagnosis.search import LocalSearch, evolved, with_fitted_severities
-from selfmodel.diagnosis.verdict import diagnosis_of
+from selfmodel.diagnosis.verdict import diagnosis_of, without_severities
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -209,8 +209,13 @@ class DiagnosticSearch:
         diagnosis = diagnosis_of(later, compared, refined)
         final = change if split is None else dated(split)
         change = final if final.index == change.index else change
-        is_same = diagnosis.best == change.before  # what came with the change is model error
-        return None if is_same else replace(diagnosis, change=change, trials=len(trials))
+        # What came with the change may be what a refit has left out.
+        parts = {without_severities(one) for one in (diagnosis.best, change.before)}
+        return (
+            None
+            if diagnosis.left_out and len(parts) == 1
+            else replace(diagnosis, change=change, trials=len(trials))
+        )
 
     def _with_refined_before(
         self, change: Change, starts: Sequence[Hypothesis], problem: Problem

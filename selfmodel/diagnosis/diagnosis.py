@@ -203,6 +203,8 @@ class Diagnosis:
         probability: Probabilities of the best hypothesis and its neighbours, by their notation; see
             ``diagnosis.probability``. None of a comparator without a test, without healthy trials,
             and of trials that are not judged.
+        left_out: Faults of the best hypothesis of the search that an error of the self-model
+            explains as well; see ``verdict.supported``. ``fit`` is then by the refitted model.
     """
 
     ranked: tuple[Candidate, ...]
@@ -221,6 +223,7 @@ class Diagnosis:
     residual: Residual | None = None
     doubt: Doubt | None = None
     probability: Mapping[str, float] = field(default_factory=dict)
+    left_out: tuple[Hypothesis, ...] = ()
 
     @property
     def best(self) -> Hypothesis:

@@ -44,7 +44,7 @@ def with_joint_faults(best: Hypothesis, search: LocalSearch) -> Hypothesis:
     """
     joints = _JointSearch(best, search)
     current = best
-    faulty = _joints_of(best.faults, search.problem)
+    faulty = joints_of(best.faults, search.problem)
     for joint in followed(faulty, STAGE, search.problem.observer):
         current = joints.replaced(current, joint)
     while len(current) < search.problem.settings.genes:
@@ -75,12 +75,12 @@ def lead_at_joints(best: Hypothesis, other: Hypothesis, problem: Problem) -> flo
 
     The joints at which exactly one of the two has a fault are compared.
     """
-    joints = _joints_of(set(best.faults) ^ set(other.faults), problem)
+    joints = joints_of(set(best.faults) ^ set(other.faults), problem)
     leads = (significance.joint_lead(*problem.of_joint(joint, [best, other])) for joint in joints)
     return max(leads, default=0.0)
 
 
-def _joints_of(faults: Sequence[Fault] | set[Fault], problem: Problem) -> list[str]:
+def joints_of(faults: Sequence[Fault] | set[Fault], problem: Problem) -> list[str]:
     """Returns the joints with a fault of their motion, in the order of the anatomy."""
     parts = {fault.part for fault in faults if fault.kind.is_of_joint}
     return [joint.name for joint in problem.space.anatomy.joints if joint.name in parts]
@@ -112,7 +112,7 @@ class _JointSearch:
 
     def with_one_more(self, current: Hypothesis) -> Hypothesis:
         """The hypothesis with a fault of a further joint; the same if none explains its joint."""
-        faulty = _joints_of(current.faults, self._problem)
+        faulty = joints_of(current.faults, self._problem)
         excess = excesses(current, self._problem)
         suspects = [
             name
@@ -135,7 +135,7 @@ class _JointSearch:
             removed = set(hypothesis.faults) - set(fewer.faults)
             if not significance.is_better(*self._losses([hypothesis, fewer])) and not any(
                 significance.joint_is_better(*self._problem.of_joint(joint, [hypothesis, fewer]))
-                for joint in _joints_of(removed, self._problem)
+                for joint in joints_of(removed, self._problem)
             ):
                 return self.pruned(fewer)
         return hypothesis

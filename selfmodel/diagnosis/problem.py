@@ -85,7 +85,7 @@ class Problem:
         self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
         jams = observed_jams([part.rows for part in self.trials], space.anatomy)
         self.space = self._told_apart(replace(space, observed=jams))
-        self._refits: dict[Hypothesis, LossTable | None] = {}
+        self._refits: dict[Hypothesis, Problem | None] = {}
         self.has_test = table.is_piecewise([part.trial for part in self.trials])
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
@@ -130,26 +130,11 @@ class Problem:
             observer=self.observer,
         )
 
-    def by(self, table: LossTable) -> "Problem":
-        """Returns the same problem with the losses of another self-model."""
-        return Problem(
-            table,
-            self.space,
-            self.trials,
-            surrogate=self.surrogate,
-            healthy_trials=self.healthy_trials,
-            names=self.names,
-            settings=self.settings,
-            calibrate=self.calibrate,
-            healthy_parts=self.healthy_motions[len(self.healthy_trials) :],
-            observer=self.observer,
-        )
+    def refitted(self, hypothesis: Hypothesis) -> "Problem | None":
+        """Returns this problem by the self-model that is fitted to the healthy trials and these.
 
-    def recalibrated(self, hypothesis: Hypothesis) -> LossTable | None:
-        """Returns losses with the self-model that is fitted to the healthy trials and these.
-
-        In these, the robot has the faults of the hypothesis. None for a self-model that is given as
-        it is, and if the trials are too short for a fit.
+        In these, the robot has the faults of the hypothesis. The surrogate has the self-model of
+        before. None for one that is given as it is, and if the trials are too short for a fit.
         """
         if hypothesis not in self._refits:
             every = [part.rows for part in (*self.healthy_trials, *self.trials)]
@@ -157,7 +142,19 @@ class Problem:
             refit = None
             if self.calibrate is not None:
                 with suppress(InputError):
-                    refit = self.table.of_robot(self.calibrate(every, hypotheses=faults).robot)
+                    robot = self.calibrate(every, hypotheses=faults).robot
+                    refit = Problem(
+                        self.table.of_robot(robot),
+                        self.space,
+                        self.trials,
+                        surrogate=self.surrogate,
+                        healthy_trials=self.healthy_trials,
+                        names=self.names,
+                        settings=self.settings,
+                        calibrate=self.calibrate,
+                        healthy_parts=self.healthy_motions[len(self.healthy_trials) :],
+                        observer=self.observer,
+                    )
             self._refits[hypothesis] = refit
         return self._refits[hypothesis]
 

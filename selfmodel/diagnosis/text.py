@@ -159,6 +159,9 @@ def verdict_sentences(diagnosis: Diagnosis) -> str:
     if diagnosis.also_searched:
         also = "Searched beyond the kinds asked for, to predict the trials better"
         sentences.append(f"{also}: {', '.join(diagnosis.also_searched)}.")
+    if diagnosis.left_out:
+        listed = ", ".join(map(str, diagnosis.left_out))
+        sentences.append(f"Left out, because a refit of the self-model explains as much: {listed}.")
     if diagnosis.undetectable:
         faults = ", ".join(map(str, diagnosis.undetectable_faults))
         sentences.append(f"Undetectable in these trials: {faults}.")

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmodel.diagnosis import search, significance
-from selfmodel.diagnosis.adequacy import doubt_of, is_explained_by
+from selfmodel.diagnosis.adequacy import doubt_of
 from selfmodel.diagnosis.diagnosis import (
     Candidate,
     DetectableSeverity,
@@ -22,7 +22,7 @@ from selfmodel.diagnosis.diagnosis import (
     UnsearchedFault,
     Verdict,
 )
-from selfmodel.diagnosis.joints import excesses, lead_at_joints
+from selfmodel.diagnosis.joints import excesses, joints_of, lead_at_joints
 from selfmodel.diagnosis.losses import LossFunction, by_total_loss
 from selfmodel.diagnosis.probability import probabilities, unlikeness
 from selfmodel.diagnosis.problem import Problem
@@ -93,12 +93,13 @@ def diagnosis_of(
         best = ranked[0]
     if not math.isfinite(totals[best]):
         return _all_diverged(ranked, problem)
-    best, by_refit = supported(best, problem)
+    found = best
+    best, by_refit = supported(found, problem)
     totals.setdefault(best, float(problem.table.distances([best], problem.trials)[0]))
     order = best_severities([best, *ranked])
-    leads = leads_of(best, problem) if problem.has_test else {}
+    leads = leads_of(best, by_refit) if problem.has_test else {}
     if problem.has_test:
-        alike, unsearched = indistinguishable(leads), unsearched_fault(best, problem)
+        alike, unsearched = indistinguishable(leads), unsearched_fault(best, by_refit)
     else:
         equal = [one for one in order if totals[one] == totals[best]]
         alike, unsearched = [one for one in equal if not _has_more(one, best)], None
@@ -127,12 +128,13 @@ def diagnosis_of(
         verdict=verdict if doubt is None else "not judged",
         test=significance.TEST if problem.has_test else EQUAL_DISTANCES,
         unsearched=unsearched,
-        undetectable=tuple(undetectable(best, problem)[:kept]) if problem.has_test else (),
+        undetectable=tuple(undetectable(best, by_refit)[:kept]) if problem.has_test else (),
         detectable=tuple(severities),
         fit=fit,
         residual=_residual_of(best, by_refit) if verdict == "unexplained" else None,
         doubt=doubt,
         probability=probability,
+        left_out=tuple(Hypothesis((fault,)) for fault in _missing(best, found)),
     )
 
 
@@ -159,50 +161,63 @@ def supported(best: Hypothesis, problem: Problem) -> tuple[Hypothesis, Problem]:
 
     A fault beside others is doubted if it explains little of the loss, or if the others alone do
     not make the trials unexplained. It is left out if a self-model that is fitted to the healthy
-    trials and to these, with the others in these, predicts both as well without it; and these as
-    well as one that is fitted with all the faults in them. The losses of the problem that is
-    returned are then by that self-model: what is left out is in it.
+    trials and to these, with the others in these, predicts all of them as well as one that is
+    fitted with all the faults in them. The problem that is returned has the losses by that
+    self-model, which has absorbed the faults left out.
 
-    A fault that only readings show, or only the motion of its joint, is not doubted: the fit is to
-    all motions. Nor is one beside a fault of the specification, as a fit has the compiled model.
+    Nothing is left out of a hypothesis that does not explain the trials: a fault is missing.
     """
     rest, by_refit = best, problem
-    if problem.calibrate is None or problem.healthy([INTACT]) is None or best.spec_part:
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or len(best) < 2:
+        return best, problem
+    if best.spec_part or is_too_high(_fit_of(best, problem)):  # a fit has the compiled model
         return best, problem
     while fewer := [one for one in problem.space.with_one_less(rest) if 0 < len(one) < len(rest)]:
-        for fewest in by_total_loss(fewer, problem.losses):
-            one = search.with_fitted_severities(fewest, problem.coarse, problem.space)
-            if len(one) == len(fewest) and (found := _refitted(one, best, problem)):
-                rest, by_refit = one, found
+        for one in by_total_loss(fewer, problem.losses):
+            if (found := _without_some(one, best, problem)) is not None:
+                rest, by_refit = found
                 break
         else:
             break
     return rest, by_refit
 
 
-def _refitted(rest: Hypothesis, best: Hypothesis, problem: Problem) -> Problem | None:
-    """Returns the problem of a refit that explains the trials as well with fewer faults, if any."""
-    parts = {(fault.kind, fault.part) for fault in rest.faults}
-    others = [fault for fault in best.faults if (fault.kind, fault.part) not in parts]
-    if not all(fault.kind.affects_dynamics for fault in others):
-        return None
+def _without_some(
+    fewer: Hypothesis, best: Hypothesis, problem: Problem
+) -> tuple[Hypothesis, Problem] | None:
+    """Returns fewer faults and the problem of a refit with which they explain as much, if any."""
+    others = _missing(fewer, best)
+    if not others or not all(fault.kind.affects_dynamics for fault in others):
+        return None  # the readings of a sensor are not fitted
+    rest = search.with_fitted_severities(fewer, problem.coarse, problem.space)
     losses = problem.losses([best, rest, INTACT])
-    if not significance.is_better(losses[0], losses[1]):
+    if len(rest) < len(fewer) or not np.isfinite(losses).all():
         return None
     loss, without, intact = losses.mean(axis=1)
     is_small = without - loss <= MAX_SHARE * (intact - loss)
     if not is_small and is_too_high(_fit_of(rest, problem)):
         return None
-    refit = problem.recalibrated(rest)
-    if refit is None or not is_explained_by(rest, refit, best, problem):
+    by_some, by_all = problem.refitted(rest), problem.refitted(best)
+    if by_some is None or by_all is None:
         return None
-    # A fit to these trials predicts them better with any faults.
-    if (other := problem.recalibrated(best)) is None:
-        return None
-    ((with_all,), (with_rest,)) = (
-        table.losses([one], problem.trials) for table, one in ((other, best), (refit, rest))
+    with_some, with_all = (
+        np.concatenate([*by.losses([one]), *by.table.losses([INTACT], by.healthy_trials)])
+        for by, one in ((by_some, rest), (by_all, best))
     )
-    return None if significance.is_better(with_all, with_rest) else problem.by(refit)
+    joints = joints_of(others, problem) if problem.has_joints else []
+    is_needed = significance.is_better(with_all, with_some) or any(
+        significance.joint_is_better(
+            by_all.of_joint(joint, [best])[0], by_some.of_joint(joint, [rest])[0]
+        )
+        for joint in joints
+    )
+    return None if is_needed else (rest, by_some)
+
+
+def _missing(fewer: Hypothesis, more: Hypothesis) -> list[Fault]:
+    """Returns the faults of a hypothesis that another lacks, whatever their severities."""
+    kept = without_severities(fewer)
+    return [one for one in more.faults if not without_severities(Hypothesis((one,))) <= kept]
 
 
 def _fit_of(best: Hypothesis, problem: Problem) -> Fit:
@@ -391,13 +406,12 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
         # A reading that healthy trials predict better with the fault is predicted badly as such.
         if not fault.kind.affects_dynamics and significance.is_better(*healthy):
             continue
-        if significance.gain_exceeds_healthy_gain(losses, best_losses, *healthy):
+        is_gain = significance.gain_exceeds_healthy_gain(losses, best_losses, *healthy)
+        if is_gain and len(supported(candidate, problem)[0]) == len(candidate):
             better[fault.kind.name] = candidate
     if not better:
         return None
     (first, hypothesis), *others = better.items()
-    if without_severities(supported(hypothesis, problem)[0]) == without_severities(best):
-        return None
     return UnsearchedFault(hypothesis, first, dict(others))
 
 

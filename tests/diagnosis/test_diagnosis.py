@@ -127,6 +127,7 @@ def test_a_diagnosis_survives_the_output_of_the_command_line(found: Diagnosis):
         fit=fit,
         probability={BEST: 0.9, OTHER: 0.05},
         also_searched=("grip",),
+        left_out=(SPACE.parse(OTHER),),
     )
     output = json.loads(json.dumps(output_of(whole), allow_nan=False))
 
@@ -139,7 +140,7 @@ def test_the_output_has_the_names_of_python_and_keys_of_0_1_are_read(found: Diag
     assert set(values) == {
         *("diagnosis", "verdict", "indistinguishable", "undetectable", "test", "unsearched"),
         *("intact_distance", "reason", "fit", "change", "residual", "doubt", "detectable"),
-        *("probability", "also_searched"),
+        *("probability", "also_searched", "left_out"),
     }
     assert values["undetectable"] == [f"{BEST}+sensor:back_left_touch"]
     assert values["reason"] is values["fit"] is values["change"] is values["residual"] is None
