@@ -211,11 +211,8 @@ class DiagnosticSearch:
         change = final if final.index == change.index else change
         # What came with the change may be what a refit has left out.
         parts = {without_severities(one) for one in (diagnosis.best, change.before)}
-        return (
-            None
-            if diagnosis.left_out and len(parts) == 1
-            else replace(diagnosis, change=change, trials=len(trials))
-        )
+        is_same = diagnosis.left_out and len(parts) == 1
+        return None if is_same else replace(diagnosis, change=change, trials=len(trials))
 
     def _with_refined_before(
         self, change: Change, starts: Sequence[Hypothesis], problem: Problem

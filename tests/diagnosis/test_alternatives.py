@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -181,10 +180,10 @@ def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
 def test_an_unsearched_fault_that_a_refit_explains_is_model_error(
     monkeypatch: pytest.MonkeyPatch, *, is_error: bool
 ):
-    monkeypatch.setattr(verdict, "_refitted", lambda *_: Mock() if is_error else None)
     after = of({JAM: 0.9, f"{JAM}+wind=12": 0.8})
     problem = Synthetic(PAPER, after, before=of({}))
-    problem.calibrate = Mock()
+    left = said(JAM if is_error else f"{JAM}+wind=12")
+    monkeypatch.setattr(verdict, "supported", lambda *_: (left, problem))
 
     assert (unsearched_fault(said(JAM), problem) is None) == is_error
 
