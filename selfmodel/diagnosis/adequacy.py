@@ -17,6 +17,8 @@ trials, the following is asked before a robot is called damaged:
 3. **Recalibration.** Does the fault explain more than a self-model that is fitted to the healthy
    trials and to those to explain together, without a fault? What the healthy trials left open is
    free in it.
+
+Of a fault beside others, only the third is asked, of a fit with the others (``supported``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -24,9 +26,11 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis import significance
+from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
-from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.joints import excesses, joints_of
+from selfmodel.diagnosis.losses import LossTable, by_total_loss
+from selfmodel.diagnosis.probability import unlikeness
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
@@ -65,6 +69,9 @@ LEFT_OUT = ". Or import again without the fast part (with {}), and repeat the di
 MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0
 """Largest share of a trial, and largest number of its parts, that it is advised to leave out; and
 shortest time without fast commands between two parts, s."""
+
+MAX_SHARE = 0.1
+"""Share of the loss that a fault explains beside others, up to which it has to beat a refit."""
 
 FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
@@ -136,6 +143,103 @@ def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Prob
         )
         + (LEFT_OUT.format(" and ".join(parts)) if (parts := fast_parts(faster, problem)) else ""),
     )
+
+
+def supported(best: Hypothesis, problem: Problem) -> tuple[Hypothesis, Problem]:
+    """Returns a hypothesis without the faults that an error of the self-model explains as well.
+
+    A fault beside others is doubted if it explains little of the loss, or if the others alone do
+    not make the trials unexplained. It is left out if a self-model that is fitted to the healthy
+    trials and to these, with the others in these, predicts all of them as well as one that is
+    fitted with all the faults in them. The problem that is returned has the losses by that
+    self-model, which has absorbed the faults left out.
+
+    Nothing is left out of a hypothesis that does not explain the trials: a fault is missing.
+    """
+    rest, by_refit = best, problem
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or len(best) < 2:
+        return best, problem
+    if best.spec_part or is_too_high(fit_of(best, problem)):  # a fit has the compiled model
+        return best, problem
+    while fewer := [one for one in problem.space.with_one_less(rest) if 0 < len(one) < len(rest)]:
+        for one in by_total_loss(fewer, problem.losses):
+            if (found := _without_some(one, best, problem)) is not None:
+                rest, by_refit = found
+                break
+        else:
+            break
+    return rest, by_refit
+
+
+def _without_some(
+    fewer: Hypothesis, best: Hypothesis, problem: Problem
+) -> tuple[Hypothesis, Problem] | None:
+    """Returns fewer faults and the problem of a refit with which they explain as much, if any."""
+    others = best.lacking(fewer)
+    if not others or not all(fault.kind.affects_dynamics for fault in others):
+        return None  # the readings of a sensor are not fitted
+    rest = search.with_fitted_severities(fewer, problem.coarse, problem.space)
+    losses = problem.losses([best, rest, INTACT])
+    if len(rest) < len(fewer) or not np.isfinite(losses).all():
+        return None
+    loss, without, intact = losses.mean(axis=1)
+    is_small = without - loss <= MAX_SHARE * (intact - loss)
+    if not is_small and is_too_high(fit_of(rest, problem)):
+        return None
+    by_some, by_all = problem.refitted(rest), problem.refitted(best)
+    if by_some is None or by_all is None:
+        return None
+    with_some, with_all = (
+        np.concatenate([*by.losses([one]), *by.table.losses([INTACT], by.healthy_trials)])
+        for by, one in ((by_some, rest), (by_all, best))
+    )
+    joints = joints_of(others, problem) if problem.has_joints else []
+    is_needed = significance.is_better(with_all, with_some) or any(
+        significance.joint_is_better(
+            by_all.of_joint(joint, [best])[0], by_some.of_joint(joint, [rest])[0]
+        )
+        for joint in joints
+    )
+    return None if is_needed else (rest, by_some)
+
+
+def fit_of(best: Hypothesis, problem: Problem) -> Fit:
+    """Returns how well the best hypothesis predicts the trials.
+
+    Trials with the gait of the healthy ones are compared with all of these. Others are compared
+    with the one that is predicted worst: gaits differ in how hard they are to predict, which the
+    scatter of the pieces of all healthy trials does not contain. Joints are suspected only in the
+    same gait: another one loads the joints otherwise, and 16 of 24 healthy robots would be
+    suspected.
+    """
+    losses, intact = problem.losses([best, INTACT])
+    rows = ([part.rows for part in each] for each in (problem.trials, problem.healthy_trials))
+    is_one_gait = have_one_gait(*rows)
+    joints = excesses(INTACT, problem) if is_one_gait and not best else {}
+    loss, intact_loss = float(losses.mean()), float(intact.mean())
+    healthy_loss = excess = left = None
+    reference = problem.reference if is_one_gait else problem.hardest
+    if reference is not None:
+        healthy_loss = float(reference.mean())
+        excess = significance.excess_over_healthy(losses, reference)
+        left = significance.share_left(loss, intact_loss, healthy_loss)
+    return Fit(
+        loss,
+        intact_loss,
+        healthy_loss,
+        excess,
+        threshold=significance.MIN_Z_OF_ONE_GAIT
+        if is_one_gait
+        else significance.MIN_Z_OF_OTHER_GAITS,
+        has_faults=bool(best),
+        left=left,
+        joints={joint: z for joint, z in joints.items() if z >= significance.MIN_Z_OF_JOINT},
+    )
+
+
+def is_too_high(fit: Fit) -> bool:
+    """Returns whether the loss is higher than that of healthy trials, significantly and by much."""
+    return unlikeness(fit) > 1.0
 
 
 def sufficient_trials(accused: Hypothesis, problem: Problem) -> list[TrialPart]:

@@ -23,7 +23,7 @@ from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.diagnosis.search import LocalSearch, evolved, with_fitted_severities
-from selfmodel.diagnosis.verdict import diagnosis_of, without_severities
+from selfmodel.diagnosis.verdict import diagnosis_of
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -210,7 +210,7 @@ class DiagnosticSearch:
         final = change if split is None else dated(split)
         change = final if final.index == change.index else change
         # What came with the change may be what a refit has left out.
-        parts = {without_severities(one) for one in (diagnosis.best, change.before)}
+        parts = {one.without_severities for one in (diagnosis.best, change.before)}
         is_same = diagnosis.left_out and len(parts) == 1
         return None if is_same else replace(diagnosis, change=change, trials=len(trials))
 

@@ -182,19 +182,19 @@ class Diagnosis:
         trials: Number of trials.
         intact_distance: Distance of the empty hypothesis.
         indistinguishable: Hypotheses not significantly worse than the best, smallest distance
-            first; see ``verdict.indistinguishable``.
+            first; see ``alternatives.indistinguishable``.
         verdict: ``intact``, ``explained``, ``ambiguous``, ``unexplained`` or ``not judged``; see
             ``Verdict``.
         test: Name of the test behind ``indistinguishable``.
         unsearched: The best hypothesis with a fault of an unsearched kind, if it predicts the
-            trials significantly better; see ``verdict.unsearched_fault``.
+            trials significantly better; see ``alternatives.unsearched_fault``.
         also_searched: Names of the kinds that were searched beyond those that were asked for,
             because faults of them predicted the trials better.
         undetectable: The best hypothesis with one more fault, for each undetectable fault,
             smallest distance first, at most as many as are ranked.
         reason: Cause of the verdict and remedy, if every simulation diverged; else empty.
         detectable: Smallest detectable severities of each kind and part, if the best hypothesis
-            is the empty one; see ``verdict.detectable_severities``.
+            is the empty one; see ``alternatives.detectable_severities``.
         fit: Numbers behind the verdict; None if every simulation diverged.
         change: Change of the robot during the trials; the diagnosis is about the time after it.
             None if one hypothesis is enough.
@@ -204,7 +204,7 @@ class Diagnosis:
             ``diagnosis.probability``. None of a comparator without a test, without healthy trials,
             and of trials that are not judged.
         left_out: Faults of the best hypothesis of the search that an error of the self-model
-            explains as well; see ``verdict.supported``. ``fit`` is then by the refitted model.
+            explains as well; see ``adequacy.supported``. ``fit`` is then by the refitted model.
     """
 
     ranked: tuple[Candidate, ...]

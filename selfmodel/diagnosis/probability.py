@@ -1,9 +1,9 @@
 """Probabilities of hypotheses, from the statistics that decide the verdict.
 
-A hypothesis over which the best one leads by ``z`` standard errors (``verdict.leads_of``) has the
-weight ``exp(-z^2 / 2)``, the best has 1. Those with ``z`` below ``MIN_Z``, 1.1 % of the best's
-weight, cannot be told apart. Beside all of them there is a fault that was not searched, whose odds
-grow with the loss that is left (``unlikeness``).
+A hypothesis over which the best one leads by ``z`` standard errors (``leads_of``) has the weight
+``exp(-z^2 / 2)``, the best has 1. Those with ``z`` below ``MIN_Z``, 1.1 % of the best's weight,
+cannot be told apart. Beside all of them there is a fault that was not searched, whose odds grow
+with the loss that is left (``unlikeness``).
 
 The probability is that of the kinds and parts of all faults, at about the named severities, if no
 fault is too small to show. The constants are of recordings of our own generator; docs/results has

@@ -4,11 +4,10 @@ import math
 import re
 from collections.abc import Sequence
 
-from selfmodel.diagnosis.adequacy import LONGER
+from selfmodel.diagnosis.adequacy import LONGER, is_too_high
 from selfmodel.diagnosis.diagnosis import DetectableSeverity, Diagnosis, Doubt, Fit
 from selfmodel.diagnosis.direct_evidence import DirectEvidence
 from selfmodel.diagnosis.significance import LOSS_RATIO, NEGLIGIBLE_LOSS
-from selfmodel.diagnosis.verdict import is_too_high
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.registry import KIND_SETS, KINDS
 

@@ -43,6 +43,16 @@ class Hypothesis:
         """The faults that edit the specification before it is compiled."""
         return Hypothesis(tuple(fault for fault in self.faults if fault.kind.edits_specification))
 
+    @property
+    def without_severities(self) -> frozenset[tuple[FaultKind, str]]:
+        """The kind and the part of each fault."""
+        return frozenset((fault.kind.without_severity, fault.part) for fault in self.faults)
+
+    def lacking(self, other: "Hypothesis") -> list[Fault]:
+        """Returns the faults that another hypothesis lacks, whatever their severities."""
+        kept = other.without_severities
+        return [one for one in self.faults if not Hypothesis((one,)).without_severities <= kept]
+
 
 INTACT = Hypothesis()
 """The empty hypothesis: the nominal robot in the nominal environment."""

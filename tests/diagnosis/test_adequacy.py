@@ -16,13 +16,14 @@ from selfmodel.diagnosis.adequacy import (
     doubt_of,
     fast_parts,
     faster_joints,
+    fit_of,
     sufficient_trials,
+    supported,
 )
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO
-from selfmodel.diagnosis.verdict import _fit_of, supported
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -357,7 +358,7 @@ def test_another_gait_is_compared_with_the_healthy_trial_that_is_predicted_worst
 ):
     problem = problem_of(table, moved(real, gait), healthy)
     losses = [table.losses([INTACT], [one]).mean() for one in healthy]
-    fit = _fit_of(INTACT, problem)
+    fit = fit_of(INTACT, problem)
 
     assert losses[0] != pytest.approx(losses[1], rel=0.1)
     assert fit.healthy_loss == pytest.approx(reference(losses))

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis import verdict
-from selfmodel.diagnosis.diagnosis import DetectableSeverity, UnsearchedFault
-from selfmodel.diagnosis.losses import LossFunction
-from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
-from selfmodel.diagnosis.verdict import (
+from selfmodel.diagnosis import alternatives
+from selfmodel.diagnosis.alternatives import (
     detectable_severities,
     indistinguishable,
     leads_of,
     undetectable,
     unsearched_fault,
 )
+from selfmodel.diagnosis.diagnosis import DetectableSeverity, UnsearchedFault
+from selfmodel.diagnosis.losses import LossFunction
+from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.faults import BROKEN, FRICTION, ROUGHNESS
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -183,7 +183,7 @@ def test_an_unsearched_fault_that_a_refit_explains_is_model_error(
     after = of({JAM: 0.9, f"{JAM}+wind=12": 0.8})
     problem = Synthetic(PAPER, after, before=of({}))
     left = said(JAM if is_error else f"{JAM}+wind=12")
-    monkeypatch.setattr(verdict, "supported", lambda *_: (left, problem))
+    monkeypatch.setattr(alternatives, "supported", lambda *_: (left, problem))
 
     assert (unsearched_fault(said(JAM), problem) is None) == is_error
 

@@ -14,6 +14,7 @@ import pytest
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
+from selfmodel.diagnosis.adequacy import is_too_high
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, Fit
@@ -24,7 +25,6 @@ from selfmodel.diagnosis.verdict import (
     EQUAL_DISTANCES,
     WINDOW,
     diagnosis_of,
-    is_too_high,
     verdict_of,
 )
 from selfmodel.faults import BROKEN, JAMMED
