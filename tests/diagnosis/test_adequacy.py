@@ -178,12 +178,33 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
 
     hypothesis = parse(best, known.anatomy)
 
-    found, by_refit = supported(hypothesis, problem_of(table, trials, before, fitted))
+    problem = problem_of(table, trials, before, fitted)
+    found, by_refit = supported(hypothesis, problem)
 
     assert str(found) == left
     (losses,) = by_refit.losses([found])
     refitted = LossTable(Simulator(fitted, 1), SEGMENT_PREDICTION).losses([found], trials)
     assert (losses == (refitted if left != best else table.losses([found], trials))).all()
+
+
+def test_a_fault_is_left_out_by_what_the_refits_predict_with_it_and_without(
+    quadruped: Robot, table: LossTable, weaker: Robot
+):
+    both = f"{JAM}+payload=0.2"
+    before, trials = (
+        [moved(weaker, gait, truth=truth) for gait in ("first", "second")]
+        for truth in ("intact", both)
+    )
+    found = []
+    for beside_both in (weaker, quadruped):
+        problem = problem_of(table, trials, before)
+        robots = {JAM: weaker, both: beside_both}
+        problem.calibrate = lambda _, hypotheses, known=robots: SimpleNamespace(
+            robot=known[str(hypotheses[-1])]
+        )
+        found.append(str(supported(parse(both, quadruped.anatomy), problem)[0]))
+
+    assert found == [both, JAM]
 
 
 def test_one_healthy_gait_does_not_tell_how_well_another_is_predicted(
