@@ -144,7 +144,7 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
         if not fault.kind.affects_dynamics and significance.is_better(*healthy):
             continue
         is_gain = significance.gain_exceeds_healthy_gain(losses, best_losses, *healthy)
-        if is_gain and len(supported(candidate, problem)[0]) == len(candidate):
+        if is_gain and fault not in candidate.lacking(supported(candidate, problem)[0]):
             better[fault.kind.name] = candidate
     if not better:
         return None

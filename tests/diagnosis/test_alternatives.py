@@ -176,14 +176,15 @@ def test_an_unsearched_fault_that_helped_before_as_well_is_model_error():
     assert unsearched_fault(INTACT, Synthetic(PAPER, after, before=before)) is None
 
 
-@pytest.mark.parametrize("is_error", [False, True])
+@pytest.mark.parametrize(
+    ("left", "is_error"), [(f"{JAM}+wind=12", False), ("wind=12", False), (JAM, True)]
+)
 def test_an_unsearched_fault_that_a_refit_explains_is_model_error(
-    monkeypatch: pytest.MonkeyPatch, *, is_error: bool
+    monkeypatch: pytest.MonkeyPatch, left: str, *, is_error: bool
 ):
     after = of({JAM: 0.9, f"{JAM}+wind=12": 0.8})
     problem = Synthetic(PAPER, after, before=of({}))
-    left = said(JAM if is_error else f"{JAM}+wind=12")
-    monkeypatch.setattr(alternatives, "supported", lambda *_: (left, problem))
+    monkeypatch.setattr(alternatives, "supported", lambda *_: (said(left), problem))
 
     assert (unsearched_fault(said(JAM), problem) is None) == is_error
 
