@@ -30,7 +30,6 @@ from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.joints import excesses, joints_of
 from selfmodel.diagnosis.losses import LossTable, by_total_loss
-from selfmodel.diagnosis.probability import unlikeness
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
@@ -240,6 +239,24 @@ def fit_of(best: Hypothesis, problem: Problem) -> Fit:
 def is_too_high(fit: Fit) -> bool:
     """Returns whether the loss is higher than that of healthy trials, significantly and by much."""
     return unlikeness(fit) > 1.0
+
+
+def unlikeness(fit: Fit) -> float:
+    """Returns the loss of the best hypothesis over the largest that is expected of the right one.
+
+    From 1 on, the best hypothesis does not explain the trials: its loss is higher than that of
+    healthy trials, significantly and by much, or that of a joint is. Faults make a motion harder to
+    predict: a slipping foot, a body on the ground. So the loss of a hypothesis with faults has to
+    exceed the reference by the factor ``FAULTY_RATIO`` too. 0 without healthy trials.
+    """
+    if fit.healthy_loss is None or fit.excess is None:
+        return 0.0
+    ratio, many = (
+        fit.loss / (times * fit.healthy_loss + significance.LOSS_FLOOR)
+        for times in (significance.FAULTY_RATIO, significance.LOSS_RATIO)
+    )
+    excess = fit.excess / fit.threshold
+    return max(many, min(excess, ratio) if fit.has_faults else excess)
 
 
 def sufficient_trials(accused: Hypothesis, problem: Problem) -> list[TrialPart]:

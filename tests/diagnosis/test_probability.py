@@ -5,9 +5,10 @@ import math
 
 import pytest
 
+from selfmodel.diagnosis.adequacy import unlikeness
 from selfmodel.diagnosis.diagnosis import Fit
-from selfmodel.diagnosis.probability import UNKNOWN, probabilities, unlikeness
 from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_FLOOR, MIN_Z
+from selfmodel.diagnosis.verdict import UNKNOWN, probabilities
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.tasks import ROBOTS
