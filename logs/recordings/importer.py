@@ -83,6 +83,8 @@ def import_recording(
 ) -> ImportedTrial:
     """Returns the trial in a bag or a table of the robot that a mapping names.
 
+    Written as a log (``writing.write_recording``), it is read as any other trial is.
+
     Args:
         path: The recording.
         mapping: Mapping of its topics or columns.

@@ -1,9 +1,9 @@
 """Controllers: a design, such as a network or a CPG, with the genome that sets its weights.
 
-Each design is one file: ``network.py``, ``cpg.py``. A further design needs three changes: its file
+Each design is one file: ``network.py``, ``cpg.py``. A further design needs four changes: its file
 with a ``Design`` and a ``ControllerBatch``, its row in ``selfmodel.robot.designs.DESIGNS`` (the
-names on the command line), and its row in ``selfmodel.logs.controllers.KINDS`` (the arrays of its
-``.npz`` file).
+names on the command line), its row in ``selfmodel.logs.controllers.KINDS`` (the arrays of its
+``.npz`` file: one number of its own), and its name on the help page, ``cli/options.toml``.
 """
 
 import math

@@ -71,7 +71,8 @@ def verdict_of(
     """Returns the verdict about the best hypothesis of a diagnosis.
 
     ``alike`` are the hypotheses that are indistinguishable from the best, ``unsearched`` is the
-    best one with a fault of an unsearched kind, if that is better.
+    best one with a fault of an unsearched kind, if that is better. ``diagnosis_of`` says
+    ``not judged`` in place of an accusation that the healthy trials do not carry.
     """
     if unsearched is not None or is_too_high(fit) or fit.joints:
         return "unexplained"

@@ -1,8 +1,9 @@
 """Scores of rollouts and trials: the fitness of a repair.
 
-``SCORES`` has those that need no argument; ``upright_within`` limits returns another, and so does
-``tracking``. Any other ``Score`` works as well. One that cannot be measured on a physical robot is
-refused before the first trial (``check_measurable``).
+A further one is a ``Score`` with its function, its row in ``SCORES``, and its name on the help
+page, ``cli/options.toml``; ``upright_within`` limits and ``tracking`` take an argument, and the sum
+of a task's rewards is in ``selfmodel.tasks``. Any other ``Score`` works as well. One that cannot be
+measured on a physical robot is refused before the first trial (``check_measurable``).
 """
 
 import dataclasses
