@@ -87,9 +87,19 @@ def publish(part: Path, path: Path) -> None:
     sync_folder(path.parent)
 
 
-def make_folder(path: Path) -> None:
-    """Makes a folder with its parents, unless it exists, and flushes their names to the disk."""
-    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
+def make_folder(path: Path, within: Path | None = None) -> None:
+    """Makes a folder with its parents, unless it exists, and flushes their names to the disk.
+
+    Raises:
+        InputError: The folder, or one of its parents below ``within``, is a link: what is written
+            there would be elsewhere.
+        LogWriteError: It cannot be made.
+    """
+    above = (path, *path.parents)
+    for folder in above[: above.index(within)] if within else ():
+        if folder.is_symlink():
+            raise InputError(f"{folder}: expected a folder, got a link: remove it, or rename it")
+    missing = [folder for folder in above if not folder.exists()]
     try:
         with suppress(FileNotFoundError):  # another process removed an empty parent meanwhile
             path.mkdir(parents=True, exist_ok=True)

@@ -170,7 +170,7 @@ def choose_gl() -> str:
 
 def draws(library: str) -> bool:
     """Returns whether MuJoCo renders a picture with that value of ``MUJOCO_GL``."""
-    command, environment = [sys.executable, "-c", PICTURE], {**os.environ, GL: library}
+    command, environment = [sys.executable, "-P", "-c", PICTURE], {**os.environ, GL: library}
     with suppress(subprocess.SubprocessError):
         subprocess.run(  # noqa: S603  # this Python, and a text from above
             command, env=environment, capture_output=True, check=True, timeout=PICTURE_SECONDS

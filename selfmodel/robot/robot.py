@@ -24,7 +24,7 @@ MAX_NUMBER = float(mujoco.mjMAXVAL)
 """Largest number of a model: MuJoCo resets a simulation whose state or acceleration exceeds it."""
 
 MAX_NAME = 1000
-"""Longest name of a motor or a hinge, characters: every message of a log may have all names."""
+"""Longest name of a part, characters: messages of a log and refusals have names."""
 
 MAX_ITERATIONS = 10_000
 """Largest number of iterations of a solver; MuJoCo's default is 100 or less. The number of a step
@@ -153,6 +153,7 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
         ValueError: The model has an unsupported part, or a number that is not finite or absurdly
             large; the message contains the name of the part.
     """
+    _check_longest_name(model)  # first: the others print names
     if not model.opt.timestep > 0:
         raise ValueError(
             f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
@@ -219,11 +220,15 @@ def _check_names(kind: str, parts: list[mujoco.MjModel]) -> None:
                 f"the model's {kind} number {int(part.id)} has no name: give it one, because "
                 f"logs and faults identify parts by name"
             )
-        if len(part.name) > MAX_NAME:
-            raise ValueError(
-                f"expected names of at most {MAX_NAME} characters, got {len(part.name)} in the "
-                f"name of the {kind} {part.name[:20]}...: shorten it"
-            )
+
+
+def _check_longest_name(model: mujoco.MjModel) -> None:
+    longest = max(bytes(model.names).split(b"\0"), key=len).decode(errors="replace")
+    if len(longest) > MAX_NAME:
+        raise ValueError(
+            f"expected names of at most {MAX_NAME} characters, got {len(longest)} in "
+            f"{longest[:20]}...: shorten it"
+        )
 
 
 def _label(part: mujoco.MjModel) -> str:

@@ -145,10 +145,10 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
     # A new name that nobody has: no link is followed, and no file is replaced.
     unfinished = folder / UNFINISHED / f"{place.name}.{secrets.token_hex(8)}"
     try:
-        make_folder(unfinished)
+        make_folder(unfinished, folder)
         error = _perform(folder, cell, unfinished, begin)
         if error is None:
-            _publish(unfinished, place)
+            _publish(unfinished, folder, place)
             (folder / ERRORS / f"{place.name}.txt").unlink(missing_ok=True)  # of an earlier failure
         return time.perf_counter() - begin, error
     except OSError as cause:
@@ -194,14 +194,14 @@ def _perform(folder: Path, cell: Cell, unfinished: Path, begin: float) -> str | 
 
 def keep_error(folder: Path, place: str, text: str) -> None:
     """Writes the error of a cell into its file."""
-    make_folder(folder / ERRORS)
+    make_folder(folder / ERRORS, folder)
     path = folder / ERRORS / f"{Path(place).name}.txt"
     replace_file(path, f"{text}\n".encode(errors="replace"))
 
 
-def _publish(unfinished: Path, place: Path) -> None:
+def _publish(unfinished: Path, folder: Path, place: Path) -> None:
     """Moves the folder of a cell to its place; of two workers, the first one keeps it."""
-    make_folder(place.parent)
+    make_folder(place.parent, folder)
     sync_folder(unfinished)
     try:
         unfinished.rename(place)

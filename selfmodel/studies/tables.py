@@ -337,6 +337,6 @@ def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
 def write_files(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Writes files, by their path in a folder, which is made if missing; returns their paths."""
     for name, data in files.items():
-        make_folder((folder / name).parent)
+        make_folder((folder / name).parent, folder)
         replace_file(folder / name, data)
     return tuple(folder / name for name in files)

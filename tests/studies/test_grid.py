@@ -20,6 +20,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.studies import cells as cell_files, grid
 from selfmodel.studies.cells import CELL, Cell, finished
 from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor, run_grid
+from selfmodel.studies.tables import write_files
 from tests.helpers.grids import calls, cell, cells, shared
 
 ROOT = Path(__file__).parents[2]
@@ -230,6 +231,15 @@ def test_no_link_in_the_folder_of_a_study_is_followed(study: Study):
     place.symlink_to(precious)
     with pytest.raises(OSError, match="cannot be written"):
         study.run([wanted])
+
+    place.unlink()
+    place.parent.rmdir()
+    place.parent.symlink_to(precious)
+    with pytest.raises(InputError, match="got a link"):
+        study.run([wanted])
+    (study.folder / "tables").symlink_to(precious)
+    with pytest.raises(InputError, match="got a link"):
+        write_files(study.folder, {"tables/gap.csv": b"new"})
 
     assert (precious / "number.txt").read_text() == "mine"
     assert [path.name for path in precious.iterdir()] == ["number.txt"]

@@ -85,6 +85,9 @@ AWKWARD: dict[str, Awkward] = {
     "a name of 100,000 characters": Awkward(
         mjcf().replace("left_hip", "h" * 100_000), "at most 1000 characters"
     ),
+    "a body's name of 100,000 characters": Awkward(
+        mjcf().replace("torso", "h" * 100_000), "at most 1000 characters"
+    ),
     # Files.
     "a missing mesh": Awkward(mjcf(more=MESH.format("m", "m.obj"), torso=MESHED), "'m.obj'"),
     "a missing mesh that is not used": Awkward(mjcf(more=MESH.format("m", "m.obj"))),
