@@ -2,9 +2,8 @@
 
 Usage: python .ci/check_versions.py dist/selfmodel-….whl
 
-The lowest versions of the dependencies are installed with Python 3.11, the highest with 3.12, each
-in an environment of its own, at the same time. A Python that is not on this machine is named and
-skipped.
+The lowest and the highest versions of the dependencies are installed with Python 3.11 and 3.12, each
+in an environment of its own. A Python that is not on this machine is named and skipped.
 """
 
 import shutil
@@ -13,6 +12,7 @@ import sys
 import tempfile
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SHORT = ("--steps", "80")
 LOGS = ("before.mcap", "after.mcap")
 COMMANDS = (
+    ("recover", "--help"),
     ("trial", "quadruped", "--out", "before.mcap", "--stage", "before", *SHORT),
     ("trial", "quadruped", "--out", "after.mcap", "--damage", "break:front_left_knee", *SHORT),
     ("diagnose", *LOGS, "--population", "8", "--generations", "2", "--kinds", "break", "--json"),
@@ -29,9 +30,10 @@ COMMANDS = (
 
 
 def main(wheel: Path) -> None:
-    """Runs both checks; exits with what failed."""
-    with ThreadPoolExecutor() as pool:
-        found = list(pool.map(check, (wheel, wheel), (11, 12), (lowest(), [])))
+    """Runs the four checks; exits with what failed."""
+    with ThreadPoolExecutor(2) as pool:
+        every = product((11, 12), (lowest(), []))
+        found = list(pool.map(lambda one: check(wheel, *one), every))
     if not any(map(interpreter, (11, 12))):
         sys.exit("nothing was checked: install Python 3.11 or 3.12")
     failures = [text for text in found if text]

@@ -251,8 +251,13 @@ def _commands() -> Iterator[Scenario]:
     yield "commands/robots", {"robots": "robots --json"}
     trial = _trial("quadruped", "--steps 200")
     yield "commands/logs", {"trial": trial, "verify": "logs verify trial.mcap --json"}
+    small = "--steps 100 --population 8 --generations 2 --workers 1 --json"
     ablate = (
         "ablate --robots quadruped --comparator forward-displacement,segment-prediction --case 1 "
-        "--steps 100 --population 8 --generations 2 --seeds 2 --out study --workers 1 --json"
+        f"--seeds 2 --out study {small}"
     )
-    yield "commands/ablate", {"ablate": ablate}
+    yield "commands/ablate", {"ablate": ablate, "compare": "compare study --json"}
+    displacement = "--case 1 --comparator forward-displacement --trials 1 --out study"
+    suite = f"suite run --domains walker --repair paper {displacement} {small}"
+    yield "commands/suite", {"suite": suite}
+    yield "commands/paper", {"paper": f"paper --robots quadruped {displacement} {small}"}
