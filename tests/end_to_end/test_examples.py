@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import runpy
 import subprocess
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.logs.journal import is_calibrated
@@ -21,7 +23,8 @@ from selfmodel.testing import check_comparator
 from tests.helpers.command import SMALL, as_started_in, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 
 
 def run(name: str, *arguments: str, cwd: Path) -> str:
@@ -41,6 +44,21 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((tmp_path / "run" / "trials").glob("*.mcap"))) == 3
     assert not is_calibrated(tmp_path / "run"), "a report of the run must not calibrate"
+
+
+@pytest.mark.opengl
+@pytest.mark.usefixtures("gl")
+def test_lanes_are_drawn_with_the_opengl_that_works_of_itself(tmp_path: Path):
+    folder, figure = ROOT / "tests" / "data" / "logs-0.1" / "recovery", tmp_path / "lanes.png"
+    command = [sys.executable, EXAMPLES / "plot_lanes.py", folder, figure]
+    subprocess.run(command, env={**os.environ, "MUJOCO_GL": ""}, check=True)
+    with Image.open(figure) as picture:
+        numbers = [picture.info[stage] for stage in ("before", "after", "recovery")]
+        pixels = np.asarray(picture.convert("RGB"), int)[:, 320:].reshape(-1, 3)
+
+    assert numbers == ["0.2", "0.3", "0.2"]
+    blue, red, green = (pixels[:, k] - np.delete(pixels, k, 1).max(1) for k in (2, 0, 1))
+    assert min(np.sum(each > 20) for each in (blue, red, green)) > 500  # beside the caption
 
 
 def heading_comparator() -> Comparator:
@@ -106,8 +124,7 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40
 
 
-ROOT = Path(__file__).parents[2]
-NOTEBOOK = ROOT / "examples" / "comparators.ipynb"
+NOTEBOOK = EXAMPLES / "comparators.ipynb"
 PAGE = ROOT / "docs" / "results" / "comparators.md"
 
 
