@@ -1,6 +1,5 @@
 """Promises of the examples and the notebook: each runs, and draws or prints what it promises."""
 
-import importlib.util
 import json
 import os
 import re
@@ -8,6 +7,7 @@ import runpy
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.logs.journal import is_calibrated
 from selfmodel.studies.statistics import Interval
 from selfmodel.testing import check_comparator
@@ -61,15 +60,6 @@ def test_lanes_are_drawn_with_the_opengl_that_works_of_itself(tmp_path: Path):
     assert min(np.sum(each > 20) for each in (blue, red, green)) > 500  # beside the caption
 
 
-def heading_comparator() -> Comparator:
-    """The example's comparator, imported as its user's own file would be."""
-    spec = importlib.util.spec_from_file_location("heading", EXAMPLES / "heading_comparator.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where a dataclass looks for its annotations
-    spec.loader.exec_module(module)
-    return module.HEADING
-
-
 def turning(rate: float) -> np.ndarray:
     """Orientations of a base that turns to the left, rad/s."""
     half = np.arange(1000) * 0.01 * rate / 2
@@ -77,16 +67,18 @@ def turning(rate: float) -> np.ndarray:
 
 
 def test_a_comparator_of_ones_own_keeps_the_contract():
+    with as_started_in(EXAMPLES, [], {}):
+        heading = import_module("heading_comparator").HEADING
     left = changed(gait(), base_orientation=turning(0.1))
     unknown = turning(0.1)
     unknown[200:300] = np.nan
     trial = logged(changed(left, base_orientation=unknown))
     runs = batch(left, gait(), changed(gait(), base_orientation=turning(-0.1)))
 
-    check_comparator(heading_comparator(), logged(left), runs)
-    check_comparator(heading_comparator(), trial, runs)
+    check_comparator(heading, logged(left), runs)
+    check_comparator(heading, trial, runs)
     # A mean over 10 s of turning 0.1 rad/s apart.
-    losses = heading_comparator().prepare(logged(left)).losses(runs)
+    losses = heading.prepare(logged(left)).losses(runs)
     np.testing.assert_allclose(losses.mean(axis=1), [0, 0.4995, 0.999], rtol=1e-6)
 
 
