@@ -1,6 +1,6 @@
 """Draws three trials of a recovery in lanes side by side: before, after the failure, recovered.
 
-Usage: MUJOCO_GL=osmesa python examples/plot_lanes.py RUN_FOLDER FIGURE.png
+Usage: python examples/plot_lanes.py RUN_FOLDER FIGURE.png
 
 Each lane shows the robot at several moments of one trial, and a line each 5 m. A detached limb is
 not drawn. The file has the displacements as text, too, with which a test compares the README. The
@@ -8,8 +8,13 @@ picture needs EGL or OSMesa, as ``selfmodel render`` does.
 """
 
 import json
+import os
 import sys
 from pathlib import Path
+
+from selfmodel.cli.render import GL, choose_gl
+
+os.environ[GL] = choose_gl()  # before MuJoCo is imported, which reads it
 
 import mujoco
 import numpy as np

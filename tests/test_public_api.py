@@ -4,6 +4,8 @@ import ast
 import doctest
 import importlib
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -68,3 +70,14 @@ def test_the_example_of_every_public_name_runs(
 
     assert result.attempted > 0
     assert result.failed == 0
+
+
+@pytest.mark.process
+def test_a_folder_that_is_called_selfmodel_does_not_come_before_the_package(tmp_path: Path):
+    """It is a namespace package, to which an install by an import hook would lose."""
+    (tmp_path / "selfmodel").mkdir()
+    code = "import selfmodel as s; from selfmodel import tasks; print(s.diagnose, tasks.__file__)"
+    told = subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, text=True)
+
+    assert told.startswith("<function diagnose at ")
+    assert told.split()[-1] == str(ROOT / "selfmodel" / "tasks" / "__init__.py")

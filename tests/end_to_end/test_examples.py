@@ -1,28 +1,30 @@
 """Promises of the examples and the notebook: each runs, and draws or prints what it promises."""
 
-import importlib.util
 import json
+import os
 import re
 import runpy
 import shutil
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.logs.journal import is_calibrated
 from selfmodel.studies.statistics import Interval
 from selfmodel.testing import check_comparator
 from tests.helpers.command import SMALL, as_started_in, selfmodel
 from tests.helpers.gaits import batch, changed, gait, logged
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 
 
 def run(name: str, *arguments: str, cwd: Path) -> str:
@@ -44,13 +46,19 @@ def test_a_recovery_in_python_is_drawn_from_its_logs(tmp_path: Path):
     assert not is_calibrated(tmp_path / "run"), "a report of the run must not calibrate"
 
 
-def heading_comparator() -> Comparator:
-    """The example's comparator, imported as its user's own file would be."""
-    spec = importlib.util.spec_from_file_location("heading", EXAMPLES / "heading_comparator.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where a dataclass looks for its annotations
-    spec.loader.exec_module(module)
-    return module.HEADING
+@pytest.mark.opengl
+@pytest.mark.usefixtures("gl")
+def test_lanes_are_drawn_with_the_opengl_that_works_of_itself(tmp_path: Path):
+    folder, figure = ROOT / "tests" / "data" / "logs-0.1" / "recovery", tmp_path / "lanes.png"
+    command = [sys.executable, EXAMPLES / "plot_lanes.py", folder, figure]
+    subprocess.run(command, env={**os.environ, "MUJOCO_GL": ""}, check=True)
+    with Image.open(figure) as picture:
+        numbers = [picture.info[stage] for stage in ("before", "after", "recovery")]
+        pixels = np.asarray(picture.convert("RGB"), int)[:, 320:].reshape(-1, 3)
+
+    assert numbers == ["0.2", "0.3", "0.2"]
+    blue, red, green = (pixels[:, k] - np.delete(pixels, k, 1).max(1) for k in (2, 0, 1))
+    assert min(np.sum(each > 20) for each in (blue, red, green)) > 500  # beside the caption
 
 
 def turning(rate: float) -> np.ndarray:
@@ -60,16 +68,18 @@ def turning(rate: float) -> np.ndarray:
 
 
 def test_a_comparator_of_ones_own_keeps_the_contract():
+    with as_started_in(EXAMPLES, [], {}):
+        heading = import_module("heading_comparator").HEADING
     left = changed(gait(), base_orientation=turning(0.1))
     unknown = turning(0.1)
     unknown[200:300] = np.nan
     trial = logged(changed(left, base_orientation=unknown))
     runs = batch(left, gait(), changed(gait(), base_orientation=turning(-0.1)))
 
-    check_comparator(heading_comparator(), logged(left), runs)
-    check_comparator(heading_comparator(), trial, runs)
+    check_comparator(heading, logged(left), runs)
+    check_comparator(heading, trial, runs)
     # A mean over 10 s of turning 0.1 rad/s apart.
-    losses = heading_comparator().prepare(logged(left)).losses(runs)
+    losses = heading.prepare(logged(left)).losses(runs)
     np.testing.assert_allclose(losses.mean(axis=1), [0, 0.4995, 0.999], rtol=1e-6)
 
 
@@ -110,8 +120,7 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40
 
 
-ROOT = Path(__file__).parents[2]
-NOTEBOOK = ROOT / "examples" / "comparators.ipynb"
+NOTEBOOK = EXAMPLES / "comparators.ipynb"
 PAGE = ROOT / "docs" / "results" / "comparators.md"
 
 

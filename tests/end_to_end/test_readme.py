@@ -42,6 +42,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
+JAM = re.compile(r"back_left_shoulder( is stuck at 0\.30 rad|=0\.3, explained)")
+"""What every step after the trials says of the second one, by a command or in Python."""
+
 SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 """Options by which commands take seconds for minutes; the block of Python reads the same logs."""
 
@@ -49,14 +52,19 @@ SHORTER = {"trial": ("--steps", "140"), "diagnose": SMALL, "report": SMALL}
 @pytest.mark.process
 @pytest.mark.usefixtures("coarse_calibration")
 @pytest.mark.parametrize("step", [one for one in steps() if not is_in_ci(one)], ids=name_of)
-def test_a_reader_can_run(step: str | Block, folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_reader_can_run_and_is_told_what_is_wrong(
+    step: str | Block, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
     if isinstance(step, str):
         words = shlex.split(step)[1:]
-        succeeds(*words, *SHORTER.get(words[0], ()), cwd=folder)
+        told = succeeds(*words, *SHORTER.get(words[0], ()), cwd=folder).stdout
     else:
         monkeypatch.chdir(folder)
         small = "settings=selfmodel.Settings(generations=2).scaled(8), healthy="
         exec(step.text.replace("healthy=", small), {})  # noqa: S102  # the page's own code
+        told = capsys.readouterr().out
+
+    assert "selfmodel trial " in name_of(step) or JAM.search(told), told
 
 
 def test_every_command_is_this_projects_and_what_make_runs_is_run_by_ci():

@@ -63,10 +63,10 @@ def says(name: str, /, **texts: str) -> Change:
 
 
 def holds(name: str, change: Callable[[bytes], bytes]) -> Change:
-    """Changes an attachment."""
+    """Changes an attachment, or the text of a schema."""
 
     def changed(record: McapRecord) -> McapRecord:
-        if isinstance(record, Attachment) and record.name == name:
+        if isinstance(record, Attachment | Schema) and record.name == name:
             record.data = change(record.data)
         return record
 

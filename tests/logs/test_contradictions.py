@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, McapRecord, Message, Metadata
 
 from selfmodel.logs import (
     CorruptError,
@@ -18,7 +18,7 @@ from selfmodel.logs.inspection import verify
 from selfmodel.logs.records import CONTROLLER_FILE, MODEL_FILE, RESULT, TRIAL
 from tests.logs.edits import Change, attach, holds, rewritten, says, without
 
-HALF_A_SECOND = 50 * 10**7
+HALF_A_SECOND, ODOMETRY = 50 * 10**7, "nav_msgs/msg/Odometry"
 
 
 def replaced(name: str, old: bytes, new: bytes) -> Change:
@@ -55,28 +55,13 @@ def renamed(record: McapRecord) -> McapRecord:
     return record
 
 
-def moved(record: McapRecord) -> McapRecord:
-    if isinstance(record, Channel) and record.topic == "/odom":
-        record.topic = "/odometry"
-    return record
+def called(field: str, old: str, new: str) -> Change:
+    def change(record: McapRecord) -> McapRecord:
+        if getattr(record, field, "") == old:
+            setattr(record, field, new)
+        return record
 
-
-def twice(record: McapRecord) -> McapRecord:
-    if isinstance(record, Channel) and record.topic == "/tf":
-        record.topic = "/odom"
-    return record
-
-
-def retyped(record: McapRecord) -> McapRecord:
-    if isinstance(record, Schema) and record.name == "nav_msgs/msg/Odometry":
-        record.name = "nav_msgs/msg/Path"
-    return record
-
-
-def redefined(record: McapRecord) -> McapRecord:
-    if isinstance(record, Schema) and record.name == "nav_msgs/msg/Odometry":
-        record.data += b"float64 more\n"
-    return record
+    return change
 
 
 @pytest.mark.parametrize(
@@ -111,10 +96,10 @@ def redefined(record: McapRecord) -> McapRecord:
         (at_half_a_second(lambda _: None), CorruptError, "119 messages on /joint_states"),
         (forged, CorruptError, r"digest of the record selfmodel\.trial"),
         (renamed, SchemaMismatchError, "controller"),
-        (moved, SchemaMismatchError, "/odom"),
-        (twice, CorruptError, "'/odom' twice"),
-        (retyped, SchemaMismatchError, "nav_msgs/msg/Odometry in cdr on /odom"),
-        (redefined, SchemaMismatchError, "definition of nav_msgs/msg/Odometry"),
+        (called("topic", "/odom", "/odometry"), SchemaMismatchError, "/odom"),
+        (called("topic", "/tf", "/odom"), CorruptError, "'/odom' twice"),
+        (called("name", ODOMETRY, "a/msg/A"), SchemaMismatchError, f"{ODOMETRY} in cdr on /odom"),
+        (replaced(ODOMETRY, b"twist", b"turn"), SchemaMismatchError, "definition of nav_msgs"),
     ],
 )
 def test_a_log_that_contradicts_itself_is_refused_by_name(

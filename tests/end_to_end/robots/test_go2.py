@@ -19,7 +19,7 @@ from tests.helpers.go2 import recorded
 
 NUMBERS = Path(__file__).parents[3] / "benchmarks" / "go2" / "go2.json"
 
-pytestmark = [pytest.mark.search, recorded]
+pytestmark = recorded
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,7 @@ def test_the_last_five_seconds_are_predicted_better_by_a_quarter(fitted: Robot):
     assert error(fitted) < 0.75 * error(robot_on_stand())
 
 
+@pytest.mark.search
 def test_no_weak_motor_explains_the_healthy_robot_better(fitted: Robot):
     found = better_hypotheses(fitted, 1)
 

@@ -16,7 +16,11 @@ T0 = 1_700_000_000 * 10**9
 """When the made-up bags begin, ns."""
 
 Item = tuple[str, int, object]
-"""A topic, a log time in ns, and a message."""
+"""A topic, a log time in ns, and a message; or the bytes of an event of a service."""
+
+EVENT = "example_interfaces/srv/AddTwoInts_Event"
+SERVICE = {"msgdef": "int64 a\nint64 b\n---\nint64 sum\n", "rihs01": "RIHS01_"}
+"""What a recorder of ROS 2 writes for the definition of an event: that of its service."""
 
 FORMS = {
     "mcap": (StoragePlugin.MCAP, CompressionMode.NONE),
@@ -37,10 +41,12 @@ def write_bag(folder: Path, items: Iterable[Item], form: str = "mcap") -> Path:
     with writer:
         known = {}
         for topic, time, message in sorted(items, key=lambda item: item[1]):
-            kind = message.__msgtype__
+            kind = getattr(message, "__msgtype__", EVENT)
+            defined = SERVICE if kind == EVENT else {"typestore": ROS}
             if topic not in known:
-                known[topic] = writer.add_connection(topic, kind, typestore=ROS)
-            writer.write(known[topic], time, ROS.serialize_cdr(message, kind))
+                known[topic] = writer.add_connection(topic, kind, **defined)
+            data = message if kind == EVENT else ROS.serialize_cdr(message, kind)
+            writer.write(known[topic], time, data)
     return folder
 
 

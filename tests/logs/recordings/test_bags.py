@@ -66,10 +66,8 @@ def test_every_form_of_rosbag2_is_the_same_trial(
 
 @pytest.mark.parametrize("form", ROS1_FORMS)
 def test_a_ros_1_bag_is_the_same_trial(form: str, biped: Robot, bag: Path, tmp_path: Path):
-    ros1, ros2 = (
-        imported(write_ros1(tmp_path / "a.bag", recorded(), form), biped),
-        imported(bag, biped),
-    )
+    ros1 = imported(write_ros1(tmp_path / "a.bag", recorded(), form), biped)
+    ros2 = imported(bag, biped)
 
     for signal, values in ros2.trajectory.signals.items():
         assert ros1.trajectory[signal].tobytes() == values.tobytes(), signal
@@ -84,6 +82,20 @@ def test_other_writers_of_mcap_are_read(
     path, lz4 = tmp_path / "bag.mcap", CompressionType.LZ4
     write_mcap(path, recorded(), encoding=encoding, compression=lz4, use_chunking=chunked)
     assert signals(path, biped) == expected
+
+
+@pytest.mark.parametrize("form", ["mcap", "sqlite"])
+def test_events_of_services_are_counted_and_change_nothing(
+    form: str, biped: Robot, expected: dict, tmp_path: Path
+):
+    events = [("/add/_service_event", T0 + k, b"\0\1\0\0" + bytes(40)) for k in range(3)]
+    folder = write_bag(tmp_path / "walk", [*recorded(), *events], form)
+    series = read_bag(folder).series["/add/_service_event"]
+
+    assert (series.count, series.names) == (3, ())
+    assert signals(folder, biped) == expected
+    with pytest.raises(InputError, match="/joint_states"):
+        imported(write_bag(tmp_path / "alone", events, form), biped)
 
 
 @pytest.mark.parametrize("listed", [True, False])
@@ -319,14 +331,7 @@ def test_messages_that_are_missing_are_missed(
 ):
     if form == "plain":  # without chunks, and so without checksums
         path = tmp_path / "plain.mcap"
-        with path.open("wb") as file:
-            writer = Writer(file, use_chunking=False, use_statistics=True)
-            writer.start("ros2")
-            schema = writer.register_schema("std_msgs/msg/Bool", "ros2msg", b"")
-            channel = writer.register_channel("/x", "cdr", schema)
-            for time in range(20):
-                writer.add_message(channel, T0 + time, b"\0\1\0\0\1", T0 + time)
-            writer.finish()
+        write_mcap(path, recorded(0.2), use_chunking=False)
     elif form == "ros1":
         path = write_ros1(tmp_path / "walk.bag", recorded(0.2))
     else:

@@ -1,17 +1,13 @@
 """A simulated trial, recorded as a driver would and imported again, still tells what is wrong."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
 
-from selfmodel.cli import app
 from selfmodel.comparators import DEFAULT
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
-from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
@@ -23,6 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import Trajectory, collect
+from tests.helpers.command import printed, refused, succeeds
 from tests.helpers.drivers import random_controllers
 from tests.logs.recordings.driver import mapping, record
 
@@ -61,10 +58,6 @@ def driven(
     return record(folder / "bag", quadruped, simulated)
 
 
-def selfmodel(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(app, [*map(str, arguments)])
-
-
 def test_what_is_imported_is_what_was_simulated(
     quadruped: Robot, driven: Path, simulated: Trajectory
 ):
@@ -93,11 +86,8 @@ def test_the_right_fault_is_found_in_an_imported_trial(
     quadruped: Robot, driven: Path, truth: Hypothesis, tmp_path: Path
 ):
     log = tmp_path / "trial.mcap"
-    done = selfmodel(
-        "logs", "import", driven, "--mapping", driven.parent / "map.toml", "-o", log, "--json"
-    )
-    assert done.exit_code == 0, done.stderr
-    facts = json.loads(done.stdout)
+    mapped = ("--mapping", driven.parent / "map.toml")
+    facts = printed("logs", "import", driven, *mapped, "-o", log, "--json", cwd=tmp_path)
     assert facts["valid"]["joint_positions"] == facts["valid"]["base_position"] == 1
     assert facts["topics"]["/odom"]["latency"] == pytest.approx(0.015)
     trial = read_log(log).trial
@@ -123,18 +113,13 @@ def test_the_suggested_mapping_needs_only_what_is_marked(quadruped: Robot, drive
 
 
 def test_the_command_suggests_imports_and_reports(driven: Path, tmp_path: Path):
-    done = selfmodel("logs", "import", driven, "--suggest", "--robot", "quadruped")
-    assert done.exit_code == 0, done.stderr
-    path = tmp_path / "map.toml"
-    path.write_text(done.stdout)
-    log = tmp_path / "trial.mcap"
-    arguments = ("logs", "import", driven, "--mapping", path, "-o", log)
-    done = selfmodel(*arguments)
-    assert done.exit_code == 0, done.stderr
+    done = succeeds("logs", "import", driven, "--suggest", "--robot", "quadruped", cwd=tmp_path)
+    (tmp_path / "map.toml").write_text(done.stdout)
+    arguments = ("logs", "import", driven, "--mapping", "map.toml", "-o", "trial.mcap")
+    done = succeeds(*arguments, cwd=tmp_path)
     assert max(map(len, done.stdout.partition("note:")[0].splitlines())) <= 80
     assert "start pose" in done.stdout  # the suggestion knows no offsets
-    again = selfmodel(*arguments)
-    assert str(again.exception) == f"{log} exists, and is not overwritten: choose another name"
+    refused(*arguments, said="trial.mcap exists, and is not overwritten", cwd=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -157,12 +142,9 @@ def test_what_a_mapping_names_must_be_there(
     text: str, message: str, quadruped: Robot, driven: Path, tmp_path: Path
 ):
     (tmp_path / "r.xml").write_text("<mujoco/>")
-    path = tmp_path / "map.toml"
     rest = mapping(quadruped, STEPS, None).partition("\n")[2]
-    path.write_text(f"{text}\n{rest}")
-    done = selfmodel("logs", "import", driven, "--mapping", path, "-o", tmp_path / "t.mcap")
+    (tmp_path / "map.toml").write_text(f"{text}\n{rest}")
+    arguments = ("logs", "import", driven, "--mapping", "map.toml", "-o", "t.mcap")
+    done = refused(*arguments, said=message.partition(".*")[0], cwd=tmp_path)
+    assert message.partition(".*")[2] in done.stderr
     assert not (tmp_path / "t.mcap").exists()
-    first, _, second = message.partition(".*")
-    assert isinstance(done.exception, InputError)
-    assert first in str(done.exception)
-    assert second in str(done.exception)
