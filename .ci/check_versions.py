@@ -2,8 +2,8 @@
 
 Usage: python .ci/check_versions.py dist/selfmodel-….whl
 
-The lowest and the highest versions of the dependencies are installed with Python 3.11 and 3.12, each
-in an environment of its own. A Python that is not on this machine is named and skipped.
+The lowest and the highest versions of the dependencies are installed with Python 3.11 and 3.12,
+each in an environment of its own. A Python that is not on this machine is named and skipped.
 """
 
 import shutil

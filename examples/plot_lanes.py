@@ -65,7 +65,7 @@ def main(folder: Path, figure: Path) -> None:
     for row, (stage, (log, _)) in enumerate(shown.items()):
         text = f"{TITLES[stage]}: {log.trial.displacement:.2f} m"
         colour = tuple(round(255 * part) for part in COLOURS[stage])
-        draw.text((24, 18 + 28 * row), text, fill=colour, font=font)
+        draw.text((24, HEIGHT - 92 + 28 * row), text, fill=colour, font=font)
         numbers.add_text(stage, f"{log.trial.displacement:.1f}")
     image.save(figure, pnginfo=numbers)
 
