@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
@@ -21,6 +22,7 @@ from selfmodel.studies import cells as cell_files, grid
 from selfmodel.studies.cells import CELL, Cell, finished
 from selfmodel.studies.grid import CellEnds, GridBegins, dask_executor, run_grid
 from selfmodel.studies.tables import write_files
+from tests.helpers.code_blocks import blocks
 from tests.helpers.grids import calls, cell, cells, shared
 
 ROOT = Path(__file__).parents[2]
@@ -420,3 +422,19 @@ def test_a_scheduler_that_goes_mute_ends_the_study(study: Study, monkeypatch: py
                     study.run(cells(study.notes, 1), executor=executor)
         finally:
             scheduler.kill()
+
+
+def test_the_documented_jobs_of_slurm_are_a_worker_per_processor(monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("dask_jobqueue", reason="needs dask-jobqueue")
+    page = ROOT / "docs" / "how-to" / "run-on-a-cluster.md"
+    (block,) = (one for one in blocks(page) if "SLURMCluster(" in one.text)
+    made: dict[str, Any] = {}
+    monkeypatch.setattr("builtins.input", lambda _prompt: None)
+    exec(block.text.replace("8786", "0"), made)  # noqa: S102  # a text of this repository
+    with made["cluster"] as cluster:
+        script = cluster.job_script()
+
+    assert "#SBATCH -p cpu" in script
+    assert f"{sys.executable} -m distributed.cli.dask_worker tcp://" in script
+    assert "--nthreads 1 " in script
+    assert "--nworkers 8 " in script
