@@ -92,6 +92,9 @@ def selfmodel(
     """Parses the options that come before the command."""
 
 
+LONGEST_ERROR = 20_000
+"""Longest error that is printed, characters: some repeat a name from a file."""
+
 UsageError: Any = typer.BadParameter.__base__
 """Error of unknown commands, options and values; typer has no public name for it."""
 
@@ -143,5 +146,6 @@ def _run() -> int:
 
 
 def _fail(message: str, status: int) -> None:
-    print_notes(f"error: {message}")
+    cut = f"{message[:LONGEST_ERROR]}..." if len(message) > LONGEST_ERROR else message
+    print_notes(f"error: {cut}")
     sys.exit(status)

@@ -34,8 +34,9 @@ def compare(options: Compare) -> None:
         formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), texts=3),
     ]
     content = formats.table_files(tables, options.table) | figures.of_comparisons(pairs)
-    folder = options.out or options.study / COMPARISON
-    files = list(map(str, formats.write_files(folder, content)))
+    if options.out is None:  # within the study, where no linked folder is written to
+        content = {f"{COMPARISON}/{name}": data for name, data in content.items()}
+    files = list(map(str, formats.write_files(options.out or options.study, content)))
     if options.as_json:
         facts = {
             "study": found.kind,

@@ -61,8 +61,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         model = mujoco.MjModel.from_xml_string(self.mjcf, dict(self.assets))
-        root = anatomy_reader.find_root_body(model)
-        check_model(model, root)
+        root = check_model(model)
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "anatomy", anatomy_reader.read_anatomy(model, root))
         object.__setattr__(self, "root", str(model.body(root).name))
@@ -146,14 +145,18 @@ _ITERATIONS = (
 )
 
 
-def check_model(model: mujoco.MjModel, root: int) -> None:
+def check_model(model: mujoco.MjModel) -> int:
     """Checks that a robot of this model can be logged, damaged and predicted from its logs.
+
+    Returns:
+        The number of its root body.
 
     Raises:
         ValueError: The model has an unsupported part, or a number that is not finite or absurdly
             large; the message contains the name of the part.
     """
     _check_longest_name(model)  # first: the others print names
+    root = anatomy_reader.find_root_body(model)
     if not model.opt.timestep > 0:
         raise ValueError(
             f"the model's <option timestep> must be above 0 s, got {model.opt.timestep}"
@@ -191,6 +194,7 @@ def check_model(model: mujoco.MjModel, root: int) -> None:
     hinges = [model.joint(int(j)) for j in np.flatnonzero(model.jnt_type == _HINGE)]
     _check_names("motor", [model.actuator(m) for m in range(model.nu)])
     _check_names("hinge", hinges)
+    return root
 
 
 def _check_motor(model: mujoco.MjModel, motor: int) -> None:
@@ -223,7 +227,7 @@ def _check_names(kind: str, parts: list[mujoco.MjModel]) -> None:
 
 
 def _check_longest_name(model: mujoco.MjModel) -> None:
-    longest = max(bytes(model.names).split(b"\0"), key=len).decode(errors="replace")
+    longest = max(bytes(model.names).decode(errors="replace").split("\0"), key=len)
     if len(longest) > MAX_NAME:
         raise ValueError(
             f"expected names of at most {MAX_NAME} characters, got {len(longest)} in "
@@ -262,8 +266,7 @@ def check_usable(model: mujoco.MjModel) -> None:
             "diagnosed: give the joints of its limbs motors in <actuator>"
         )
     try:
-        root = anatomy_reader.find_root_body(model)
-        check_model(model, root)
+        root = check_model(model)
     except ValueError as error:
         raise InputError(str(error)) from error
     base_joints = anatomy_reader.joints_of_body(model, root)

@@ -145,10 +145,11 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
     # A new name that nobody has: no link is followed, and no file is replaced.
     unfinished = folder / UNFINISHED / f"{place.name}.{secrets.token_hex(8)}"
     try:
-        make_folder(unfinished, folder)
+        for needed in (unfinished, place.parent):
+            make_folder(needed, folder)
         error = _perform(folder, cell, unfinished, begin)
         if error is None:
-            _publish(unfinished, folder, place)
+            _publish(unfinished, place)
             (folder / ERRORS / f"{place.name}.txt").unlink(missing_ok=True)  # of an earlier failure
         return time.perf_counter() - begin, error
     except OSError as cause:
@@ -199,9 +200,8 @@ def keep_error(folder: Path, place: str, text: str) -> None:
     replace_file(path, f"{text}\n".encode(errors="replace"))
 
 
-def _publish(unfinished: Path, folder: Path, place: Path) -> None:
+def _publish(unfinished: Path, place: Path) -> None:
     """Moves the folder of a cell to its place; of two workers, the first one keeps it."""
-    make_folder(place.parent, folder)
     sync_folder(unfinished)
     try:
         unfinished.rename(place)

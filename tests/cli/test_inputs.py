@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from selfmodel.cli import app, inputs
 from selfmodel.errors import InputError
+from tests.helpers.command import selfmodel
 
 
 @pytest.mark.parametrize(
@@ -66,3 +67,11 @@ def test_a_list_is_what_stands_between_the_commas_each_once(items: list[str]):
 
 def test_a_number_is_one_number_however_it_is_written():
     assert inputs.whole_numbers("--any", "2,02,1,+2", ()) == (2, 1)
+
+
+def test_an_error_repeats_no_name_of_any_length(tmp_path: Path):
+    (tmp_path / "long.xml").write_text(f'<mujoco><include file="{"n" * 100_000}"/></mujoco>')
+    done = selfmodel("trial", "long.xml", "--out", "a.mcap", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert 20_000 < len(done.stderr) < 30_000

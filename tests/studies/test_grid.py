@@ -430,7 +430,7 @@ def test_the_documented_jobs_of_slurm_are_a_worker_per_processor(monkeypatch: py
     (block,) = (one for one in blocks(page) if "SLURMCluster(" in one.text)
     made: dict[str, Any] = {}
     monkeypatch.setattr("builtins.input", lambda _prompt: None)
-    exec(block.text.replace("8786", "0"), made)  # noqa: S102  # a text of this repository
+    exec(block.text.replace("8786", '0, "dashboard_address": ":0"'), made)  # noqa: S102  # a text of this repository
     with made["cluster"] as cluster:
         script = cluster.job_script()
 

@@ -54,7 +54,7 @@ def parse_xml(text: str | bytes) -> ET.Element:
     except InputError:
         raise
     except (ET.ParseError, LookupError, ValueError) as error:  # LookupError: unknown encoding
-        raise InputError(f"expected an MJCF or URDF file, got no XML: {error!s:.200}") from error
+        raise InputError(f"expected an MJCF or URDF file, got no XML: {error}") from error
     return root
 
 
