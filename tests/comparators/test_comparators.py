@@ -7,6 +7,8 @@ import pytest
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.comparators.paper import MIN_ERROR, READINGS, RELATIVE_ERROR, PaperSensors
+from selfmodel.comparators.sensor_series import geman_mcclure
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.losses import simulate
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
@@ -17,7 +19,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.testing import check_comparator, shown
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.trajectory import Trajectory
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces, distances_of
 from tests.helpers.drivers import random_controllers
@@ -91,6 +93,20 @@ def keeps_its_contract(name: str, robot: Robot, trial: Trial) -> None:
         assert distances[0] < NEGLIGIBLE_LOSS
     assert comparator.name == name
     assert isinstance(comparator, Comparator)
+
+
+def test_the_displacement_has_a_fifth_of_the_distance_of_all_that_the_papers_robots_measure(
+    logged_and_simulated: Both,
+):
+    trial, simulated = logged_and_simulated
+    windows = READINGS.prepare(trial).losses(simulated)
+    losses = PaperSensors().prepare(trial).losses(simulated)
+    far = np.abs(forward_displacement(simulated) - trial.displacement)
+    end = geman_mcclure(far / max(RELATIVE_ERROR * abs(trial.displacement), MIN_ERROR))
+
+    assert end.max() > 0.1
+    assert losses.shape == (len(windows), windows.shape[1] + 1)
+    assert np.allclose(losses.mean(axis=1), 0.8 * windows.mean(axis=1) + 0.2 * end)
 
 
 def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated: Both):

@@ -220,3 +220,13 @@ def test_a_reference_lacks_what_one_of_the_others_lacks(lost: list[int]):
     assert np.flatnonzero(~known).tolist() == lost
     assert observed_as(damaged, [damaged]) is damaged
     assert observed_as(WALK, []) is WALK
+
+
+def test_the_time_step_of_a_trial_is_the_mean_of_all():
+    trajectory = WALK.trajectory
+    time = trajectory.time.copy()
+    time[1:] += 0.1
+
+    changed = dataclasses.replace(trajectory, time=time)
+    assert changed.timestep == pytest.approx((time[-1] - time[0]) / (len(time) - 1))
+    assert changed.timestep > trajectory.timestep

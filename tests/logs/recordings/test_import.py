@@ -252,6 +252,17 @@ def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
     assert any(note.startswith(silent) for note in recording.notes)
 
 
+def test_a_pause_that_is_shorter_than_a_control_step_is_no_gap(biped: Robot, tmp_path: Path):
+    items = without("/joint_states", recorded())
+    for stamp in (T0 + 1_000_000 * k for k in range(1000) if not 100 < k < 106):
+        items.append(("/joint_states", stamp, joint_state(stamp, JOINTS, [0.0] * 4)))
+    recording = imported(write_bag(tmp_path / "bag", items), biped)
+
+    assert recording.qualities["/joint_states"].longest == pytest.approx(0.006)
+    assert recording.qualities["/joint_states"].gaps == ()
+    assert np.isfinite(recording.trajectory["joint_positions"]).all()
+
+
 @pytest.mark.parametrize("limited", [True, False])
 def test_only_a_hinge_without_limits_goes_round(*, limited: bool, tmp_path: Path):
     items = without("/joint_states", recorded())
