@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
@@ -424,17 +423,22 @@ def test_a_scheduler_that_goes_mute_ends_the_study(study: Study, monkeypatch: py
             scheduler.kill()
 
 
-def test_the_documented_jobs_of_slurm_are_a_worker_per_processor(monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.process
+def test_the_documented_jobs_of_slurm_are_a_worker_per_processor(tmp_path: Path):
     pytest.importorskip("dask_jobqueue", reason="needs dask-jobqueue")
     page = ROOT / "docs" / "how-to" / "run-on-a-cluster.md"
     (block,) = (one for one in blocks(page) if "SLURMCluster(" in one.text)
-    made: dict[str, Any] = {}
-    monkeypatch.setattr("builtins.input", lambda _prompt: None)
-    exec(block.text.replace("8786", '0, "dashboard_address": ":0"'), made)  # noqa: S102  # a text of this repository
-    with made["cluster"] as cluster:
-        script = cluster.job_script()
+    code = block.text.replace("8786", '0, "dashboard_address": ":0"')
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nprint(cluster.job_script())"],
+        cwd=tmp_path,
+        input="\n",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
-    assert "#SBATCH -p cpu" in script
-    assert f"{sys.executable} -m distributed.cli.dask_worker tcp://" in script
-    assert "--nthreads 1 " in script
-    assert "--nworkers 8 " in script
+    assert "#SBATCH -p cpu" in done.stdout, done.stderr
+    assert f"{sys.executable} -m distributed.cli.dask_worker tcp://" in done.stdout
+    assert "--nthreads 1 " in done.stdout
+    assert "--nworkers 8 " in done.stdout
