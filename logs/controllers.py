@@ -4,6 +4,10 @@ The arrays of every file: ``kind`` (the name of the design), ``sensors`` and ``m
 design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``, s, of a CPG) and
 ``genome`` (float64). Controllers whose command ranges differ from the paper's also have ``ranges``
 (float64, centre and half width per motor).
+
+In place of a number, a policy has ``content`` (its operators, terms and action, as JSON) and the
+tensors of its network, and a compensating layer ``base`` (the bytes of the controller within) and
+``feedback``.
 """
 
 import io
@@ -12,24 +16,30 @@ import tokenize
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.controllers.controller import PAPER_RANGE, Controller, Design
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.compensation import Compensated
+from selfmodel.controllers.controller import PAPER_RANGE, Controller, Design, Ranges
 from selfmodel.controllers.cpg import Cpg
+from selfmodel.controllers.graph import Graph, Node
 from selfmodel.controllers.network import Network
+from selfmodel.controllers.policy import Interface, Policy
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.files import create_file
 
-MAX_CONTROLLER_BYTES = 2**20
-"""Largest size of a controller file, bytes; those of the paper's robots are under 3,000."""
+MAX_CONTROLLER_BYTES = 2**24
+"""Largest size of a controller file, bytes. Those of the paper's robots are under 3,000; a policy
+of four layers of 512 neurons has three million."""
 
 Arrays = Mapping[str, NDArray[Any]]
 """Arrays of a file, by name."""
@@ -51,6 +61,7 @@ NPZ_FAILURES = (
     struct.error,
     zipfile.BadZipFile,
     zlib.error,
+    msgspec.MsgspecError,  # the content of a policy
 )
 """Exceptions of zipfile and numpy for malformed bytes."""
 
@@ -78,12 +89,11 @@ def load_controller(path: Path) -> Controller:
 def controller_bytes(controller: Controller) -> bytes:
     """Returns a controller as the bytes of an ``.npz`` file; equal controllers, equal bytes."""
     design = controller.design
-    number = KINDS[design.name][1]
     arrays: dict[str, NDArray[Any]] = {
         "kind": np.array(design.name),
         "sensors": np.array(design.sensors, dtype=np.str_),
         "motors": np.array(design.motors, dtype=np.str_),
-        number: np.array(getattr(design, number)),
+        **_own_arrays(design),
         "genome": controller.genome,
     }
     if any(one != PAPER_RANGE for one in design.ranges):
@@ -95,23 +105,105 @@ def controller_bytes(controller: Controller) -> bytes:
 
 def parse_controller(data: bytes, source: str) -> Controller:
     """Returns the controller of bytes that ``controller_bytes`` made; errors name the source."""
+    return _parsed(data, source, (*KINDS, Policy.name, Compensated.name))
+
+
+def _parsed(data: bytes, source: str, known: Sequence[str]) -> Controller:
+    """Returns a controller of one of some kinds."""
     what = "a controller (.npz with the arrays kind, sensors, motors, genome and a design's own)"
     with npz_errors(source, what):
         arrays = read_arrays(data, MAX_CONTROLLER_BYTES)
         kind = str(arrays.get("kind", "network"))
-        if kind not in KINDS:
-            raise ValueError(f"expected the kind {' or '.join(map(repr, KINDS))}, got {kind!r}")
-        design, number, code = KINDS[kind]
-        expected = {"kind": "U0", "sensors": "U1", "motors": "U1", number: f"{code}0"}
+        if kind not in known:
+            raise ValueError(f"expected the kind {' or '.join(map(repr, known))}, got {kind!r}")
+        expected = {"kind": "U0", "sensors": "U1", "motors": "U1", **_own_types(kind, arrays)}
         expected |= {"genome": "f1"} | ({"ranges": "f2"} if "ranges" in arrays else {})
         check_types(arrays, expected, lambda array: f"{array.dtype.kind}{array.ndim}")
         for name, array in arrays.items():
-            if array.dtype.kind == "f" and array.dtype != np.float64:
+            wide = array.dtype == np.float64 or name.startswith(_TENSOR)
+            if array.dtype.kind == "f" and not wide:
                 raise ValueError(f"its {name} is {array.dtype}, expected float64")
         sensors, motors = (tuple(arrays[name].tolist()) for name in ("sensors", "motors"))
         ranges = tuple((c, half) for c, half in arrays.get("ranges", np.empty((0, 2))).tolist())
-        own = arrays[number].item()
-        return Controller(design(sensors, motors, own, ranges=ranges), arrays["genome"])
+        design = _design(kind, (sensors, motors), ranges, arrays, source)
+        return Controller(design, arrays["genome"])
+
+
+class _Content(msgspec.Struct, forbid_unknown_fields=True):
+    """The JSON of a policy: its operators in order, and its interface."""
+
+    input: str
+    output: str
+    inputs: int
+    outputs: int
+    nodes: tuple[Node, ...]
+    interface: Interface
+
+
+_TENSOR = "tensor/"
+"""Prefix of the names of a network's tensors."""
+
+
+def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
+    """Returns the arrays that only controllers of a design have."""
+    if isinstance(design, Policy):
+        graph = design.graph
+        ends = (graph.input, graph.output, graph.inputs, graph.outputs)
+        content = msgspec.json.encode(_Content(*ends, graph.nodes, design.interface))
+        tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
+        return {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
+    if isinstance(design, Compensated):
+        base = np.frombuffer(controller_bytes(design.base), dtype=np.uint8)
+        return {"base": base, "feedback": np.array(design.feedback)}
+    number = KINDS[design.name][1]
+    return {number: np.array(getattr(design, number))}
+
+
+def _narrow(tensor: FloatArray) -> NDArray[Any]:
+    """Returns a tensor in float32 if that changes no number: networks are trained in it."""
+    with np.errstate(over="ignore"):
+        narrow = tensor.astype(np.float32)
+    return narrow if np.array_equal(narrow, tensor) else tensor
+
+
+def _own_types(kind: str, arrays: Arrays) -> dict[str, str]:
+    """Returns the types and ranks of these arrays, for ``check_types``."""
+    if kind == Policy.name:
+        tensors = {
+            name: f"f{each.ndim}" for name, each in arrays.items() if name.startswith(_TENSOR)
+        }
+        return {"content": "u1", **tensors}
+    if kind == Compensated.name:
+        return {"base": "u1", "feedback": "b0"}
+    _, number, code = KINDS[kind]
+    return {number: f"{code}0"}
+
+
+def _design(
+    kind: str,
+    ends: tuple[tuple[str, ...], tuple[str, ...]],
+    ranges: Ranges,
+    arrays: Arrays,
+    source: str,
+) -> Design:
+    """Returns the design of a controller from its sensors, motors, ranges and own arrays."""
+    if kind == Policy.name:
+        content = msgspec.json.decode(arrays["content"].tobytes(), type=_Content)
+        tensors = {
+            name.removeprefix(_TENSOR): np.asarray(each, dtype=np.float64)
+            for name, each in arrays.items()
+            if name.startswith(_TENSOR)
+        }
+        sizes = content.inputs, content.outputs
+        graph = Graph(content.input, content.output, *sizes, content.nodes, tensors)
+        return Policy(*ends, ranges=ranges, graph=graph, interface=content.interface)
+    if kind == Compensated.name:
+        # Without a layer, which could have another within, and so on.
+        base = _parsed(arrays["base"].tobytes(), source, (*KINDS, Policy.name))
+        feedback = bool(arrays["feedback"])
+        return Compensated(*ends, ranges=ranges, base=base, feedback=feedback)
+    design, number, _ = KINDS[kind]
+    return design(*ends, arrays[number].item(), ranges=ranges)
 
 
 # ---------------------------------------------------------------- archives of arrays

@@ -18,7 +18,7 @@ from selfmodel.logs.messages import WORLD, Part, transforms
 from selfmodel.robot.motion import POSE, Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer
-from selfmodel.trials.rotation import product, rotated
+from selfmodel.rotation import product, rotated
 
 _JOINTS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",

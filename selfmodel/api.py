@@ -308,10 +308,11 @@ def recover(
     kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
+    gait: Controller | None = None,
     calibrate: bool = True,
     next_trial: recovery_loop.NextTrial = recovery_loop.by_repair,
     score: Score | None = None,
-    repair: str = plugins.ROBUST,
+    repair: str | None = None,
     search: str | None = None,
     repertoire: Repertoire | str | Path | None = None,
     seed: int = 0,
@@ -345,12 +346,13 @@ def recover(
             separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
+        gait: Controller with which the robot walks, such as its policy; evolved if not given.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
         score: Fitness of the repair; by default the forward displacement until the first fall, or
             the whole displacement for the paper's repair.
-        repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
-            simulation.
+        repair: ``robust``, on rollouts under random conditions; ``paper``, in one exact
+            simulation; or ``compensate``, of a layer around ``gait``, the default with one.
         search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair, CMA-ES or the
             paper's EA, or the repertoire if one is given.
         repertoire: Gaits from which the search begins, or the path of their file.
@@ -365,10 +367,11 @@ def recover(
     """
     arguments.check_seed(seed)
     robot, count = arguments.robot_of(robot), thread_count(threads)
-    score = score or (UPRIGHT if repair == plugins.ROBUST else DISPLACEMENT)
+    score = score or (DISPLACEMENT if repair == plugins.PAPER else UPRIGHT)
     check_measurable(score, robot, observed_of(healthy, damaged))
     chosen, searched = settings or Settings(), arguments.kinds_of(kinds)
     drawn = plugins.design(design, robot) if isinstance(design, str) else design
+    repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
     journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
     return recovery_loop.RecoveryLoop(
@@ -379,6 +382,7 @@ def recover(
         settings=chosen,
         seed=seed,
         on_event=on_event,
+        gait=gait,
         design=drawn,
         kinds=searched,
         calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event, known={})

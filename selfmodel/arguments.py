@@ -7,10 +7,14 @@ from functools import partial
 from pathlib import Path
 from types import UnionType
 
+import numpy as np
+
 from selfmodel import plugins
 from selfmodel.comparators import PREFERENCE
+from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
+from selfmodel.controllers.policy import Policy
 from selfmodel.diagnosis.choice import ComparatorChoice, chosen_comparator
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError
@@ -19,10 +23,12 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.files import encodable, file_digest, read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
+from selfmodel.logs.policies import read_policy
 from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.progress import Observer, ignore
 from selfmodel.recovery.repertoire import Repertoire
+from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.mjcf.load import check_compiles, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
@@ -359,7 +365,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
 
 
 def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Controller:
-    """Returns the controller in a ``.npz`` file or in a trial's log.
+    """Returns the controller in a ``.npz`` file, in a trial's log, or in a policy file, ``.toml``.
 
     Args:
         path: The file.
@@ -369,6 +375,10 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
     Raises:
         InputError: The file contains no controller, or one that does not fit.
     """
+    if path.suffix.lower() == ".toml":
+        policy = read_policy(path, robot)
+        _check_neurons(path, policy, neurons)
+        return Controller(policy, np.zeros(policy.weights))
     with _log_errors_as_input_errors():
         is_log = path.suffix.lower() == ".mcap"
         loaded = read_log(path).trial.plan.controller if is_log else load_controller(path)
@@ -378,6 +388,17 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
             f"selfmodel ran, or a .npz file"
         )
     found = loaded.design
+    if found.name not in DESIGNS:
+        names = robot.anatomy.names
+        _check_neurons(path, found, neurons)
+        if (found.sensors, found.motors) == (names.sensors, names.motors):
+            check_robot(found, robot, path)
+            return loaded
+        raise InputError(
+            f"{path} has a controller for {_connections(found)}; this robot has the sensors "
+            f"{', '.join(names.sensors)} and the motors {', '.join(names.motors)}: give a "
+            f"controller of this robot"
+        )
     needed = DESIGNS[found.name](robot, (found.hidden or None) if neurons is None else neurons)
     got, expected = map(_connections, (found, needed))
     if got != expected:
@@ -386,6 +407,31 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
             f"controller of this robot"
         )
     return loaded
+
+
+def check_robot(design: Design, robot: Robot, path: Path) -> None:
+    """Checks that a policy, or that in a layer, is of a robot of this command range and time step.
+
+    Raises:
+        InputError: It is of another one.
+    """
+    inner = design.base.design if isinstance(design, Compensated) else design
+    own = inner.interface if isinstance(inner, Policy) else None
+    if design.ranges == command_ranges(robot.model) and (
+        own is None or (own.hinges, own.timestep) == (robot.anatomy.hinges, robot.control_timestep)
+    ):
+        return
+    raise InputError(
+        f"{path} has {design.description} of a robot with other joints, another command range or "
+        f"time step: give the settings of that robot with --set, or a policy file (.toml)"
+    )
+
+
+def _check_neurons(path: Path, design: Design, neurons: int | None) -> None:
+    if neurons is not None and neurons != design.hidden:
+        raise InputError(
+            f"{path} has {design.description}, got --neurons {neurons}: leave --neurons out"
+        )
 
 
 def _connections(design: Design) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from selfmodel.comparators import COMPARATORS
-from selfmodel.controllers.controller import Design
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.evolution import Evolution
@@ -22,11 +22,15 @@ from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
 from selfmodel.recovery.repair import (
+    LAYER_CONDITIONS,
+    LAYER_COST,
     MakeRepair,
     MakeSearch,
     RepairSearch,
     RobustRepair,
+    around_identity,
     from_repertoire,
+    layered,
 )
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import DISPLACEMENT, SCORES, TRACKING, UPRIGHT, Score, checked
@@ -39,11 +43,12 @@ NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
 )
 """Choices of the next trial of a recovery, by name."""
 
-ROBUST, PAPER = "robust", "paper"
-"""Names of the repairs: on rollouts under random conditions, and in one exact simulation."""
+ROBUST, PAPER, COMPENSATE = "robust", "paper", "compensate"
+"""Names of the repairs: on rollouts under random conditions, in one exact simulation, and of a
+layer around a known controller on rollouts under random conditions."""
 
 DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
-    {ROBUST: UPRIGHT.name, PAPER: DISPLACEMENT.name}
+    {ROBUST: UPRIGHT.name, COMPENSATE: UPRIGHT.name, PAPER: DISPLACEMENT.name}
 )
 """Name of the score of each repair, unless another is given."""
 
@@ -86,15 +91,15 @@ def repair(
     """Returns a function that makes a repair.
 
     Args:
-        name: ``robust`` or ``paper``.
+        name: ``robust``, ``paper`` or ``compensate``.
         search: Name of one of ``SEARCHES``, or ``repertoire``; None as for ``search_name``.
         repertoire: Gaits from which the search ``repertoire`` begins.
 
     Raises:
-        InputError: A name is unknown, the paper's repair is to have another search, or a repertoire
-            is given without the search that needs it, or the search without a repertoire.
+        InputError: A name is unknown, another repair than the robust one is to have another search,
+            a repertoire is given without the search that needs it, or that without a repertoire.
     """
-    check_known("repair", name, (ROBUST, PAPER))
+    check_known("repair", name, DEFAULT_SCORES)
     chosen = search_name(name, search, repertoire)
     check_known("search", chosen, (*SEARCHES, REPERTOIRE))
     if (chosen == REPERTOIRE) != (repertoire is not None):
@@ -110,8 +115,50 @@ def repair(
                 f"--repertoire out, or give --repair {ROBUST}"
             )
         return RepairSearch
+    if name == COMPENSATE:
+        if chosen != "cma-es":
+            raise InputError(
+                f"the repair {COMPENSATE} has CMA-ES from the known controller, got the search "
+                f"{chosen}: leave --search and --repertoire out, or give --repair {ROBUST}"
+            )
+        return partial(
+            RobustRepair,
+            make_search=around_identity,
+            conditions=LAYER_CONDITIONS,
+            cost=LAYER_COST,
+        )
     make_search = SEARCHES[chosen] if repertoire is None else from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
+
+
+def repaired_around(
+    repair: str | None, design: Design, gait: Controller | None
+) -> tuple[str, Design, Controller | None]:
+    """Returns the name of a repair, the design that it evolves, and the controller it begins from.
+
+    Args:
+        repair: Name of the repair; None for ``compensate`` with a known controller, or ``robust``.
+        design: Design of the controllers to evolve without a layer.
+        gait: Known controller of the robot; None to evolve the first one.
+
+    Raises:
+        InputError: A layer is to be evolved around no controller, or a policy without a layer.
+    """
+    name = repair or (ROBUST if gait is None else COMPENSATE)
+    if name != COMPENSATE:
+        if not design.weights:
+            raise InputError(
+                f"the repair {name} evolves the weights of a controller, got "
+                f"{design.description}: leave the repair out, for a layer around it"
+            )
+        return name, design, gait
+    if gait is None:
+        raise InputError(
+            f"the repair {name} needs a controller that walks, got the design {design.name}: give "
+            f"--controller FILE, a policy file, a .npz or a log; in Python gait="
+        )
+    inner = layered(gait)
+    return name, inner.design, inner
 
 
 def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
@@ -120,7 +167,7 @@ def search_name(repair: str, search: str | None, repertoire: Repertoire | None) 
         return search
     if repertoire is not None:
         return REPERTOIRE
-    return "cma-es" if repair == ROBUST else "ea"
+    return "ea" if repair == PAPER else "cma-es"
 
 
 def kinds(names: str) -> tuple[FaultKind, ...]:

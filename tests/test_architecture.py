@@ -20,7 +20,8 @@ ROOMS = (
 are a file: plug-ins, arguments, the public functions, and contract checks."""
 
 VOCABULARY = (
-    *("arrays", "errors", "files", "isolation", "settings", "evolution", "progress", "version"),
+    *("arrays", "errors", "files", "isolation", "settings", "evolution", "progress", "rotation"),
+    "version",
 )
 """The files beside the rooms, which every room may import."""
 

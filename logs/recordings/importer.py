@@ -22,8 +22,8 @@ from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.logs.records import Imported, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import rotated
 from selfmodel.settings import Settings
-from selfmodel.trials.rotation import rotated
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, samples_of
 from selfmodel.trials.trial import TrialPlan

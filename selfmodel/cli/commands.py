@@ -118,7 +118,7 @@ class Recover(Robot):
     next_trial: str = "repair"
     controller: str = "network"
     neurons: int | None = None
-    repair: str = "robust"
+    repair: str | None = None
     search: str | None = None
     repertoire: Path | None = None
     score: str | None = None

@@ -18,7 +18,7 @@ from selfmodel.cli.commands import Recover, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import displacement_text, display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
-from selfmodel.controllers.controller import check_silent_neurons
+from selfmodel.controllers.controller import Controller, Design, check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.errors import counted
@@ -80,24 +80,26 @@ def experiment_of(options: Recover) -> Experiment:
     kinds = plugins.kinds(options.kinds)
     damage = inputs.case_notation(entry.cases, options.case, options.damage)
     robot = entry.robot()
-    design = plugins.design(options.controller, robot, options.neurons)
+    design, gait = _controllers(options, robot)
+    repair, design, gait = plugins.repaired_around(options.repair, design, gait)
     truth = HypothesisSpace(robot.anatomy, kinds).parse(damage)
     check_silent_neurons(design, silent_neurons(truth))
     gaits = arguments.repertoire_of(options.repertoire, robot, design)
-    plugins.repair(options.repair, options.search, gaits)
+    plugins.repair(repair, options.search, gaits)
     plugins.check_known("choice of the next trial", options.next_trial, plugins.NEXT_TRIAL)
     score = choose_score(
-        options.score or plugins.DEFAULT_SCORES[options.repair],
+        options.score or plugins.DEFAULT_SCORES[repair],
         entry,
         design,
         steps=options.steps,
         seed=options.seed,
         reference=options.reference,
+        gait=gait,
         max_speed=options.max_joint_speed,
         max_torque=options.max_joint_torque,
         max_self_collision=options.max_self_collision,
     )
-    if score.gait is not None:
+    if score.gait is not None and gait is None:
         print_notes(
             f"note: no --reference is given, so the robot is to repeat the motion of its first "
             f"controller, a {design.name} with random weights: the {score.score.name} before the "
@@ -122,10 +124,18 @@ def experiment_of(options: Recover) -> Experiment:
         gait=score.gait,
         score=score.score,
         physical=entry.physical,
-        repair=options.repair,
+        repair=repair,
         search=options.search,
         repertoire=gaits,
     )
+
+
+def _controllers(options: Recover, robot: Robot) -> tuple[Design, Controller | None]:
+    """Returns the design of the controllers to evolve, and a known controller in a file."""
+    if not Path(options.controller).suffix:
+        return plugins.design(options.controller, robot, options.neurons), None
+    gait = arguments.read_controller(Path(options.controller), robot, options.neurons)
+    return gait.design, gait
 
 
 def _described(robot: Robot, score: Score, trial: Trial) -> str:

@@ -23,8 +23,8 @@ from selfmodel.cli.replay import ReplayedLog, replayed_log
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.files import replace_file
 from selfmodel.robot import motion
+from selfmodel.rotation import rotated
 from selfmodel.simulation.trial_replay import Replay
-from selfmodel.trials.rotation import rotated
 
 HOST, PORT = "127.0.0.1", View.port
 """Address of the viewer: Rerun's own port, on this computer alone."""

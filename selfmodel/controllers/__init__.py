@@ -1,4 +1,4 @@
-"""Command sources of a robot: controllers (network, CPG) and playbacks of recorded commands."""
+"""Command sources of a robot: controllers (network, CPG, policy, layer), and recorded commands."""
 
 import lazy_loader
 

@@ -1,3 +1,4 @@
+from .compensation import Compensated as Compensated
 from .controller import (
     CommandSource as CommandSource,
     Controller as Controller,
@@ -7,3 +8,4 @@ from .controller import (
 from .cpg import Cpg as Cpg
 from .network import Network as Network
 from .playback import Playback as Playback
+from .policy import Policy as Policy

@@ -1,6 +1,7 @@
 """Controllers: a design, such as a network or a CPG, with the genome that sets its weights.
 
-Each design is one file: ``network.py``, ``cpg.py``. A further design needs four changes: its file
+Each design is one file: ``network.py``, ``cpg.py``, ``policy.py``, and ``compensation.py`` around
+another. A further design needs four changes: its file
 with a ``Design`` and a ``ControllerBatch``, its row in ``selfmodel.robot.designs.DESIGNS`` (the
 names on the command line), its row in ``selfmodel.logs.controllers.KINDS`` (the arrays of its
 ``.npz`` file: one number of its own), and its name on the help page, ``cli/options.toml``.
@@ -9,7 +10,7 @@ names on the command line), its row in ``selfmodel.logs.controllers.KINDS`` (the
 import math
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence, Set as AbstractSet
+from collections.abc import Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
@@ -38,9 +39,11 @@ class ControllerBatch(Protocol):
 
     Attributes:
         readings: Sensor readings, ``(n, sensors)``; the caller writes them before each step.
+        observed: Other signals that the controllers observe, ``(n, width)`` each; likewise.
     """
 
     readings: FloatArray
+    observed: Mapping[str, FloatArray]
 
     def step(self, targets: FloatArray) -> None:
         """Writes the commands of the next control step, ``(n, motors)``, given ``readings``."""
@@ -83,6 +86,16 @@ class Design(ABC):
     def hidden(self) -> int:
         """Number of hidden neurons; 0 for a design without neurons."""
         return 0
+
+    @property
+    def observes(self) -> tuple[str, ...]:
+        """Signals that it observes besides the readings."""
+        return ()
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """Command of each motor about which it moves: the centre of its range."""
+        return tuple(centre for centre, _ in self.ranges)
 
     @property
     @abstractmethod

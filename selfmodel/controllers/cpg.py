@@ -10,7 +10,7 @@ quadruped locomotion* (ICRA 2008).
 """
 
 import math
-from collections.abc import Sequence, Set as AbstractSet
+from collections.abc import Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -135,6 +135,7 @@ class CpgBatch:
         self._phase = np.zeros(len(decoded))
         self._step = 0
         self.readings = np.zeros((len(decoded), len(cpg.sensors)))
+        self.observed: Mapping[str, FloatArray] = {}
 
     def step(self, targets: FloatArray) -> None:
         """Writes the commands of the next control step; see ``ControllerBatch``."""

@@ -1,6 +1,6 @@
 """Recurrent network: the paper's controller design."""
 
-from collections.abc import Sequence, Set as AbstractSet
+from collections.abc import Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -87,6 +87,7 @@ class NetworkBatch:
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]
+        self.observed: Mapping[str, FloatArray] = {}
         self._hidden = self._inputs[:, sensors:-1]
         self._outputs = self._inputs[:, sensors:]
 

@@ -1,6 +1,6 @@
 """Playback of recorded commands, for a robot whose controller is unknown."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +69,7 @@ class PlaybackBatch:
         self._commands = [playback.commands for playback in playbacks]
         self._step = 0
         self.readings = np.zeros((len(playbacks), sensors))
+        self.observed: Mapping[str, FloatArray] = {}
 
     def step(self, targets: FloatArray) -> None:
         """Writes the commands of the next control step; see ``ControllerBatch``."""

@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.trials.rotation import rotated
+from selfmodel.rotation import rotated
 
 if TYPE_CHECKING:
     from mujoco import MjSpec

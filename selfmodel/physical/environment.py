@@ -224,6 +224,7 @@ class EnvironmentRobot:
         # The readings are required of a controller; of a playback, only that some signal arrives.
         needed = {signal for limit in self.limits for signal in limit.signals}
         needed |= set() if isinstance(controller, Playback) else {"sensors"}
+        needed |= {signal for signal in SIGNALS if signal in controllers.observed}
         missing_steps: dict[Signal, IndexArray] = {
             signal: np.zeros(names.width(signal), dtype=np.intp)
             for signal in SIGNALS
@@ -249,7 +250,13 @@ class EnvironmentRobot:
             self._check(k, values, missing=timing.missing)
             readings = values["sensors"]
             np.copyto(controllers.readings[0], readings, where=~np.isnan(readings))
+            for signal in SIGNALS:
+                if signal in controllers.observed:
+                    value = values[signal]
+                    np.copyto(controllers.observed[signal][0], value, where=~np.isnan(value))
             controllers.step(commands)
+            if not np.isfinite(commands).all():  # of a network that divides by 0, for example
+                raise TrialError(f"the controller's commands are not finite at step {k}")
             values["commands"] = commands[0].copy()
             yield Sample(k * timestep, values, timing)
 
@@ -273,7 +280,7 @@ class EnvironmentRobot:
         columns = np.array(self.robot.anatomy.names.columns(signal))
         if lacking := ", ".join(columns[missing_steps > patience]):
             if signal != "sensors":
-                lacking = f"{signal} ({lacking}), which a limit requires,"
+                lacking = f"{signal} ({lacking}), which a limit or the controller requires,"
             raise TrialError(f"no reading of {lacking} for more than {patience} steps, at step {k}")
 
     def _check(self, k: int, values: Mapping[Signal, FloatArray], *, missing: bool) -> None:

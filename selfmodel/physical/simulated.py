@@ -1,7 +1,7 @@
 """Simulated physical robot: hidden faults, a reality gap with noise, and debris of lost limbs."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 import mujoco
@@ -13,12 +13,12 @@ from selfmodel.errors import TrialError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import BROKEN
-from selfmodel.robot.anatomy_reader import joint_limits
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import BASE_SIGNALS
 from selfmodel.simulation.domain import (
     dead_sensors,
+    joint_half_ranges,
     randomize_initial_pose,
     rotated_by_vector,
     start_spread,
@@ -62,7 +62,7 @@ class NoisyMeasurement(Measurement):
 
     An angle reading has normal noise with a standard deviation of ``level`` (half of the range is a
     reading of 1). A touch reading is flipped with a probability of ``level / 2``. A dead sensor
-    reads exactly 0. Logged joint positions have noise independent of the readings.
+    reads exactly 0. Logged signals have noise independent of what the controller observes.
     """
 
     def __init__(
@@ -71,10 +71,7 @@ class NoisyMeasurement(Measurement):
         self._level, self._rng = level, rng
         self._dead = dead_sensors(robot.anatomy, variant)
         self._touch = np.array([sensor.kind == "touch" for sensor in robot.anatomy.sensors])
-        hinges = [robot.model.joint(name).id for name in robot.anatomy.hinges]
-        # MuJoCo leaves the range of an unlimited hinge in degrees, if the MJCF is in degrees.
-        ranges = [joint_limits(robot.model, hinge) for hinge in hinges]
-        self._half_ranges = np.array([(high - low) / 2 for low, high in ranges])
+        self._half_ranges = joint_half_ranges(robot)
 
     def corrupt_readings(self, readings: FloatArray) -> None:
         """Adds noise to the readings."""
@@ -153,17 +150,24 @@ class SimulatedRobot:
             randomize_initial_pose(robot, data, start_spread(gap.level), rng)
             place_debris(variant.model, data, self._limbs)
             start = data.qpos[np.newaxis]
+        # The pose of a fixed base is known, so no sensor measures it.
+        known = BASE_SIGNALS if robot.has_fixed_base else ()
+
+        def disturb(readings: FloatArray, observed: Mapping[str, FloatArray]) -> None:
+            measurement.corrupt_readings(readings[0])
+            for signal in SIGNALS:
+                if signal in observed and signal not in known:
+                    observed[signal][0] = measurement.measure(signal, observed[signal][0])
+
         rollout = Rollout(
             robot,
             [variant],
             [controller],
             SIGNALS,
             start=start,
-            disturb=lambda readings: measurement.corrupt_readings(readings[0]),
+            disturb=disturb,
             added_delay=0 if gap is None else gap.delay,
         )
-        # The pose of a fixed base is known, so no sensor measures it.
-        known = BASE_SIGNALS if robot.has_fixed_base else ()
         for k in rollout.steps(steps):
             if rollout.diverged()[0]:
                 raise TrialError(

@@ -52,6 +52,9 @@ class CmaEs:
         length, draw, settings, rng, seeds: As of ``Evolution``; all seeds are used.
         share: Size of the first generation, relative to the population of the paper's EA.
         deviation: Standard deviation of the first generation of a run from a random genome.
+        seed_deviation: Likewise from a seed.
+        starts: Number of runs that start.
+        population: Genomes of a generation of a run; None for a share of the EA's population.
     """
 
     def __init__(
@@ -64,10 +67,14 @@ class CmaEs:
         *,
         share: float = RANDOM_SHARE,
         deviation: float = DEVIATION,
+        seed_deviation: float = SEED_DEVIATION,
+        starts: int = STARTS,
+        population: int | None = None,
     ) -> None:
-        self._rng, self._deviation, self._seeds = rng, deviation, len(seeds)
-        self._population = max(MIN_POPULATION, round(SHARE * settings.population))
-        size = max(STARTS + len(seeds), round(share * settings.population))
+        self._rng, self._deviations, self._seeds = rng, (seed_deviation, deviation), len(seeds)
+        self._starts = starts
+        self._population = population or max(MIN_POPULATION, round(SHARE * settings.population))
+        size = max(starts + len(seeds), round(share * settings.population))
         self._asked = first_generation(size, length, draw, rng, seeds)
         self._runs: list[_Run] = []
         self.generation = 0
@@ -91,7 +98,7 @@ class CmaEs:
                 run.tell(*values)
             if self.generation in PRUNED_AFTER:
                 order = sorted(self._runs, key=lambda run: -run.recent_fitness)
-                self._runs = order[: len(order) // 2]
+                self._runs = order[: max(1, len(order) // 2)]
         self.generation += 1
         self.evaluations += len(fitness)
         self._asked = np.concatenate([run.ask() for run in self._runs])
@@ -99,9 +106,10 @@ class CmaEs:
     def _started(self, fitness: FloatArray) -> list["_Run"]:
         """Returns the runs from the best seeds and the best random genomes."""
         order = np.argsort(-fitness, kind="stable")
-        seeds = order[order < self._seeds][: STARTS // 2]
-        random = order[order >= self._seeds][: STARTS - len(seeds)]
-        starts = [(i, SEED_DEVIATION) for i in seeds] + [(i, self._deviation) for i in random]
+        seeds = order[order < self._seeds][: max(1, self._starts // 2)]
+        random = order[order >= self._seeds][: self._starts - len(seeds)]
+        of_seed, of_random = self._deviations
+        starts = [(i, of_seed) for i in seeds] + [(i, of_random) for i in random]
         return [
             _Run(self._asked[i], deviation, self._population, self._rng) for i, deviation in starts
         ]

@@ -6,7 +6,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.rotation import directions
+from selfmodel.rotation import directions
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 

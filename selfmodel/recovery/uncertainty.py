@@ -19,6 +19,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import directions
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.domain import DomainDistribution, DomainSample, StartSpread, draw_samples
@@ -26,7 +27,6 @@ from selfmodel.simulation.model_factors import LogNormal, Weighted, exact
 from selfmodel.simulation.rollout import batch_bytes
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import encoder_noise
-from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import Trial
 

@@ -10,7 +10,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.robot.actuators import ancestors, has_feedback, motor_bodies, motor_joints
 from selfmodel.robot.anatomy import Anatomy, Joint, Sensor
-from selfmodel.trials.rotation import product, rotated
+from selfmodel.rotation import product, rotated
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)

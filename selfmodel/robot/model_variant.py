@@ -2,7 +2,7 @@
 
 Edits keep the layout of the model, so that all hypotheses share one batch: a detached limb stays in
 the model without mass and contacts, a welded joint stays as a joint of near-infinite inertia.
-``selfmodel.trials.rotation`` rotates whole trajectories; its results differ in the last bits from
+``selfmodel.rotation`` rotates whole trajectories; its results differ in the last bits from
 those of MuJoCo's functions, which are used here.
 """
 

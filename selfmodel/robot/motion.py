@@ -13,7 +13,7 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray, held
 from selfmodel.robot.contacts import touching_geoms
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer, with_known_base
-from selfmodel.trials.rotation import rotated
+from selfmodel.rotation import rotated
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Trajectory
 

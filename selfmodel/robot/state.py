@@ -15,8 +15,8 @@ from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.anatomy_reader import joints_of_body, reference_pose
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import product, rotated
 from selfmodel.trials.estimation import with_joint_velocities
-from selfmodel.trials.rotation import product, rotated
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial

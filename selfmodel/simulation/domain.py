@@ -6,7 +6,7 @@ approximately.
 Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,10 +17,19 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy_reader import joint_limits
 from selfmodel.robot.model_variant import WELD_ARMATURE, ModelVariant
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import bind_data, current_value, signal_fields, state_writer
+from selfmodel.robot.state import (
+    BASE_SIGNALS,
+    bind_data,
+    current_value,
+    signal_fields,
+    state_writer,
+)
+from selfmodel.rotation import product
 from selfmodel.simulation.model_factors import ModelDistribution, Parameters, model_with_parameters
+from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS
 
 ANGLE_DEVIATION, TILT_DEVIATION = 0.2, 0.1
 """Standard deviations of the initial joint angles, and of the initial roll and pitch of the base,
@@ -196,32 +205,61 @@ def rotated_by_vector(orientation: FloatArray, vector: FloatArray) -> FloatArray
     return result
 
 
-def reading_noise(
-    anatomy: Anatomy,
+def measurement_noise(
+    robot: Robot,
     variants: Sequence[ModelVariant],
     conditions: Sequence[DomainSample],
     uncertainty: DomainDistribution,
-) -> Callable[[FloatArray], None]:
-    """Returns a function that adds the noise of the next step to readings, ``(runs, sensors)``.
+) -> Callable[[FloatArray, Mapping[str, FloatArray]], None]:
+    """Returns a function that adds the noise of the next step to what controllers observe.
 
-    The noise of a condition is the same in all its runs (common random numbers); dead sensors have
-    none. The runs of the conditions are in turn in each group of adjacent rows.
+    These are readings, ``(runs, sensors)``, and other signals, ``(runs, width)`` each, whose level
+    of noise is the largest of the readings'. The noise of a condition is the same in all its runs
+    (common random numbers); dead sensors have none. The runs of the conditions are in turn in each
+    group of adjacent rows.
     """
+    anatomy = robot.anatomy
     silent = np.array([dead_sensors(anatomy, variant) for variant in variants])
     generators = [np.random.default_rng((own.seed or 0, 1)) for own in conditions]
     deviations = np.where(silent, 0.0, uncertainty.reading_noise)
     wrong_touches = np.where(silent, 0.0, uncertainty.wrong_touches)
     count, sensors = silent.shape
+    level = float(uncertainty.reading_noise.max(initial=0.0))
+    of_signals = [np.random.default_rng((own.seed or 0, 2)) for own in conditions]
+    half_ranges = joint_half_ranges(robot)
+    # The pose of a fixed base is known, so no sensor measures it.
+    known = BASE_SIGNALS if robot.has_fixed_base else ()
 
-    def add(readings: FloatArray) -> None:
+    def add(readings: FloatArray, observed: Mapping[str, FloatArray]) -> None:
         by_condition = readings.reshape(len(readings) // count, count, sensors)
         uniform = np.array([rng.random(sensors) for rng in generators])
         normal = np.array([rng.standard_normal(sensors) for rng in generators])
         by_condition += deviations * normal
         wrong = uniform < wrong_touches
         by_condition[:, wrong] = 1 - by_condition[:, wrong]
+        for signal in SIGNALS if level else ():
+            if signal in observed and signal not in known:
+                rows = observed[signal]
+                joints = signal == "joint_positions"
+                scale = level * (half_ranges if joints else MEASUREMENT_FULL_SCALES[signal])
+                turned = signal == "base_orientation"
+                drawn = [rng.standard_normal(3 if turned else rows.shape[1]) for rng in of_signals]
+                noise = np.tile(scale * np.array(drawn), (len(rows) // count, 1))
+                if turned:
+                    turn = np.column_stack([np.ones(len(noise)), noise / 2])
+                    rows[:] = product(rows, turn / np.linalg.norm(turn, axis=1, keepdims=True))
+                else:
+                    rows += noise
 
     return add
+
+
+def joint_half_ranges(robot: Robot) -> FloatArray:
+    """Returns half the range of each hinge, ``(hinges,)``, rad: full scale of its position."""
+    hinges = [robot.model.joint(name).id for name in robot.anatomy.hinges]
+    # MuJoCo leaves the range of an unlimited hinge in degrees, if the MJCF is in degrees.
+    ranges = [joint_limits(robot.model, hinge) for hinge in hinges]
+    return np.array([(high - low) / 2 for low, high in ranges])
 
 
 def dead_sensors(anatomy: Anatomy, variant: ModelVariant) -> BoolArray:

@@ -4,7 +4,7 @@ The simulator and the simulated physical robot step the same rollout, so that th
 simulator's to the bit.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -23,8 +23,11 @@ from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import Bind, Reader, SensorReader, observed_fields
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
+
+Disturb = Callable[[FloatArray, Mapping[str, FloatArray]], None]
+"""Changes the readings, ``(n, sensors)``, and the other observed signals of a step in place."""
 
 
 @dataclass
@@ -170,8 +173,8 @@ class Rollout:
         threads: Threads of MuJoCo's steps.
         stats: Statistics that are updated.
         start: Initial generalised positions, ``(n, nq)``; None for the reference pose.
-        disturb: Changes the readings of each step before the controllers receive them,
-            ``(n, sensors)``.
+        disturb: Changes the readings of each step, ``(n, sensors)``, and the other signals that
+            the controllers observe, before they receive them.
         added_delay: Control delay in addition to that of the robot and its faults, control steps.
 
     Attributes:
@@ -192,7 +195,7 @@ class Rollout:
         threads: int = 1,
         stats: SimulationStats | None = None,
         start: FloatArray | None = None,
-        disturb: Callable[[FloatArray], None] = lambda _: None,
+        disturb: Disturb = lambda _readings, _observed: None,
         added_delay: int = 0,
     ) -> None:
         self._stats = SimulationStats() if stats is None else stats
@@ -202,6 +205,8 @@ class Rollout:
         self._reader = SensorReader(model, robot.anatomy, variants)
         silent = [variant.silent_neurons for variant in variants]
         self._controllers = make_batch(drivers, silent, sensors)
+        observes = [signal for signal in SIGNALS if signal in self._controllers.observed]
+        self._observe = live_signals(robot, batch.bind, variants, observes)
         self._sensordata, self._qpos = batch.bind("sensordata"), batch.bind("qpos")
         whole, self._part = split_delay(robot.control_delay, robot.substeps)
         added = [
@@ -236,7 +241,9 @@ class Rollout:
                         self._command(k)
                     self._batch.step(self._substeps - self._part)
             self._reader.read(self._sensordata, self._qpos, self._controllers.readings)
-            self._disturb(self._controllers.readings)
+            for signal, value in self._observe.items():
+                self._controllers.observed[signal][:] = value()
+            self._disturb(self._controllers.readings, self._controllers.observed)
             self._controllers.step(self._commands)
             self._sent[k % len(self._sent)] = self._commands
             self._command(k)

@@ -18,13 +18,13 @@ from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import uncounted_warnings
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import bind_data, state_writer, with_known_base
+from selfmodel.rotation import directions
 from selfmodel.simulation import domain
 from selfmodel.simulation.prediction import predict
 from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.simulation.rollout import Rollout, SimulationResult, SimulationStats, batch_bytes
 from selfmodel.trials.estimation import STATE, estimated_states, known_steps
-from selfmodel.trials.rotation import directions
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Trajectory
 
@@ -152,7 +152,7 @@ class Simulator:
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            disturb=domain.reading_noise(robot.anatomy, variants, conditions, uncertainty),
+            disturb=domain.measurement_noise(robot, variants, conditions, uncertainty),
         )
         return flat.grouped(count, len(conditions))
 

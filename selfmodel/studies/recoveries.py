@@ -104,6 +104,11 @@ def repair_parameters(repair: str, search: str | None, score: str | None) -> dic
             f"give --search {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
             f"recover --repertoire FILE`"
         )
+    if repair == plugins.COMPENSATE:
+        raise InputError(
+            f"a study evolves its gaits, and has no controller to begin from, got --repair "
+            f"{repair}: give --repair {plugins.ROBUST} or {plugins.PAPER}"
+        )
     plugins.repair(repair, search)
     return {
         "repair": repair,

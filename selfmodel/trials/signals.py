@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.trials.rotation import directions, rotation_between
+from selfmodel.rotation import directions, rotation_between
 
 Signal = Literal[
     "sensors",

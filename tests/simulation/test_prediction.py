@@ -18,6 +18,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import rotation_between
 from selfmodel.simulation import prediction
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.prediction import activations, predict
@@ -25,7 +26,6 @@ from selfmodel.simulation.requests import END, MAX_CHAIN, WARM_UP, Segments, cha
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
-from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_motion

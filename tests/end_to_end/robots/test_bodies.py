@@ -25,6 +25,7 @@ from selfmodel.recovery.falls import first_falls
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import rotation_between
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.model_factors import nominal, with_parameters
@@ -32,7 +33,6 @@ from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import suite_bodies, walking
 from selfmodel.trials.estimation import BASE, STATE
-from selfmodel.trials.rotation import rotation_between
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan

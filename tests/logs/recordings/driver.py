@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.rotation import rotated
+from selfmodel.rotation import rotated
 from selfmodel.trials.trajectory import Trajectory
 from tests.logs.recordings.bags import T0, Item, joint_state, odometry, wrench, write_bag
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.trials.rotation import cross, rotation_between
+from selfmodel.rotation import cross, rotation_between
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:

@@ -1,0 +1,327 @@
+"""Policy files: a small TOML that names a network, what it observes and what it commands.
+
+::
+
+    network = "policy.onnx"        # beside this file; or an .npz of layers
+    preset = "mujoco_playground"   # terms and action of a framework; a key below replaces its own
+    velocity = [1.0, 0.0, 0.0]     # commanded: forward, to the left, m/s; turn to the left, rad/s
+    joints = ["FR_hip_joint"]      # in the order of the network; the robot's by default
+
+    [[observation]]
+    term = "joint_velocities"
+    scale = 0.05
+
+    [action]
+    scale = 0.5
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.graph import Graph, Node, layers
+from selfmodel.controllers.policy import Action, Interface, Policy, Term
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.files import load_toml, read_file
+from selfmodel.logs.controllers import MAX_CONTROLLER_BYTES, npz_errors, read_arrays
+from selfmodel.robot.actuators import command_ranges, holding_commands
+from selfmodel.robot.robot import Robot
+
+Number = Annotated[float, Meta(gt=-1e9, lt=1e9)]
+Numbers = Number | tuple[Number, ...]
+Count = Annotated[int, Meta(ge=1, le=1000)]
+Positive = Annotated[float, Meta(gt=0, lt=1e9)]
+
+
+class Section(Struct, forbid_unknown_fields=True, frozen=True):
+    """Table of the file."""
+
+
+class Observed(Section, frozen=True):
+    """A term of the observation; see ``selfmodel.controllers.policy.Term``."""
+
+    term: str
+    scale: Numbers = 1.0
+    offset: Numbers = 0.0
+
+
+class Commanded(Section, frozen=True):
+    """Targets from the output; see ``selfmodel.controllers.policy.Action``.
+
+    By default, the motors are the robot's, and the offset is their commands of the initial pose.
+    """
+
+    scale: Numbers | None = None
+    offset: Numbers | None = None
+    motors: tuple[str, ...] = ()
+    clip: Positive | None = None
+
+
+class PolicyFile(Section, frozen=True):
+    """The file; see ``selfmodel.controllers.policy.Policy``.
+
+    Attributes:
+        network: File of the network beside this one, ``.onnx`` or ``.npz``.
+        preset: Key of ``PRESETS``.
+        activation: Operator between the layers of an ``.npz``, ``last`` that after them.
+        pose: Positions of ``joints`` that count as 0, rad; the initial pose by default.
+        newest_first: Whether a history begins with the newest observation; ``by_term``, whether it
+            is stacked term by term.
+    """
+
+    network: str
+    preset: str = ""
+    activation: str = "Elu"
+    last: str = "Identity"
+    observation: tuple[Observed, ...] = ()
+    action: Commanded = Commanded()
+    joints: tuple[str, ...] = ()
+    pose: tuple[Number, ...] = ()
+    velocity: tuple[Number, ...] = (0.0, 0.0, 0.0)
+    history: Count = 1
+    by_term: bool = False
+    newest_first: bool = False
+    decimation: Count = 1
+    period: Positive | None = None
+
+
+def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
+    return tuple(Observed(term, scales.get(term, 1.0)) for term in terms)
+
+
+_LEGGED_GYM: Mapping[str, Numbers] = MappingProxyType(
+    {
+        "linear_velocity": 2.0,
+        "angular_velocity": 0.25,
+        "velocity": (2.0, 2.0, 0.25),
+        "joint_velocities": 0.05,
+    }
+)
+
+PRESETS: Mapping[str, tuple[tuple[Observed, ...], float, float]] = MappingProxyType(
+    {
+        "mujoco_playground": (
+            _terms(
+                *("linear_velocity", "angular_velocity", "gravity", "joint_positions"),
+                *("joint_velocities", "last_action", "velocity"),
+            ),
+            0.5,
+            1.0,
+        ),
+        "isaac_lab": (
+            _terms(
+                *("linear_velocity", "angular_velocity", "gravity", "velocity"),
+                *("joint_positions", "joint_velocities", "last_action"),
+            ),
+            0.5,
+            1.0,
+        ),
+        "legged_gym": (
+            _terms(
+                *("linear_velocity", "angular_velocity", "gravity", "velocity"),
+                *("joint_positions", "joint_velocities", "last_action"),
+                **_LEGGED_GYM,
+            ),
+            0.25,
+            1.0,
+        ),
+        "unitree_rl_gym": (
+            _terms(
+                *("angular_velocity", "gravity", "velocity", "joint_positions"),
+                *("joint_velocities", "last_action", "phase"),
+                **_LEGGED_GYM,
+            ),
+            0.25,
+            0.8,
+        ),
+    }
+)
+"""Terms of the observation, scale of the action, and period of the clock, s, by the framework that
+trains the policy."""
+
+
+def read_policy(path: Path, robot: Robot) -> Policy:
+    """Returns the policy of a robot that a TOML file describes.
+
+    Raises:
+        InputError: A file cannot be read or is invalid, or the policy does not fit the robot; the
+            message names the file and what does not fit.
+    """
+    what = "a policy file"
+    try:
+        text = read_file(path, what, 2**20).decode()
+        file = msgspec.convert(load_toml(text), PolicyFile)
+    except InputError:
+        raise
+    # No ValueError in msgspec 0.19.
+    except (ValueError, msgspec.ValidationError) as failure:
+        raise InputError(f"{path}: expected {what} as TOML: {failure}") from failure
+    if file.preset and file.preset not in PRESETS:
+        raise InputError(f"{path}: {unknown_name('preset', file.preset, PRESETS)}")
+    if Path(file.network).name != file.network:
+        raise InputError(
+            f"{path}: expected a network beside this file, got {file.network!r}: copy it here"
+        )
+    graph = read_network(path.parent / file.network, file.activation, file.last)
+    try:
+        return _policy(file, graph, robot)
+    except ValueError as failure:
+        raise InputError(f"{path} does not fit {robot.name}: {failure}") from failure
+
+
+def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
+    names, model = robot.anatomy.names, robot.model
+    terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
+    action = file.action
+    motors, joints = action.motors or names.motors, file.joints or names.hinges
+    known = {"motor": names.motors, "joint": names.hinges}
+    for what, chosen in (("motor", motors), ("joint", joints)):
+        for name in chosen:
+            if name not in known[what]:
+                raise unknown_name(what, name, known[what])
+    holding = dict(zip(names.motors, holding_commands(model).tolist(), strict=True))
+    initial = [float(model.qpos0[model.joint(name).qposadr[0]]) for name in joints]
+    given = scale if action.scale is None else action.scale
+    offset = [holding[name] for name in motors] if action.offset is None else action.offset
+    return Policy(
+        *(names.sensors, names.motors),
+        ranges=command_ranges(model),
+        graph=graph,
+        interface=Interface(
+            terms=tuple(
+                Term(each.term, _row(each.scale), _row(each.offset))
+                for each in file.observation or terms
+            ),
+            action=Action(
+                motors=motors,
+                scale=_row(given, len(motors)),
+                offset=_row(offset, len(motors)),
+                clip=action.clip,
+            ),
+            hinges=names.hinges,
+            joints=joints,
+            pose=file.pose or tuple(initial),
+            holding=tuple(holding.values()),
+            timestep=robot.control_timestep,
+            velocity=file.velocity,
+            history=file.history,
+            by_term=file.by_term,
+            newest_first=file.newest_first,
+            decimation=file.decimation,
+            period=file.period or period,
+        ),
+    )
+
+
+def _row(numbers: Numbers | Sequence[float], count: int = 1) -> tuple[float, ...]:
+    row = (numbers,) * count if isinstance(numbers, float | int) else numbers
+    return tuple(map(float, row))
+
+
+# ---------------------------------------------------------------- networks
+
+
+def read_network(path: Path, activation: str = "Elu", last: str = "Identity") -> Graph:
+    """Returns the network in an ``.onnx`` file, or in an ``.npz`` of layers.
+
+    Such an archive has the arrays ``weight0``, ``(outputs, inputs)``, ``bias0``, ``weight1`` and so
+    on.
+
+    Args:
+        path: The file.
+        activation: Operator between the layers of an ``.npz``, such as ``Elu``.
+        last: Operator after its last layer.
+
+    Raises:
+        InputError: The file cannot be read, or has another content; the message names the file.
+    """
+    data = read_file(path, "a network", MAX_CONTROLLER_BYTES)
+    if path.suffix.lower() == ".onnx":
+        return _of_onnx(data, path)
+    with npz_errors(str(path), "a network, as .onnx or as .npz of weight0, bias0, weight1, ..."):
+        arrays = read_arrays(data, MAX_CONTROLLER_BYTES)
+        count = len(arrays) // 2
+        if not count or arrays.keys() != {
+            f"{of}{k}" for of in ("weight", "bias") for k in range(count)
+        }:
+            raise ValueError(f"it holds {', '.join(sorted(arrays)) or 'nothing'}")
+        pairs = [(arrays[f"weight{k}"], arrays[f"bias{k}"]) for k in range(count)]
+        if any((w.ndim, b.ndim) != (2, 1) for w, b in pairs):
+            raise ValueError("expected weights of (outputs, inputs), and biases of (outputs,)")
+        return layers([(_numbers(w), _numbers(b)) for w, b in pairs], activation, last)
+
+
+def _numbers(array: np.ndarray) -> FloatArray:
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"expected numbers, got {array.dtype}")
+    return np.asarray(array, dtype=np.float64)
+
+
+def _of_onnx(data: bytes, path: Path) -> Graph:
+    try:
+        import onnx  # noqa: PLC0415  # optional
+        from google.protobuf.message import DecodeError  # noqa: PLC0415  # comes with onnx
+    except ImportError as error:
+        raise InputError(
+            f"{path} needs the package onnx, which is not installed: pip install 'selfmodel[onnx]'"
+        ) from error
+    try:
+        return _graph(onnx.load_model_from_string(data).graph)
+    except (ValueError, TypeError, IndexError, KeyError, DecodeError) as failure:
+        raise InputError(f"{path}: expected a network as ONNX: {failure}") from failure
+
+
+def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
+    from onnx import TensorProto, numpy_helper  # noqa: PLC0415  # optional
+
+    values = [(tensor.name, tensor) for tensor in network.initializer]
+    values += [
+        (node.output[0], attribute.t)
+        for node in network.node
+        for attribute in node.attribute
+        if node.op_type == "Constant" and attribute.name == "value"
+    ]
+    if any(tensor.data_location == TensorProto.EXTERNAL for _, tensor in values):
+        raise ValueError("its weights are in another file: export it with weights inside")
+    tensors = {name: _numbers(numpy_helper.to_array(tensor)) for name, tensor in values}
+    inputs = [each for each in network.input if each.name not in tensors]
+    if len(inputs) != 1 or not network.output:
+        raise ValueError(
+            f"expected one input and an output, got the inputs "
+            f"{', '.join(each.name for each in inputs) or 'none'}"
+        )
+    nodes = [_node(node, tensors) for node in network.node if node.op_type != "Constant"]
+    shapes = [each.type.tensor_type.shape.dim for each in (inputs[0], network.output[0])]
+    width, outputs = (int(shape[-1].dim_value) if len(shape) else 0 for shape in shapes)
+    if not width:
+        raise ValueError("its input has no fixed size: export it with one")
+    used = {name for node in nodes for name in node.inputs}
+    kept = {name: tensor for name, tensor in tensors.items() if name in used}
+    return Graph(inputs[0].name, network.output[0].name, width, outputs, tuple(nodes), kept)
+
+
+def _node(node: Any, tensors: dict[str, FloatArray]) -> Node:  # noqa: ANN401  # onnx is optional
+    """Returns an operator; a constant second factor is stored as its rows are summed."""
+    from onnx import helper  # noqa: PLC0415  # optional
+
+    attributes: dict[str, float | tuple[float, ...]] = {}
+    for attribute in node.attribute:
+        value = helper.get_attribute_value(attribute)
+        if isinstance(value, float | int):
+            attributes[attribute.name] = float(value)
+        elif isinstance(value, Sequence) and all(isinstance(one, float | int) for one in value):
+            attributes[attribute.name] = tuple(map(float, value))
+    operator, inputs = str(node.op_type), tuple(node.input)
+    is_product = operator in ("MatMul", "Gemm") and not attributes.get("transB")
+    if is_product and inputs[1] in tensors:
+        turned = f"{inputs[1]}.T"
+        tensors[turned] = np.ascontiguousarray(tensors[inputs[1]].T)
+        operator, inputs = "Gemm", (inputs[0], turned, *inputs[2:])
+        attributes["transB"] = 1.0
+    return Node(operator, inputs, tuple(node.output), tuple(sorted(attributes.items())))

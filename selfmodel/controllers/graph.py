@@ -1,0 +1,329 @@
+"""Feed-forward networks as graphs of operators, evaluated for many robots together.
+
+The operators are those of ONNX with its names, over rows: axis 0 of every value is that of the
+robots, and each row of a result is bit-identical for every number of rows. Arithmetic is in
+float64: against another evaluation, only the rounding of its float32 is left.
+"""
+
+import functools
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, frozen
+
+MAX_NODES = 1000
+"""Largest number of operators of a graph."""
+
+MAX_WIDTH = 2**20
+"""Largest number of numbers of a value, per row."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operator of a graph.
+
+    Attributes:
+        operator: Its name in ONNX, a key of ``OPERATORS``.
+        inputs: Names of its inputs: the graph's input, its tensors, or outputs of earlier nodes; ""
+            for an optional input that is left out.
+        outputs: Names of its outputs.
+        attributes: Its numbers by name, as sorted pairs.
+    """
+
+    operator: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    attributes: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """A network from one row of numbers to another; graphs of equal content are equal.
+
+    Attributes:
+        input: Name of the input, of ``inputs`` numbers a row.
+        output: Name of the output, of ``outputs`` numbers a row.
+        nodes: Operators, in the order of their evaluation.
+        tensors: Weights and constants by name; arrays of whole numbers are shapes and axes.
+
+    Raises:
+        ValueError: An operator is unknown, a value is used before it is computed or has another
+            shape, or a tensor has numbers that are not finite; the message names it.
+    """
+
+    input: str
+    output: str
+    inputs: int
+    outputs: int
+    nodes: tuple[Node, ...]
+    tensors: Mapping[str, FloatArray]
+
+    def __post_init__(self) -> None:
+        self._check_names()
+        for name, tensor in self.tensors.items():
+            if not np.isfinite(tensor).all():
+                raise ValueError(f"the tensor {name} has numbers that are not finite")
+        tensors = {name: frozen(tensor) for name, tensor in self.tensors.items()}
+        object.__setattr__(self, "tensors", MappingProxyType(tensors))
+        for rows in (1, 2):  # a tensor of two rows fits two robots alone
+            given, expected = (rows, self.inputs), (rows, self.outputs)
+            found = self(np.zeros(given)).shape  # raises ValueError
+            if found != expected:
+                raise ValueError(
+                    f"its output for inputs of {given} has the shape {found}, expected {expected}"
+                )
+
+    def _check_names(self) -> None:
+        if len(self.nodes) > MAX_NODES:
+            raise ValueError(f"it has {len(self.nodes)} operators, expected at most {MAX_NODES}")
+        known = {self.input, *self.tensors}
+        for node in self.nodes:
+            if node.operator not in OPERATORS:
+                raise ValueError(
+                    f"the operator {node.operator} is not supported, which are "
+                    f"{', '.join(sorted(OPERATORS))}"
+                )
+            if missing := [name for name in node.inputs if name and name not in known]:
+                raise ValueError(f"{missing[0]} is used by {node.operator} before it is computed")
+            for name, value in node.attributes:
+                if not np.isfinite(value).all():
+                    raise ValueError(f"the {name} of {node.operator} is not finite")
+            known |= set(node.outputs)
+        if self.output not in known:
+            raise ValueError(f"no operator computes the output {self.output}")
+
+    @np.errstate(all="ignore")  # the numbers of a simulation that diverged
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        """Returns the output of each row, ``(n, outputs)``, for rows of ``(n, inputs)``."""
+        values: dict[str, FloatArray] = {**self.tensors, self.input: rows}
+        for node in self.nodes:
+            arguments: list[Any] = [values[name] if name else None for name in node.inputs]
+            try:
+                results = _results(node, arguments, len(rows))
+            except (ValueError, IndexError, KeyError, TypeError) as error:
+                shapes = ", ".join(str(np.shape(one)) for one in arguments)
+                raise ValueError(f"{node.operator} of the shapes {shapes}: {error}") from error
+            values.update(zip(node.outputs, results, strict=False))
+        return values[self.output]
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Graph):
+            return NotImplemented
+        return self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the operators and the tensors."""
+        shape = [self.input, self.output, self.inputs, self.outputs]
+        nodes = [[n.operator, n.inputs, n.outputs, n.attributes] for n in self.nodes]
+        digest = hashlib.sha256(json.dumps([shape, nodes]).encode())
+        for name, tensor in sorted(self.tensors.items()):
+            digest.update(json.dumps([name, tensor.shape]).encode())
+            digest.update(tensor.tobytes())
+        return digest.hexdigest()
+
+    @property
+    def weights(self) -> int:
+        """Number of numbers in its tensors."""
+        return sum(tensor.size for tensor in self.tensors.values())
+
+
+def layers(
+    weights: Sequence[tuple[FloatArray, FloatArray]], activation: str, last: str = "Identity"
+) -> Graph:
+    """Returns the network of dense layers, each ``(outputs, inputs)`` and its bias ``(outputs,)``.
+
+    Args:
+        weights: Matrix and bias of each layer.
+        activation: Operator between two layers, such as ``Elu``.
+        last: Operator after the last layer.
+    """
+    nodes, tensors, value = list[Node](), dict[str, FloatArray](), "input"
+    for k, (matrix, bias) in enumerate(weights):
+        tensors |= {f"weight{k}": matrix, f"bias{k}": bias}
+        dense = Node("Gemm", (value, f"weight{k}", f"bias{k}"), (f"dense{k}",), (("transB", 1.0),))
+        end = k == len(weights) - 1
+        value = "output" if end else f"layer{k}"
+        nodes += [dense, Node(last if end else activation, (f"dense{k}",), (value,))]
+    inputs, outputs = weights[0][0].shape[1], weights[-1][0].shape[0]
+    return Graph("input", "output", inputs, outputs, tuple(nodes), tensors)
+
+
+def _results(node: Node, arguments: "Arguments", rows: int) -> Sequence[FloatArray]:
+    """Returns the outputs of an operator, at least as many as the node has."""
+    attributes = {"num_outputs": len(node.outputs), **dict(node.attributes)}
+    results = OPERATORS[node.operator](arguments, attributes)
+    if len(results) < len(node.outputs):
+        raise ValueError(f"{len(results)} outputs, expected {len(node.outputs)}")
+    if max(map(np.size, results)) > MAX_WIDTH * rows:
+        raise ValueError(f"more than {MAX_WIDTH} numbers in a row")
+    return results
+
+
+# ---------------------------------------------------------------- operators
+
+Arguments = Sequence[Any]
+Attributes = Mapping[str, Any]
+Operator = Callable[[Arguments, Attributes], Sequence[FloatArray]]
+"""Function from the inputs and the attributes of a node to its outputs."""
+
+
+def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Returns ``rows @ matrix.T``; BLAS sums in an order that depends on the number of rows."""
+    return np.asarray(np.einsum("ni,ji->nj", np.ascontiguousarray(rows), matrix))
+
+
+def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    rows, matrix, *bias = arguments
+    if attributes.get("transA"):
+        raise ValueError("a transposed first factor is not supported")
+    turned = matrix if attributes.get("transB") else np.ascontiguousarray(matrix.T)
+    result = attributes.get("alpha", 1.0) * _matmul(rows, turned)
+    return [result + attributes.get("beta", 1.0) * bias[0] if bias else result]
+
+
+def _product(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+    rows, matrix = arguments
+    return [_matmul(rows, np.ascontiguousarray(matrix.T))]
+
+
+def _sigmoid(x: FloatArray) -> FloatArray:
+    return np.asarray((1 + np.tanh(x / 2)) / 2)  # does not overflow
+
+
+def _elu(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    (x,) = arguments
+    return [np.where(x > 0, x, attributes.get("alpha", 1.0) * np.expm1(np.minimum(x, 0)))]
+
+
+def _leaky(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    (x,) = arguments
+    return [np.where(x > 0, x, attributes.get("alpha", 0.01) * x)]
+
+
+def _clip(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    x, *ends = arguments
+    low = ends[0] if ends and ends[0] is not None else attributes.get("min", -math.inf)
+    high = ends[1] if len(ends) > 1 and ends[1] is not None else attributes.get("max", math.inf)
+    return [np.clip(x, low, high)]
+
+
+def _normalised(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    x, scale, *bias = arguments
+    if attributes.get("axis", -1) not in (-1, x.ndim - 1):
+        raise ValueError("expected the last axis")
+    centred = x - x.mean(axis=-1, keepdims=True)
+    variance = np.square(centred).mean(axis=-1, keepdims=True)
+    result = centred / np.sqrt(variance + attributes.get("epsilon", 1e-5)) * scale
+    return [result + bias[0] if bias else result]
+
+
+def _along_rows(axis: float, x: FloatArray) -> None:
+    if x.ndim != 2 or axis not in (1, -1):  # rows, and the numbers of a row
+        raise ValueError("expected axis 1 of rows")
+
+
+def _concatenated(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    count = max(len(one) for one in arguments)
+    parts = [np.broadcast_to(one, (count, one.shape[-1])) for one in arguments]
+    _along_rows(attributes["axis"], parts[0])
+    return [np.concatenate(parts, axis=1)]
+
+
+def _split(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    x, *sizes = arguments
+    _along_rows(attributes.get("axis", 0), x)
+    given = sizes[0] if sizes else attributes.get("split")
+    if given is None:  # equal parts, but for a smaller last one
+        count = int(attributes["num_outputs"])
+        return np.split(x, -(-x.shape[1] // count) * np.arange(1, count), axis=1)
+    return np.split(x, np.cumsum(np.asarray(given, dtype=np.intp))[:-1], axis=1)
+
+
+def _slice(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+    x, starts, ends, *more = arguments
+    axes = more[0] if more and more[0] is not None else [0.0]
+    step = int(more[1][0]) if len(more) > 1 else 1
+    if len(starts) != 1:
+        raise ValueError("expected one axis")
+    _along_rows(float(axes[0]), x)
+    return [x[:, int(starts[0]) : int(min(ends[0], 2**31)) : step]]
+
+
+def _flat(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+    return [arguments[0].reshape(len(arguments[0]), -1)]
+
+
+def _softmax(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    _along_rows(attributes.get("axis", -1), arguments[0])
+    raised = np.exp(arguments[0] - arguments[0].max(axis=-1, keepdims=True))
+    return [raised / raised.sum(axis=-1, keepdims=True)]
+
+
+_FLOATS, _INTEGERS = (1, 10, 11, 16), (2, 3, 4, 5, 6, 7, 12, 13)
+"""Types of numbers in ONNX."""
+
+
+def _cast(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    (x,) = arguments
+    if attributes["to"] not in (*_FLOATS, *_INTEGERS):
+        raise ValueError("expected a type of numbers")
+    return [x if attributes["to"] in _FLOATS else np.trunc(x)]
+
+
+def _reduced(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operator:
+    return lambda arguments, _attributes: [functools.reduce(function, arguments)]
+
+
+def _elementwise(function: Callable[..., FloatArray]) -> Operator:
+    return lambda arguments, _attributes: [function(*arguments)]
+
+
+OPERATORS: Mapping[str, Operator] = MappingProxyType(
+    {
+        "Gemm": _gemm,
+        "MatMul": _product,
+        "Elu": _elu,
+        "LeakyRelu": _leaky,
+        "Clip": _clip,
+        "LayerNormalization": _normalised,
+        "Concat": _concatenated,
+        "Split": _split,
+        "Slice": _slice,
+        "Flatten": _flat,
+        "Reshape": _flat,
+        "Softmax": _softmax,
+        "Add": _elementwise(np.add),
+        "Sub": _elementwise(np.subtract),
+        "Mul": _elementwise(np.multiply),
+        "Div": _elementwise(np.divide),
+        "Max": _reduced(np.maximum),
+        "Min": _reduced(np.minimum),
+        "Neg": _elementwise(np.negative),
+        "Abs": _elementwise(np.abs),
+        "Exp": _elementwise(np.exp),
+        "Sqrt": _elementwise(np.sqrt),
+        "Sin": _elementwise(np.sin),
+        "Cos": _elementwise(np.cos),
+        "Tanh": _elementwise(np.tanh),
+        "Sigmoid": _elementwise(_sigmoid),
+        "Relu": _elementwise(lambda x: np.maximum(x, 0.0)),
+        "Softplus": _elementwise(lambda x: np.logaddexp(x, 0.0)),
+        "Softsign": _elementwise(lambda x: x / (1 + np.abs(x))),
+        "Identity": _elementwise(lambda x: x),
+        "Cast": _cast,
+    }
+)
+"""Supported operators, by their name in ONNX. ``Reshape`` keeps the axis of the robots, and makes
+one row of the rest; ``Cast`` is of numbers to numbers."""

@@ -1,0 +1,309 @@
+"""Policies: trained networks that walk a robot, from observations to the targets of its motors.
+
+A policy is what laboratories train by reinforcement learning: a network from an observation, a row
+of terms such as the direction of gravity and the joint velocities, to an action, from which the
+targets of the motors follow by a scale and an offset. Nothing of it is evolved: its genome is
+empty. ``compensation.Compensated`` is a layer around it that is.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence, Set as AbstractSet
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Design
+from selfmodel.controllers.graph import Graph
+from selfmodel.rotation import directions, rotated
+
+Rows = Mapping[str, FloatArray]
+"""Observed signals by name, ``(n, width)`` each."""
+
+VELOCITY = 3
+"""Numbers of a commanded velocity: forward and to the left, m/s, and the turn to the left, rad/s.
+"""
+
+
+def gravity(observed: Rows) -> FloatArray:
+    """Returns the direction of gravity in the body's frame, ``(n, 3)``."""
+    return -directions(observed["base_orientation"])[:, 2:]
+
+
+def body_velocity(observed: Rows) -> FloatArray:
+    """Returns the velocity of the base in its own frame, ``(n, 3)``, m/s."""
+    inverse = observed["base_orientation"] * (1.0, -1.0, -1.0, -1.0)
+    return rotated(observed["base_linear_velocity"], inverse)
+
+
+MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[[Rows], FloatArray]]] = MappingProxyType(
+    {
+        "linear_velocity": (("base_linear_velocity", "base_orientation"), body_velocity),
+        "angular_velocity": (
+            ("base_angular_velocity",),
+            lambda observed: observed["base_angular_velocity"],
+        ),
+        "gravity": (("base_orientation",), gravity),
+        "joint_positions": (("joint_positions",), lambda observed: observed["joint_positions"]),
+        "joint_velocities": (("joint_velocities",), lambda observed: observed["joint_velocities"]),
+    }
+)
+"""Terms that a robot measures: the signals they need, and their values from these."""
+
+JOINT_TERMS = ("joint_positions", "joint_velocities")
+"""Terms with one number per joint of the policy; positions are relative to its pose."""
+
+INTERNAL = ("last_action", "velocity", "phase", "sensors")
+"""Other terms: the network's last output, the commanded velocity, sine and cosine of the phase of a
+clock, and the readings of the paper's sensors."""
+
+TERMS = (*MEASURED, *INTERNAL)
+"""Every term of an observation."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of an observation: ``(value - offset) * scale``.
+
+    Attributes:
+        name: One of ``TERMS``.
+        scale: A factor for all its numbers, or one for each.
+        offset: What is subtracted first; one number, or one for each.
+    """
+
+    name: str
+    scale: tuple[float, ...] = (1.0,)
+    offset: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Action:
+    """How the targets of the motors follow from the output of a network.
+
+    target = offset + scale * output, within the command range of the motor.
+
+    Attributes:
+        motors: Motors of the outputs, in the order of the network; others keep their holding
+            commands.
+        scale: Target per output, ``(motors,)``, in the motor's unit.
+        offset: Target for an output of 0, ``(motors,)``.
+        clip: Largest absolute output, also as the last action; larger ones are this large.
+    """
+
+    motors: tuple[str, ...]
+    scale: tuple[float, ...]
+    offset: tuple[float, ...]
+    clip: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interface:
+    """What a policy observes of a robot, and what it commands.
+
+    Attributes:
+        terms: Terms of the observation, in order.
+        action: Targets from the output of the network.
+        hinges: Hinges of the robot, in the order of its signals.
+        joints: Hinges of the joints' terms, in the order of the network.
+        pose: Position of each of them that counts as 0, ``(joints,)``, rad.
+        holding: Commands of the robot's motors that hold its initial pose, ``(motors,)``.
+        timestep: Control time step, s.
+        velocity: Commanded velocity, ``(3,)``.
+        history: Number of last observations that the network receives; those before the trial are
+            the first one.
+        by_term: Whether a history is stacked term by term, as in Isaac Lab, and not as a whole.
+        newest_first: Whether a history begins with the newest observation.
+        decimation: Control steps per evaluation of the network.
+        period: Period of the clock of the term ``phase``, s.
+    """
+
+    terms: tuple[Term, ...]
+    action: Action
+    hinges: tuple[str, ...]
+    joints: tuple[str, ...]
+    pose: tuple[float, ...]
+    holding: tuple[float, ...]
+    timestep: float
+    velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+    history: int = 1
+    by_term: bool = False
+    newest_first: bool = False
+    decimation: int = 1
+    period: float = 1.0
+
+
+@dataclass(frozen=True)
+class Policy(Design):
+    """A trained network with what it observes and what it commands; its genome is empty.
+
+    Raises:
+        ValueError: The network does not have as many inputs or outputs as the terms and the motors
+            have numbers, a name is unknown, or a number of numbers is wrong.
+    """
+
+    name: ClassVar[str] = "policy"
+
+    graph: Graph = field(kw_only=True)
+    interface: Interface = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own, action = self.interface, self.interface.action
+        counts = (
+            ("pose", own.pose, len(own.joints)),
+            ("velocity", own.velocity, VELOCITY),
+            ("holding", own.holding, len(self.motors)),
+            ("action's scale", action.scale, len(action.motors)),
+            ("action's offset", action.offset, len(action.motors)),
+        )
+        for what, given, count in counts:
+            if len(given) != count:
+                raise ValueError(f"expected {count} numbers of its {what}, got {len(given)}")
+        names = (("joint", own.joints, own.hinges), ("motor", action.motors, self.motors))
+        for what, chosen, known in names:
+            if unknown := [name for name in chosen if name not in known]:
+                raise ValueError(f"the robot has no {what} {unknown[0]}: it has {', '.join(known)}")
+            if len(set(chosen)) < len(chosen):
+                raise ValueError(f"it names a {what} twice")
+        if min(own.history, own.decimation) < 1 or not own.period > 0 < own.timestep:
+            raise ValueError("expected a history, a decimation, a period and a step above 0")
+        self._check_terms()
+        self._check_network()
+
+    def _check_terms(self) -> None:
+        if not self.interface.terms:
+            raise ValueError("expected one term of an observation or more, got none")
+        for term in self.interface.terms:
+            if term.name not in TERMS:
+                raise ValueError(f"the term {term.name} is unknown: it may be {', '.join(TERMS)}")
+            for numbers in (term.scale, term.offset):
+                if len(numbers) not in (1, self.width(term.name)):
+                    raise ValueError(
+                        f"expected 1 or {self.width(term.name)} numbers of the term {term.name}, "
+                        f"got {len(numbers)}"
+                    )
+
+    def _check_network(self) -> None:
+        own, motors = self.interface, len(self.interface.action.motors)
+        if self.graph.outputs != motors:
+            raise ValueError(
+                f"the network has {self.graph.outputs} outputs, and there are {motors} motors"
+            )
+        size = own.history * sum(self.width(term.name) for term in own.terms)
+        if self.graph.inputs != size:
+            widths = ", ".join(f"{term.name} {self.width(term.name)}" for term in own.terms)
+            times = f", {own.history} times" if own.history > 1 else ""
+            raise ValueError(
+                f"the network has {self.graph.inputs} inputs, and its terms {size} ({widths}"
+                f"{times})"
+            )
+
+    def width(self, term: str) -> int:
+        """Numbers of a term."""
+        own = {"last_action": self.graph.outputs, "phase": 2, "sensors": len(self.sensors)}
+        return len(self.interface.joints) if term in JOINT_TERMS else own.get(term, 3)
+
+    @property
+    def observes(self) -> tuple[str, ...]:
+        """Signals of the robot that the terms need, besides the readings."""
+        needed = (MEASURED[term.name][0] for term in self.interface.terms if term.name in MEASURED)
+        return tuple(dict.fromkeys(signal for signals in needed for signal in signals))
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """Commands for an output of 0."""
+        action, holding = self.interface.action, self.interface.holding
+        of_motor = dict(zip(action.motors, action.offset, strict=True))
+        return tuple(
+            of_motor.get(name, held) for name, held in zip(self.motors, holding, strict=True)
+        )
+
+    @property
+    def weights(self) -> int:
+        """No weight is evolved."""
+        return 0
+
+    @property
+    def description(self) -> str:
+        """Numbers of observations, motors and weights as text."""
+        graph, motors = self.graph, len(self.interface.action.motors)
+        return (
+            f"a policy of {graph.inputs} observations, {motors} motors and {graph.weights} weights"
+        )
+
+    def summary(self, _genome: FloatArray) -> str:
+        """Returns the description, with a part of the digest of the network."""
+        return f"{self.description}, {self.graph.digest[:8]}"
+
+    def batch(self, genomes: FloatArray, _silent: Sequence[AbstractSet[int]]) -> "PolicyBatch":
+        """Returns the batch of as many copies as there are genomes; see ``Design.batch``."""
+        return PolicyBatch(self, len(genomes))
+
+
+class PolicyBatch:
+    """The policies of many robots; a ``ControllerBatch``.
+
+    Attributes:
+        velocity: Commanded velocity of each robot, ``(n, 3)``.
+    """
+
+    def __init__(self, policy: Policy, count: int) -> None:
+        own = policy.interface
+        action = own.action
+        self._graph, self._interface = policy.graph, own
+        self.readings = np.zeros((count, len(policy.sensors)))
+        signals = {"joint_positions": own.hinges, "joint_velocities": own.hinges}
+        widths = {signal: len(signals.get(signal, "xyz")) for signal in policy.observes}
+        widths |= {"base_orientation": 4} if "base_orientation" in widths else {}
+        self.observed: Mapping[str, FloatArray] = {
+            signal: np.zeros((count, width)) for signal, width in widths.items()
+        }
+        self.velocity = np.tile(own.velocity, (count, 1))
+        self._joints = [own.hinges.index(name) for name in own.joints]
+        self._motors = [policy.motors.index(name) for name in action.motors]
+        self._low, self._high = (
+            np.array([centre + side * half for centre, half in policy.ranges]) for side in (-1, 1)
+        )
+        self._numbers = [(np.array(term.offset), np.array(term.scale)) for term in own.terms]
+        self._pose = np.array(own.pose)
+        self._scale, self._offset = np.array(action.scale), np.array(action.offset)
+        self._output = np.zeros((count, policy.graph.outputs))
+        self._history: list[list[FloatArray]] = []
+        self._step = 0
+
+    def step(self, targets: FloatArray) -> None:
+        """Writes the commands of the next control step; see ``ControllerBatch``."""
+        own = self._interface
+        if self._step % own.decimation == 0:
+            output = self._graph(self._observation())
+            most = math.inf if own.action.clip is None else own.action.clip
+            self._output = np.clip(output, -most, most)
+        targets[:] = own.holding
+        targets[:, self._motors] = self._offset + self._scale * self._output
+        np.clip(targets, self._low, self._high, out=targets)
+        self._step += 1
+
+    def _observation(self) -> FloatArray:
+        """Returns the input of the network, ``(n, inputs)``."""
+        own, last = self._interface, self._history
+        newest = [
+            (self._value(term.name) - offset) * scale
+            for term, (offset, scale) in zip(own.terms, self._numbers, strict=True)
+        ]
+        self._history = [*(last or [newest] * own.history)[1:], newest]
+        stack = self._history[::-1] if own.newest_first else self._history
+        parts = zip(*stack, strict=True) if own.by_term else stack
+        return np.concatenate([value for part in parts for value in part], axis=1)
+
+    def _value(self, term: str) -> FloatArray:
+        if term in MEASURED:
+            value = MEASURED[term][1](self.observed)
+            chosen = value[:, self._joints] if term in JOINT_TERMS else value
+            return chosen - self._pose if term == "joint_positions" else chosen
+        if term == "phase":
+            turn = 2 * math.pi * self._step * self._interface.timestep / self._interface.period
+            return np.tile((math.sin(turn), math.cos(turn)), (len(self.readings), 1))
+        own = {"last_action": self._output, "velocity": self.velocity, "sensors": self.readings}
+        return own[term]

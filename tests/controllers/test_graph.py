@@ -1,0 +1,156 @@
+"""Promises of networks as graphs: ONNX's operators, independent rows, and refusals by name."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from selfmodel.controllers.graph import OPERATORS, Graph, Node, layers
+from selfmodel.logs.policies import read_network
+from tests.helpers.policies import onnx_bytes, random_layers, random_network
+
+UNARY = (
+    *("Neg", "Abs", "Exp", "Sqrt", "Sin", "Cos", "Tanh", "Sigmoid", "Relu", "Softplus"),
+    *("Softsign", "Identity", "Flatten", "Elu<alpha=0.7>", "LeakyRelu", "LeakyRelu<alpha=0.2>"),
+    *("Softmax", "Softmax<axis=1>"),
+)
+MODELS: list[tuple[str, int]] = [
+    *((f"y = {operator}(x)", 6) for operator in UNARY),
+    *((f"y = {operator}(x, row)", 6) for operator in ("Add", "Sub", "Mul", "Div")),
+    *((f"a = Neg(x); y = {operator}(x, a, row)", 6) for operator in ("Max", "Min")),
+    ("y = Gemm<alpha=0.5, beta=2.0>(x, w, five)", 5),
+    ("y = Gemm<transB=1>(x, turned)", 5),
+    ("y = MatMul(x, w)", 5),
+    ("y = Clip(x, low, high)", 6),
+    ('y = Clip(x, "", high)', 6),
+    ("y = LayerNormalization<epsilon=0.01>(x, row, row)", 6),
+    ("a = Neg(x); y = Concat<axis=1>(x, a)", 12),
+    ("a, b, c = Split<axis=1>(x, sizes); y = Concat<axis=-1>(c, a, b)", 6),
+    ("a, b, c, d = Split<axis=1, num_outputs=4>(x); y = Concat<axis=1>(c, b)", 4),
+    ("y = Slice(x, one, end, one, two)", 3),
+    ("y = Slice(x, four, minus, minus)", 3),
+    ("y = Reshape(x, shape)", 6),
+    ("a = Cast<to=11>(x); y = Cast<to=1>(a)", 6),
+    ("a = Cast<to=7>(x); y = Cast<to=1>(a)", 6),
+]
+W = np.eye(6, 5, dtype=np.float32) - 0.3
+TENSORS = {
+    "row": np.arange(1, 7, dtype=np.float32) / 3,
+    "w": W,
+    "turned": W.T.copy(),
+    "five": np.arange(5, dtype=np.float32),
+    "low": np.float32(-0.5).reshape(()),
+    "high": np.float32(0.7).reshape(()),
+    "sizes": np.array([1, 2, 3]),
+    **{name: np.array([k]) for name, k in (("one", 1), ("two", 2), ("four", -4), ("minus", -1))},
+    "end": np.array([2**63 - 1]),
+    "shape": np.array([-1, 6]),
+}
+
+
+@pytest.mark.parametrize(("code", "outputs"), MODELS, ids=[code for code, _ in MODELS])
+def test_an_operator_is_that_of_onnx(tmp_path: Path, code: str, outputs: int):
+    path = tmp_path / "network.onnx"
+    path.write_bytes(onnx_bytes(code, TENSORS, 6, outputs))
+    rows = np.random.default_rng(0).uniform(-2, 2, (7, 6)).astype(np.float32)
+    rows = np.abs(rows) if "Sqrt" in code else rows
+    (expected,) = onnxruntime.InferenceSession(path).run(None, {"x": rows})
+
+    np.testing.assert_allclose(read_network(path)(rows.astype(float)), expected, atol=1e-5)
+
+
+def test_every_operator_is_compared_with_onnx():
+    assert [name for name in OPERATORS if all(f"= {name}" not in code for code, _ in MODELS)] == []
+
+
+def test_layers_are_the_plain_formula():
+    (w0, b0), (w1, b1), (w2, b2) = pairs = random_layers(4, 5, 6, 2)
+    x = np.random.default_rng(1).normal(size=(9, 4))
+    value = np.maximum(np.maximum(x @ w0.T + b0, 0) @ w1.T + b1, 0) @ w2.T + b2
+
+    np.testing.assert_allclose(layers(pairs, "Relu", "Tanh")(x), np.tanh(value), rtol=1e-12)
+
+
+MIXED = Graph(
+    *("x", "y", 48, 12),
+    (
+        Node("Split", ("x", "sizes"), ("a", "b", "c", "d"), (("axis", 1.0),)),
+        Node("Tanh", ("a",), ("a1",)),
+        Node("Sigmoid", ("b",), ("b1",)),
+        Node("Exp", ("b",), ("b2",)),
+        Node("Softmax", ("c",), ("c1",)),
+        Node("Elu", ("d",), ("d1",)),
+        Node("Softplus", ("d",), ("d2",)),
+        Node("Concat", ("a1", "b2", "c1", "d1", "b1", "d2"), ("all",), (("axis", 1.0),)),
+        Node("LayerNormalization", ("all", "scale"), ("even",)),
+        Node("Gemm", ("even", "w"), ("y",), (("transB", 1.0),)),
+    ),
+    {
+        "sizes": np.array([5.0, 11, 13, 19]),
+        "scale": np.linspace(1, 2, 78),
+        "w": random_layers(78, 12)[0][0],
+    },
+)
+NETWORKS = [random_network(48, 64, 32, 12, activation="Elu"), random_network(1, 3, 1), MIXED]
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=["layers", "narrow", "mixed"])
+@settings(max_examples=25)
+@given(rows=st.integers(1, 130), place=st.integers(0, 129), seed=st.integers(0, 99))
+def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(
+    network: Graph, rows: int, place: int, seed: int
+):
+    x = np.random.default_rng(seed).normal(size=(rows, network.inputs))
+    row = slice(place % rows, place % rows + 1)
+
+    assert network(x)[row].tobytes() == network(x[row]).tobytes()
+
+
+GEMM = Node("Gemm", ("x", "w"), ("y",), (("transB", 1.0),))
+
+
+def graph(*nodes: Node, output: str = "y", **tensors: np.ndarray) -> Graph:
+    return Graph("x", output, 3, 2, nodes, {"w": np.ones((2, 3)), **tensors})
+
+
+def node(operator: str, *inputs: str, out: str = "y", **attributes: float) -> Node:
+    return Node(operator, ("x", *inputs), tuple(out.split()), tuple(attributes.items()))
+
+
+@pytest.mark.parametrize(
+    ("nodes", "options", "match"),
+    [
+        ([node("Gru")], {}, r"the operator Gru is not supported, which are Abs, Add"),
+        ([node("Add", "z"), GEMM], {}, "z is used by Add before it is computed"),
+        ([GEMM], {"output": "z"}, "no operator computes the output z"),
+        ([node("Tanh")], {}, r"its output for .* the shape \(1, 3\), expected \(1, 2\)"),
+        ([GEMM], {"w": np.full((2, 3), np.nan)}, "the tensor w has numbers that are not finite"),
+        ([GEMM], {"w": np.ones((2, 4))}, r"Gemm of the shapes \(1, 3\), \(2, 4\): "),
+        ([GEMM], {"output": "b", "b": np.ones((2, 2))}, r"inputs of \(1, 3\) has the shape \(2, 2"),
+        (
+            [GEMM, Node("Add", ("y", "b"), ("y",))],
+            {"b": np.ones((2, 2))},
+            r"the shape \(2, 2\), ex",
+        ),
+        ([node("Softmax", out="a", axis=0.0), GEMM], {}, "Softmax .* expected axis 1"),
+        ([node("Cast", out="a", to=9.0), GEMM], {}, "Cast .* expected a type of numbers"),
+        ([node("Split", "w", out="a b c", axis=1.0), GEMM], {"w": np.array([3.0])}, "1 outputs, e"),
+        ([node("Elu", out="a", alpha=math.inf), GEMM], {}, "the alpha of Elu is not finite"),
+        ([node("Add", "b", out="a"), GEMM], {"b": np.ones((2**19, 1))}, "more than 1048576 num"),
+        ([GEMM] * 1001, {}, "it has 1001 operators, expected at most 1000"),
+    ],
+)
+def test_a_network_that_cannot_be_computed_is_refused(nodes: list[Node], options: dict, match: str):
+    with pytest.raises(ValueError, match=match):
+        graph(*nodes, **options)
+
+
+def test_networks_are_equal_when_their_content_is():
+    assert len({graph(GEMM), graph(GEMM, w=np.ones((2, 3)))}) == 1
+    assert graph(GEMM) != graph(GEMM, w=np.ones((2, 3)) + 1e-9)
+    assert graph(GEMM) != graph(replace(GEMM, attributes=(("alpha", 2.0), ("transB", 1.0))))
+    assert graph(GEMM) != "a network"
