@@ -280,7 +280,9 @@ class EnvironmentRobot:
         columns = np.array(self.robot.anatomy.names.columns(signal))
         if lacking := ", ".join(columns[missing_steps > patience]):
             if signal != "sensors":
-                lacking = f"{signal} ({lacking}), which a limit or the controller requires,"
+                limited = any(signal in limit.signals for limit in self.limits)
+                who = "a limit" if limited else "the controller"
+                lacking = f"{signal} ({lacking}), which {who} requires,"
             raise TrialError(f"no reading of {lacking} for more than {patience} steps, at step {k}")
 
     def _check(self, k: int, values: Mapping[Signal, FloatArray], *, missing: bool) -> None:
