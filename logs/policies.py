@@ -25,11 +25,17 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.graph import Graph, Node, layers
 from selfmodel.controllers.policy import Action, Interface, Policy, Term
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
-from selfmodel.logs.controllers import MAX_CONTROLLER_BYTES, npz_errors, read_arrays
+from selfmodel.logs.controllers import (
+    MAX_CONTROLLER_BYTES,
+    controller_bytes,
+    npz_errors,
+    read_arrays,
+)
 from selfmodel.robot.actuators import command_ranges, holding_commands
 from selfmodel.robot.robot import Robot
 
@@ -164,15 +170,23 @@ def read_policy(path: Path, robot: Robot) -> Policy:
         raise InputError(f"{path}: expected {what} as TOML: {failure}") from failure
     if file.preset and file.preset not in PRESETS:
         raise InputError(f"{path}: {unknown_name('preset', file.preset, PRESETS)}")
-    if Path(file.network).name != file.network:
+    if not file.network or Path(file.network).name != file.network:
         raise InputError(
             f"{path}: expected a network beside this file, got {file.network!r}: copy it here"
         )
     graph = read_network(path.parent / file.network, file.activation, file.last)
     try:
-        return _policy(file, graph, robot)
+        policy = _policy(file, graph, robot)
     except ValueError as failure:
         raise InputError(f"{path} does not fit {robot.name}: {failure}") from failure
+    # A log has it as a file of its own, and a layer around it in another.
+    size = len(controller_bytes(Controller(policy, np.zeros(0))))
+    if size > MAX_CONTROLLER_BYTES // 2:
+        raise InputError(
+            f"{path}: expected a policy of at most {MAX_CONTROLLER_BYTES // 2} bytes in a log, got "
+            f"{size}: export a smaller network"
+        )
+    return policy
 
 
 def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
@@ -241,6 +255,11 @@ def read_network(path: Path, activation: str = "Elu", last: str = "Identity") ->
     Raises:
         InputError: The file cannot be read, or has another content; the message names the file.
     """
+    if path.suffix.lower() not in (".onnx", ".npz"):
+        raise InputError(
+            f"expected a network as .onnx or .npz, got {path}: export it as ONNX, such as with "
+            f"torch.onnx.export"
+        )
     data = read_file(path, "a network", MAX_CONTROLLER_BYTES)
     if path.suffix.lower() == ".onnx":
         return _of_onnx(data, path)
@@ -290,6 +309,12 @@ def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
     if any(tensor.data_location == TensorProto.EXTERNAL for _, tensor in values):
         raise ValueError("its weights are in another file: export it with weights inside")
     tensors = {name: _numbers(numpy_helper.to_array(tensor)) for name, tensor in values}
+    tensors |= {
+        node.output[0]: np.array(attribute.floats or attribute.f, dtype=np.float64)
+        for node in network.node
+        for attribute in node.attribute
+        if node.op_type == "Constant" and attribute.name in ("value_float", "value_floats")
+    }
     inputs = [each for each in network.input if each.name not in tensors]
     if len(inputs) != 1 or not network.output:
         raise ValueError(
@@ -301,6 +326,11 @@ def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
     width, outputs = (int(shape[-1].dim_value) if len(shape) else 0 for shape in shapes)
     if not width:
         raise ValueError("its input has no fixed size: export it with one")
+    if any(one.dim_value > 1 for one in shapes[0][:-1]):
+        raise ValueError(
+            f"expected an input of one row of numbers, got "
+            f"{[one.dim_value or one.dim_param for one in shapes[0]]}"
+        )
     used = {name for node in nodes for name in node.inputs}
     kept = {name: tensor for name, tensor in tensors.items() if name in used}
     return Graph(inputs[0].name, network.output[0].name, width, outputs, tuple(nodes), kept)

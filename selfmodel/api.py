@@ -346,7 +346,8 @@ def recover(
             separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
-        gait: Controller with which the robot walks, such as its policy; evolved if not given.
+        gait: Controller with which the robot walks, such as its policy; ``design`` is then its own.
+            Evolved if not given.
         calibrate: Whether the self-model is fitted to the trial before the failure.
         next_trial: Chooses the controller of each trial after the failing one.
         score: Fitness of the repair; by default the forward displacement until the first fall, or
@@ -371,6 +372,8 @@ def recover(
     check_measurable(score, robot, observed_of(healthy, damaged))
     chosen, searched = settings or Settings(), arguments.kinds_of(kinds)
     drawn = plugins.design(design, robot) if isinstance(design, str) else design
+    if gait is not None:
+        arguments.check_robot(gait.design, robot, "the gait")
     repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
     journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)

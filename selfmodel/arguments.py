@@ -389,16 +389,9 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
         )
     found = loaded.design
     if found.name not in DESIGNS:
-        names = robot.anatomy.names
         _check_neurons(path, found, neurons)
-        if (found.sensors, found.motors) == (names.sensors, names.motors):
-            check_robot(found, robot, path)
-            return loaded
-        raise InputError(
-            f"{path} has a controller for {_connections(found)}; this robot has the sensors "
-            f"{', '.join(names.sensors)} and the motors {', '.join(names.motors)}: give a "
-            f"controller of this robot"
-        )
+        check_robot(found, robot, path)
+        return loaded
     needed = DESIGNS[found.name](robot, (found.hidden or None) if neurons is None else neurons)
     got, expected = map(_connections, (found, needed))
     if got != expected:
@@ -409,22 +402,30 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
     return loaded
 
 
-def check_robot(design: Design, robot: Robot, path: Path) -> None:
-    """Checks that a policy, or that in a layer, is of a robot of this command range and time step.
+def check_robot(design: Design, robot: Robot, source: str | Path) -> None:
+    """Checks that a design is of a robot: of its sensors, motors, command range and time step.
 
     Raises:
-        InputError: It is of another one.
+        InputError: It is of another one; the message names the source.
     """
+    names = robot.anatomy.names
+    if (design.sensors, design.motors) != (names.sensors, names.motors):
+        raise InputError(
+            f"{source} has a controller for {_connections(design)}; this robot has the sensors "
+            f"{', '.join(names.sensors)} and the motors {', '.join(names.motors)}: give a "
+            f"controller of this robot"
+        )
     inner = design.base.design if isinstance(design, Compensated) else design
     own = inner.interface if isinstance(inner, Policy) else None
-    if design.ranges == command_ranges(robot.model) and (
-        own is None or (own.hinges, own.timestep) == (robot.anatomy.hinges, robot.control_timestep)
-    ):
+    if own is None:
         return
-    raise InputError(
-        f"{path} has {design.description} of a robot with other joints, another command range or "
-        f"time step: give the settings of that robot with --set, or a policy file (.toml)"
-    )
+    made = (design.ranges, own.hinges, own.timestep)
+    if made != (command_ranges(robot.model), names.hinges, robot.control_timestep):
+        raise InputError(
+            f"{source} has {design.description} of a robot with other joints, another command "
+            f"range or time step: give the settings of that robot with --set, or a policy file "
+            f"(.toml)"
+        )
 
 
 def _check_neurons(path: Path, design: Design, neurons: int | None) -> None:

@@ -145,6 +145,7 @@ def repaired_around(
         InputError: A layer is to be evolved around no controller, or a policy without a layer.
     """
     name = repair or (ROBUST if gait is None else COMPENSATE)
+    check_known("repair", name, DEFAULT_SCORES)
     if name != COMPENSATE:
         if not design.weights:
             raise InputError(

@@ -91,6 +91,11 @@ class Compensated(Design):
         return self.base.design.hidden
 
     @property
+    def reads(self) -> bool:
+        """Whether the controller within uses the readings."""
+        return self.base.design.reads
+
+    @property
     def observes(self) -> tuple[str, ...]:
         """Signals of the controller within, and of the feedback."""
         own = FEEDBACK if self.feedback else ()

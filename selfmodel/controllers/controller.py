@@ -88,6 +88,11 @@ class Design(ABC):
         return 0
 
     @property
+    def reads(self) -> bool:
+        """Whether it uses the readings of the sensors."""
+        return True
+
+    @property
     def observes(self) -> tuple[str, ...]:
         """Signals that it observes besides the readings."""
         return ()

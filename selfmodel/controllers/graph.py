@@ -22,8 +22,8 @@ from selfmodel.arrays import FloatArray, frozen
 MAX_NODES = 1000
 """Largest number of operators of a graph."""
 
-MAX_WIDTH = 2**20
-"""Largest number of numbers of a value, per row."""
+MAX_NUMBERS = 2**17
+"""Largest number of numbers that all operators of a graph compute for a row."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,10 @@ class Graph:
 
     Attributes:
         input: Name of the input, of ``inputs`` numbers a row.
-        output: Name of the output, of ``outputs`` numbers a row.
+        output: Name of the output, of ``outputs`` numbers a row; 0 for as many as are computed.
         nodes: Operators, in the order of their evaluation.
-        tensors: Weights and constants by name; arrays of whole numbers are shapes and axes.
+        tensors: Weights and constants by name; arrays of whole numbers are shapes and axes. The
+            second factor of a product is one of them.
 
     Raises:
         ValueError: An operator is unknown, a value is used before it is computed or has another
@@ -73,9 +74,14 @@ class Graph:
                 raise ValueError(f"the tensor {name} has numbers that are not finite")
         tensors = {name: frozen(tensor) for name, tensor in self.tensors.items()}
         object.__setattr__(self, "tensors", MappingProxyType(tensors))
+        if not 1 <= self.inputs <= MAX_NUMBERS:
+            raise ValueError(f"expected 1 to {MAX_NUMBERS} inputs, got {self.inputs}")
         for rows in (1, 2):  # a tensor of two rows fits two robots alone
-            given, expected = (rows, self.inputs), (rows, self.outputs)
+            given = (rows, self.inputs)
             found = self(np.zeros(given)).shape  # raises ValueError
+            if not self.outputs and len(found) == len(given):
+                object.__setattr__(self, "outputs", found[1])
+            expected = (rows, self.outputs)
             if found != expected:
                 raise ValueError(
                     f"its output for inputs of {given} has the shape {found}, expected {expected}"
@@ -96,6 +102,10 @@ class Graph:
             for name, value in node.attributes:
                 if not np.isfinite(value).all():
                     raise ValueError(f"the {name} of {node.operator} is not finite")
+            # The product with a row of another robot would be no row.
+            factors = node.inputs[1:2] if node.operator in ("Gemm", "MatMul") else ()
+            if not self.tensors.keys() >= set(factors):
+                raise ValueError(f"the second factor of {node.operator} must be a tensor")
             known |= set(node.outputs)
         if self.output not in known:
             raise ValueError(f"no operator computes the output {self.output}")
@@ -103,14 +113,18 @@ class Graph:
     @np.errstate(all="ignore")  # the numbers of a simulation that diverged
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Returns the output of each row, ``(n, outputs)``, for rows of ``(n, inputs)``."""
+        # In the order of C: otherwise numpy sums along a row in another order than of one row.
+        rows = np.ascontiguousarray(rows)
         values: dict[str, FloatArray] = {**self.tensors, self.input: rows}
+        left = MAX_NUMBERS * len(rows)
         for node in self.nodes:
             arguments: list[Any] = [values[name] if name else None for name in node.inputs]
             try:
-                results = _results(node, arguments, len(rows))
-            except (ValueError, IndexError, KeyError, TypeError) as error:
+                results = _results(node, arguments, left)
+            except _FAILURES as error:
                 shapes = ", ".join(str(np.shape(one)) for one in arguments)
                 raise ValueError(f"{node.operator} of the shapes {shapes}: {error}") from error
+            left -= sum(map(np.size, results))
             values.update(zip(node.outputs, results, strict=False))
         return values[self.output]
 
@@ -160,15 +174,30 @@ def layers(
     return Graph("input", "output", inputs, outputs, tuple(nodes), tensors)
 
 
-def _results(node: Node, arguments: "Arguments", rows: int) -> Sequence[FloatArray]:
-    """Returns the outputs of an operator, at least as many as the node has."""
-    attributes = {"num_outputs": len(node.outputs), **dict(node.attributes)}
+_FAILURES = (
+    *(ValueError, IndexError, KeyError, TypeError, AttributeError),  # of arguments of other kinds
+    *(ArithmeticError, MemoryError),  # of their numbers
+)
+
+
+def _results(node: Node, arguments: "Arguments", left: int) -> Sequence[FloatArray]:
+    """Returns the outputs of an operator, of ``left`` numbers at most."""
+    attributes = {**dict(node.attributes), "num_outputs": len(node.outputs)}
+    # Before any is computed: two small values may make a large one.
+    sizes = [np.shape(one) for one in arguments if one is not None]
+    if node.operator not in _BY_SHAPE and math.prod(np.broadcast_shapes(*sizes)) > left:
+        raise ValueError(f"more than {MAX_NUMBERS} numbers in a row")
     results = OPERATORS[node.operator](arguments, attributes)
     if len(results) < len(node.outputs):
         raise ValueError(f"{len(results)} outputs, expected {len(node.outputs)}")
-    if max(map(np.size, results)) > MAX_WIDTH * rows:
-        raise ValueError(f"more than {MAX_WIDTH} numbers in a row")
+    if sum(map(np.size, results)) > left:
+        raise ValueError(f"more than {MAX_NUMBERS} numbers in a row")
     return results
+
+
+_BY_SHAPE = ("Gemm", "MatMul", "Concat", "Split", "Slice", "Reshape", "Clip", "LayerNormalization")
+"""Operators whose arguments do not broadcast; none makes more numbers than it is given, but a
+product, of its tensor's rows."""
 
 
 # ---------------------------------------------------------------- operators
@@ -221,6 +250,7 @@ def _clip(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
 
 def _normalised(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
     x, scale, *bias = arguments
+    x = np.ascontiguousarray(x)
     if attributes.get("axis", -1) not in (-1, x.ndim - 1):
         raise ValueError("expected the last axis")
     centred = x - x.mean(axis=-1, keepdims=True)
@@ -248,10 +278,15 @@ def _split(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]
     if given is None:  # equal parts, but for a smaller last one
         count = int(attributes["num_outputs"])
         return np.split(x, -(-x.shape[1] // count) * np.arange(1, count), axis=1)
-    return np.split(x, np.cumsum(np.asarray(given, dtype=np.intp))[:-1], axis=1)
+    parts = np.asarray(given, dtype=np.intp)
+    if parts.min() < 0 or parts.sum() != x.shape[1]:
+        raise ValueError(f"parts of {parts.tolist()} numbers do not make {x.shape[1]}")
+    return np.split(x, np.cumsum(parts)[:-1], axis=1)
 
 
 def _slice(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+    if len(arguments) < 3:  # the ends are attributes
+        raise ValueError("it is of an old operator set: export with 10 or a later one")
     x, starts, ends, *more = arguments
     axes = more[0] if more and more[0] is not None else [0.0]
     step = int(more[1][0]) if len(more) > 1 else 1
@@ -262,12 +297,16 @@ def _slice(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray
 
 
 def _flat(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
-    return [arguments[0].reshape(len(arguments[0]), -1)]
+    x, *shape = arguments
+    if shape and (len(shape[0]) != 2 or shape[0][1] not in (-1, x.size // len(x))):
+        raise ValueError(f"a shape of {shape[0].tolist()}: expected one row of numbers a robot")
+    return [x.reshape(len(x), -1)]
 
 
 def _softmax(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
-    _along_rows(attributes.get("axis", -1), arguments[0])
-    raised = np.exp(arguments[0] - arguments[0].max(axis=-1, keepdims=True))
+    x = np.ascontiguousarray(arguments[0])
+    _along_rows(attributes.get("axis", -1), x)
+    raised = np.exp(x - x.max(axis=-1, keepdims=True))
     return [raised / raised.sum(axis=-1, keepdims=True)]
 
 
@@ -286,8 +325,20 @@ def _reduced(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operat
     return lambda arguments, _attributes: [functools.reduce(function, arguments)]
 
 
-def _elementwise(function: Callable[..., FloatArray]) -> Operator:
-    return lambda arguments, _attributes: [function(*arguments)]
+def _of_one(function: Callable[[FloatArray], FloatArray]) -> Operator:
+    def apply(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+        (x,) = arguments
+        return [function(x)]
+
+    return apply
+
+
+def _of_two(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operator:
+    def apply(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
+        first, second = arguments
+        return [function(first, second)]
+
+    return apply
 
 
 OPERATORS: Mapping[str, Operator] = MappingProxyType(
@@ -304,26 +355,26 @@ OPERATORS: Mapping[str, Operator] = MappingProxyType(
         "Flatten": _flat,
         "Reshape": _flat,
         "Softmax": _softmax,
-        "Add": _elementwise(np.add),
-        "Sub": _elementwise(np.subtract),
-        "Mul": _elementwise(np.multiply),
-        "Div": _elementwise(np.divide),
+        "Add": _of_two(np.add),
+        "Sub": _of_two(np.subtract),
+        "Mul": _of_two(np.multiply),
+        "Div": _of_two(np.divide),
         "Max": _reduced(np.maximum),
         "Min": _reduced(np.minimum),
-        "Neg": _elementwise(np.negative),
-        "Abs": _elementwise(np.abs),
-        "Exp": _elementwise(np.exp),
-        "Sqrt": _elementwise(np.sqrt),
-        "Sin": _elementwise(np.sin),
-        "Cos": _elementwise(np.cos),
-        "Tanh": _elementwise(np.tanh),
-        "Sigmoid": _elementwise(_sigmoid),
-        "Relu": _elementwise(lambda x: np.maximum(x, 0.0)),
-        "Softplus": _elementwise(lambda x: np.logaddexp(x, 0.0)),
-        "Softsign": _elementwise(lambda x: x / (1 + np.abs(x))),
-        "Identity": _elementwise(lambda x: x),
+        "Neg": _of_one(np.negative),
+        "Abs": _of_one(np.abs),
+        "Exp": _of_one(np.exp),
+        "Sqrt": _of_one(np.sqrt),
+        "Sin": _of_one(np.sin),
+        "Cos": _of_one(np.cos),
+        "Tanh": _of_one(np.tanh),
+        "Sigmoid": _of_one(_sigmoid),
+        "Relu": _of_one(lambda x: np.maximum(x, 0.0)),
+        "Softplus": _of_one(lambda x: np.logaddexp(x, 0.0)),
+        "Softsign": _of_one(lambda x: x / (1 + np.abs(x))),
+        "Identity": _of_one(lambda x: x),
         "Cast": _cast,
     }
 )
-"""Supported operators, by their name in ONNX. ``Reshape`` keeps the axis of the robots, and makes
-one row of the rest; ``Cast`` is of numbers to numbers."""
+"""Supported operators, by their name in ONNX. ``Reshape`` makes one row of the
+numbers of each robot; ``Cast`` is of numbers to numbers."""

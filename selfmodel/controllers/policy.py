@@ -52,6 +52,9 @@ MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[[Rows], FloatArray]]] = M
 )
 """Terms that a robot measures: the signals they need, and their values from these."""
 
+MAX_HISTORY, MIN_PERIOD = 1000, 1e-3
+"""Longest history, observations, and shortest period of a clock, s."""
+
 JOINT_TERMS = ("joint_positions", "joint_velocities")
 """Terms with one number per joint of the policy; positions are relative to its pose."""
 
@@ -167,14 +170,16 @@ class Policy(Design):
                 raise ValueError(f"the robot has no {what} {unknown[0]}: it has {', '.join(known)}")
             if len(set(chosen)) < len(chosen):
                 raise ValueError(f"it names a {what} twice")
-        if min(own.history, own.decimation) < 1 or not own.period > 0 < own.timestep:
-            raise ValueError("expected a history, a decimation, a period and a step above 0")
+        if not (1 <= own.history <= MAX_HISTORY and own.decimation >= 1):
+            raise ValueError(f"expected a history of 1 to {MAX_HISTORY}, and a decimation above 0")
+        if not (own.timestep > 0 and own.period >= MIN_PERIOD):
+            raise ValueError(f"expected a step above 0 s, and a period of {MIN_PERIOD:g} s or more")
         self._check_terms()
         self._check_network()
 
     def _check_terms(self) -> None:
         if not self.interface.terms:
-            raise ValueError("expected one term of an observation or more, got none")
+            raise ValueError("expected a preset or terms of an observation, got none")
         for term in self.interface.terms:
             if term.name not in TERMS:
                 raise ValueError(f"the term {term.name} is unknown: it may be {', '.join(TERMS)}")
@@ -204,6 +209,11 @@ class Policy(Design):
         """Numbers of a term."""
         own = {"last_action": self.graph.outputs, "phase": 2, "sensors": len(self.sensors)}
         return len(self.interface.joints) if term in JOINT_TERMS else own.get(term, 3)
+
+    @property
+    def reads(self) -> bool:
+        """Whether a term is of the readings."""
+        return any(term.name == "sensors" for term in self.interface.terms)
 
     @property
     def observes(self) -> tuple[str, ...]:

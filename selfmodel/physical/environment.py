@@ -223,7 +223,8 @@ class EnvironmentRobot:
         commands = np.zeros((1, len(names.motors)))
         # The readings are required of a controller; of a playback, only that some signal arrives.
         needed = {signal for limit in self.limits for signal in limit.signals}
-        needed |= set() if isinstance(controller, Playback) else {"sensors"}
+        reads = not isinstance(controller, Playback) and controller.design.reads
+        needed |= {"sensors"} if reads else set()
         needed |= {signal for signal in SIGNALS if signal in controllers.observed}
         missing_steps: dict[Signal, IndexArray] = {
             signal: np.zeros(names.width(signal), dtype=np.intp)
@@ -253,6 +254,11 @@ class EnvironmentRobot:
             for signal in SIGNALS:
                 if signal in controllers.observed:
                     value = values[signal]
+                    if signal == "base_orientation" and abs(np.linalg.norm(value) - 1) > 0.01:
+                        raise TrialError(
+                            f"base_orientation must be a unit quaternion, got {value.tolist()} at "
+                            f"step {k}"
+                        )
                     np.copyto(controllers.observed[signal][0], value, where=~np.isnan(value))
             controllers.step(commands)
             if not np.isfinite(commands).all():  # of a network that divides by 0, for example

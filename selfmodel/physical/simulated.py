@@ -175,6 +175,8 @@ class SimulatedRobot:
                     f"its model is unstable under this controller; try a smaller physics time step"
                 )
             true = {signal: rollout.live[signal]()[0] for signal in SIGNALS}
+            if not np.isfinite(true["commands"]).all():  # of a network that divides by 0
+                raise TrialError(f"the controller's commands are not finite at step {k}")
             yield Sample(
                 time=k * robot.control_timestep,
                 values={

@@ -421,7 +421,12 @@ def around_identity(
 
 
 def layered(controller: Controller) -> Controller:
-    """Returns a controller within a compensating layer that changes nothing."""
+    """Returns a controller within a compensating layer that changes nothing.
+
+    A controller that has a layer is returned as it is.
+    """
+    if isinstance(controller.design, Compensated):
+        return controller
     design = Compensated.around(controller)
     return Controller(design, np.zeros(design.weights))
 

@@ -224,7 +224,9 @@ def measurement_noise(
     deviations = np.where(silent, 0.0, uncertainty.reading_noise)
     wrong_touches = np.where(silent, 0.0, uncertainty.wrong_touches)
     count, sensors = silent.shape
-    level = float(uncertainty.reading_noise.max(initial=0.0))
+    # Without a sensor of an angle, the level is that of the initial poses.
+    angles = uncertainty.reading_noise.max(initial=0.0)
+    level = float(angles or uncertainty.start.angles / ANGLE_DEVIATION)
     of_signals = [np.random.default_rng((own.seed or 0, 2)) for own in conditions]
     half_ranges = joint_half_ranges(robot)
     # The pose of a fixed base is known, so no sensor measures it.

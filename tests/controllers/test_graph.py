@@ -108,6 +108,7 @@ def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(
     row = slice(place % rows, place % rows + 1)
 
     assert network(x)[row].tobytes() == network(x[row]).tobytes()
+    assert network(np.asfortranarray(x))[row].tobytes() == network(x[row]).tobytes()
 
 
 GEMM = Node("Gemm", ("x", "w"), ("y",), (("transB", 1.0),))
@@ -140,13 +141,33 @@ def node(operator: str, *inputs: str, out: str = "y", **attributes: float) -> No
         ([node("Cast", out="a", to=9.0), GEMM], {}, "Cast .* expected a type of numbers"),
         ([node("Split", "w", out="a b c", axis=1.0), GEMM], {"w": np.array([3.0])}, "1 outputs, e"),
         ([node("Elu", out="a", alpha=math.inf), GEMM], {}, "the alpha of Elu is not finite"),
-        ([node("Add", "b", out="a"), GEMM], {"b": np.ones((2**19, 1))}, "more than 1048576 num"),
+        ([node("Add", "b", out="a"), GEMM], {"b": np.ones((2**19, 1))}, "more than 131072 num"),
+        (
+            [node("Split", out="a b", axis=1.0, num_outputs=3e6), Node("Add", ("a", "c"), ("y",))],
+            {"c": np.ones((2**17, 1))},
+            "more than 131072 numbers in a row",
+        ),
+        ([node("Split", "s", out="a b", axis=1.0), GEMM], {"s": np.array([1.0, 1])}, "do not make"),
+        (
+            [node("Reshape", "s", out="a"), GEMM],
+            {"s": np.array([-1.0, 1, 3])},
+            "one row of numbers",
+        ),
+        ([node("Slice", out="a"), GEMM], {}, "export with 10 or a later one"),
+        ([node("Add", "x", "x", out="a"), GEMM], {}, "too many values"),
+        ([Node("Gemm", ("w", "x"), ("a",)), GEMM], {}, "second factor of Gemm must be a tensor"),
         ([GEMM] * 1001, {}, "it has 1001 operators, expected at most 1000"),
     ],
 )
 def test_a_network_that_cannot_be_computed_is_refused(nodes: list[Node], options: dict, match: str):
     with pytest.raises(ValueError, match=match):
         graph(*nodes, **options)
+
+
+def test_an_output_of_open_size_is_as_wide_as_it_is_computed():
+    own = Graph("x", "y", 3, 0, (GEMM,), {"w": np.ones((2, 3))})
+
+    assert (own.outputs, own) == (2, graph(GEMM))
 
 
 def test_networks_are_equal_when_their_content_is():

@@ -286,11 +286,18 @@ def test_a_robot_that_stops_to_deliver_what_its_policy_observes_is_stopped(
 
 
 def test_a_signal_that_the_policy_does_not_observe_may_be_missing(policy: Controller):
-    unneeded = [s for s in SIGNALS[2:] if s not in (*policy.design.observes, "sensors")]
+    assert not policy.design.reads
+    unneeded = [s for s in SIGNALS if s not in (*policy.design.observes, "commands")]
     absent = {k: observation(k, **dict.fromkeys(unneeded)) for k in range(STEPS)}
 
     assert unneeded
     assert np.isfinite(driven(Bench(absent), policy)["commands"]).all()
+
+
+def test_a_robot_whose_orientation_is_no_rotation_is_stopped(policy: Controller):
+    bench = Bench({9: observation(9, base_orientation=np.zeros(4))})
+    with pytest.raises(TrialError, match=r"base_orientation must be a unit quaternion.* at step 9"):
+        driven(bench, policy)
 
 
 def test_a_robot_is_not_sent_commands_that_are_not_finite(tmp_path: Path, quadruped: Robot):
@@ -328,6 +335,10 @@ def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     assert isinstance(drivers[0].design, Compensated)
     assert drivers[0].design.base == policy
     assert [bool(driver.genome.any()) for driver in drivers] == [False, False, True]
+
+    repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
+    (again, *_) = printed(*RECOVER, *repaired, cwd=tmp_path)["trials"]
+    assert read_log(tmp_path / again["log"]).trial.plan.controller == drivers[2]
 
 
 @pytest.mark.parametrize(
