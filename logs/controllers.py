@@ -27,12 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import PAPER_RANGE, Controller, Design, Ranges
 from selfmodel.controllers.cpg import Cpg
-from selfmodel.controllers.graph import Graph, Node
 from selfmodel.controllers.network import Network
-from selfmodel.controllers.policy import Interface, Policy
 from selfmodel.errors import InputError
 from selfmodel.files import read_file
 from selfmodel.logs.files import create_file
@@ -48,6 +45,9 @@ KINDS: Mapping[str, tuple[Callable[..., Design], str, str]] = MappingProxyType(
     {Network.name: (Network, "hidden", "i"), Cpg.name: (Cpg, "timestep", "f")}
 )
 """Class of each kind of design, by its name, with the name and type code of its own number."""
+
+POLICY, LAYER = "policy", "compensation"
+"""Names of the two designs without a number of their own."""
 
 NPZ_FAILURES = (
     ValueError,  # numpy's headers
@@ -105,7 +105,7 @@ def controller_bytes(controller: Controller) -> bytes:
 
 def parse_controller(data: bytes, source: str) -> Controller:
     """Returns the controller of bytes that ``controller_bytes`` made; errors name the source."""
-    return _parsed(data, source, (*KINDS, Policy.name, Compensated.name))
+    return _parsed(data, source, (*KINDS, POLICY, LAYER))
 
 
 def _parsed(data: bytes, source: str, known: Sequence[str]) -> Controller:
@@ -129,34 +129,31 @@ def _parsed(data: bytes, source: str, known: Sequence[str]) -> Controller:
         return Controller(design, arrays["genome"])
 
 
-class _Content(msgspec.Struct, forbid_unknown_fields=True):
-    """The JSON of a policy: its operators in order, and its interface."""
-
-    input: str
-    output: str
-    inputs: int
-    outputs: int
-    nodes: tuple[Node, ...]
-    interface: Interface
-
-
 _TENSOR = "tensor/"
 """Prefix of the names of a network's tensors."""
 
 
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     """Returns the arrays that only controllers of a design have."""
+    if design.name in KINDS:
+        number = KINDS[design.name][1]
+        return {number: np.array(getattr(design, number))}
+    from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
+    from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
+
     if isinstance(design, Policy):
         graph = design.graph
-        ends = (graph.input, graph.output, graph.inputs, graph.outputs)
-        content = msgspec.json.encode(_Content(*ends, graph.nodes, design.interface))
+        sizes = {"inputs": graph.inputs, "outputs": graph.outputs}
+        made = {"nodes": graph.nodes, "interface": design.interface}
+        content = msgspec.json.encode(
+            {"input": graph.input, "output": graph.output, **sizes, **made}
+        )
         tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
         return {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
     if isinstance(design, Compensated):
         base = np.frombuffer(controller_bytes(design.base), dtype=np.uint8)
         return {"base": base, "feedback": np.array(design.feedback)}
-    number = KINDS[design.name][1]
-    return {number: np.array(getattr(design, number))}
+    raise TypeError(f"expected a design of a controller file, got {design!r}")
 
 
 def _narrow(tensor: FloatArray) -> NDArray[Any]:
@@ -168,12 +165,12 @@ def _narrow(tensor: FloatArray) -> NDArray[Any]:
 
 def _own_types(kind: str, arrays: Arrays) -> dict[str, str]:
     """Returns the types and ranks of these arrays, for ``check_types``."""
-    if kind == Policy.name:
+    if kind == POLICY:
         tensors = {
             name: f"f{each.ndim}" for name, each in arrays.items() if name.startswith(_TENSOR)
         }
         return {"content": "u1", **tensors}
-    if kind == Compensated.name:
+    if kind == LAYER:
         return {"base": "u1", "feedback": "b0"}
     _, number, code = KINDS[kind]
     return {number: f"{code}0"}
@@ -187,8 +184,18 @@ def _design(
     source: str,
 ) -> Design:
     """Returns the design of a controller from its sensors, motors, ranges and own arrays."""
-    if kind == Policy.name:
-        content = msgspec.json.decode(arrays["content"].tobytes(), type=_Content)
+    if kind in KINDS:
+        design, number, _ = KINDS[kind]
+        return design(*ends, arrays[number].item(), ranges=ranges)
+    from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
+    from selfmodel.controllers.graph import Graph, Node  # noqa: PLC0415  # few controllers are one
+    from selfmodel.controllers.policy import Interface, Policy  # noqa: PLC0415  # few controllers are one
+
+    if kind == POLICY:
+        fields = [("input", str), ("output", str), ("inputs", int), ("outputs", int)]
+        fields += [("nodes", tuple[Node, ...]), ("interface", Interface)]
+        form = msgspec.defstruct("Content", fields, forbid_unknown_fields=True)
+        content: Any = msgspec.json.decode(arrays["content"].tobytes(), type=form)
         tensors = {
             name.removeprefix(_TENSOR): np.asarray(each, dtype=np.float64)
             for name, each in arrays.items()
@@ -197,13 +204,10 @@ def _design(
         sizes = content.inputs, content.outputs
         graph = Graph(content.input, content.output, *sizes, content.nodes, tensors)
         return Policy(*ends, ranges=ranges, graph=graph, interface=content.interface)
-    if kind == Compensated.name:
-        # Without a layer, which could have another within, and so on.
-        base = _parsed(arrays["base"].tobytes(), source, (*KINDS, Policy.name))
-        feedback = bool(arrays["feedback"])
-        return Compensated(*ends, ranges=ranges, base=base, feedback=feedback)
-    design, number, _ = KINDS[kind]
-    return design(*ends, arrays[number].item(), ranges=ranges)
+    # Without a layer, which could have another within, and so on.
+    base = _parsed(arrays["base"].tobytes(), source, (*KINDS, POLICY))
+    feedback = bool(arrays["feedback"])
+    return Compensated(*ends, ranges=ranges, base=base, feedback=feedback)
 
 
 # ---------------------------------------------------------------- archives of arrays

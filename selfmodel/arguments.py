@@ -11,10 +11,8 @@ import numpy as np
 
 from selfmodel import plugins
 from selfmodel.comparators import PREFERENCE
-from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
-from selfmodel.controllers.policy import Policy
 from selfmodel.diagnosis.choice import ComparatorChoice, chosen_comparator
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError
@@ -23,7 +21,6 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.files import encodable, file_digest, read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
-from selfmodel.logs.policies import read_policy
 from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
 from selfmodel.progress import Observer, ignore
@@ -376,6 +373,8 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
         InputError: The file contains no controller, or one that does not fit.
     """
     if path.suffix.lower() == ".toml":
+        from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one
+
         policy = read_policy(path, robot)
         _check_neurons(path, policy, neurons)
         return Controller(policy, np.zeros(policy.weights))
@@ -415,6 +414,11 @@ def check_robot(design: Design, robot: Robot, source: str | Path) -> None:
             f"{', '.join(names.sensors)} and the motors {', '.join(names.motors)}: give a "
             f"controller of this robot"
         )
+    if design.name in DESIGNS:
+        return
+    from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few robots have one
+    from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few robots have one
+
     inner = design.base.design if isinstance(design, Compensated) else design
     own = inner.interface if isinstance(inner, Policy) else None
     if own is None:
