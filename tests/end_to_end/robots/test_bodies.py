@@ -4,6 +4,7 @@ Whatever is promised of our own robots holds for a body that slides instead of f
 motors pull tendons or lag behind their commands, and whose hinges bend to one side only.
 """
 
+import dataclasses
 import importlib
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.tasks import suite_bodies, walking
+from selfmodel.tasks import walking
 from selfmodel.trials.estimation import BASE, STATE
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
@@ -44,10 +45,9 @@ from tests.logs.conftest import plan_of
 
 STEPS, HORIZON = 50, 10
 UP = np.array([0.0, 0.0, 1.0])
-EXACT, LOOSELY = 1e-6, 2e-3
-"""How far a prediction may be from what happened, relative to 1 of each unit. Of the dog, whose
-solver stops at its tolerance with 79 degrees of freedom, and begins a segment without the solution
-of the step before, the paths of light bones part a little."""
+EXACT, OF_DOG = 1e-6, 1e-4
+"""How far a prediction may be from what happened, relative to 1 of each unit; and that of the dog,
+whose light bones with 79 degrees of freedom part a little from a jammed joint."""
 
 
 @pytest.fixture(params=EVERY_BODY)
@@ -126,7 +126,7 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
                 else (made[signal][0] - logged)
             )
             scale = np.maximum(1, np.abs(logged).max())
-            limit = LOOSELY if body.name == "dog" else EXACT
+            limit = OF_DOG if "dog" in body.name else EXACT
             assert np.abs(apart).max() / scale < limit, f"{hypothesis}: {signal}"
 
 
@@ -141,15 +141,13 @@ def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
     evidence = LossTable(Simulator(body, 1), SEGMENT_PREDICTION)
     losses = evidence.losses([intact, *others], [trial]).mean(axis=1)
 
-    assert losses[0] < (1e-4 if body.name == "dog" else 1e-8)
+    assert losses[0] < 1e-8
     assert losses[1:].min() > 1e3 * losses[0]
     for known in (trial, lacking(trial, BASE)):
         assert prediction_error(body, [known], 1) < 0.01  # so that calibration leaves it as it is
 
 
 def test_a_log_holds_the_robot_and_its_trial(body: Robot, tmp_path: Path):
-    if body.assets:  # more than a log takes, until the body is made ready as anybody's MJCF is
-        body = suite_bodies.robot(body.name, "walk")
     samples = list(SimulatedRobot(body).run(plan_of(body, 20).controller, 20))
     path = tmp_path / "a.mcap"
     write_trial(path, body, plan_of(body, 20), samples, TrialHeader(Settings()))
@@ -187,7 +185,10 @@ def test_across_a_gap_a_damaged_body_still_moves(body: Robot):
 def test_a_calibrated_model_of_it_has_its_parts(body: Robot):
     said = with_parameters(body, nominal(body))
 
-    assert (said.anatomy, said.root) == (body.anatomy, body.root)
+    assert (said.anatomy.names, said.root) == (body.anatomy.names, body.root)
+    for one, own in zip(said.anatomy.joints, body.anatomy.joints, strict=True):
+        assert dataclasses.replace(one, limits=own.limits) == own
+        np.testing.assert_allclose(one.limits, own.limits, rtol=1e-5)  # six digits
     np.testing.assert_allclose(said.model.body_mass, body.model.body_mass, rtol=1e-4)
     np.testing.assert_allclose(said.model.actuator_gainprm, body.model.actuator_gainprm, rtol=1e-4)
 
@@ -196,7 +197,7 @@ def test_nobody_has_fallen_at_the_start_and_a_swimmer_never_does(body: Robot):
     run = happened(body, INTACT)
 
     assert first_falls(run, UP, body.standing_height) > 0
-    if body.name == "swimmer":
+    if "swimmer" in body.name:
         assert first_falls(run, UP, body.standing_height) == STEPS
 
 
