@@ -1,4 +1,4 @@
-"""Option values as objects: cases, stages, lists, shares of a study, names of files."""
+"""Option values as objects: cases, lists, shares of a study, names of files."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -6,7 +6,6 @@ from typing import TypeVar
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.logs.files import refuse_existing
-from selfmodel.trials.trial import STAGES, Stage, stage_of
 
 Number = TypeVar("Number", int, float)
 
@@ -29,14 +28,6 @@ def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None
     if case not in cases:
         raise unknown_name("case of Table I", str(case), map(str, cases))
     return cases[case]
-
-
-def stage(name: str) -> Stage:
-    """Returns the stage of that name, or raises ``InputError`` with the nearest names."""
-    found = stage_of(name)
-    if found is None:
-        raise unknown_name("stage", name, STAGES)
-    return found
 
 
 def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality
-from selfmodel.trials.trial import TrialPlan
+from selfmodel.trials.trial import TrialPlan, stage_of
 
 
 def trial(options: RunTrial) -> None:
@@ -38,7 +38,7 @@ def trial(options: RunTrial) -> None:
         driver = arguments.read_controller(Path(kind), robot, options.neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
-    plan = TrialPlan("trial", inputs.stage(options.stage), driver, settings.steps, options.seed)
+    plan = TrialPlan("trial", stage_of(options.stage), driver, settings.steps, options.seed)
     header = TrialHeader(settings, hidden=str(hidden), gap=gap.text)
     try:
         logged = run_trial(SimulatedRobot(robot, hidden, gap), plan, options.out, robot, header)

@@ -23,7 +23,7 @@ from selfmodel.recovery.repair import mutants, untried_mutants
 from selfmodel.recovery.result import DiscriminatingTrial
 from selfmodel.settings import Settings
 from selfmodel.simulation.rollout import SimulationResult
-from selfmodel.simulation.simulator import Cache, Simulator
+from selfmodel.simulation.simulator import Simulator, cached_rows
 from selfmodel.trials.signals import DISAGREEMENT_SCALES, difference
 from selfmodel.trials.trajectory import Trajectory
 
@@ -105,7 +105,7 @@ class Disagreement:
     hypotheses: Sequence[Hypothesis]
     simulator: Simulator
     steps: int
-    _cache: Cache[Controller] = field(default_factory=Cache, init=False)
+    _known: dict[Controller, FloatArray] = field(default_factory=dict, init=False)
 
     def most_discriminative(self, candidates: Sequence[Controller]) -> Controller:
         """Returns the controller whose trial is predicted to separate the hypotheses best.
@@ -129,7 +129,7 @@ class Disagreement:
         The order is of decreasing disagreement. Controllers with which the robot falls in the first
         ``EARLY_STEPS`` are last, the earliest fall at the end.
         """
-        falls, disagreement = np.array(self._cache.get_or_compute(candidates, self._evaluate)).T
+        falls, disagreement = np.array(cached_rows(self._known, candidates, self._evaluate)).T
         return falls, np.lexsort((-disagreement, -falls)).tolist()
 
     def _evaluate(self, candidates: Sequence[Controller]) -> FloatArray:

@@ -27,7 +27,7 @@ from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, scores_of
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.domain import DomainDistribution, draw_samples
-from selfmodel.simulation.simulator import Cache, Run, Simulator
+from selfmodel.simulation.simulator import Run, Simulator, cached_rows
 
 FIRST_COST, COST = 2.8, 0.8
 """Simulated control steps of a robust repair without and with a known controller to begin from,
@@ -152,7 +152,7 @@ class RepairSearch:
     design: Design | None = None
     score: Score = DISPLACEMENT
     evaluations: int = field(default=0, init=False)
-    _fitness: Cache[Run] = field(default_factory=Cache, init=False)
+    _known: dict[Run, FloatArray] = field(default_factory=dict, init=False)
 
     def __call__(
         self,
@@ -167,7 +167,7 @@ class RepairSearch:
 
         def fitness(genomes: FloatArray) -> FloatArray:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
-            return np.array(self._fitness.get_or_compute(runs, self._simulate))
+            return np.array(cached_rows(self._known, runs, self._simulate))
 
         known = _genomes_of(design, seeds)
         search = Evolution(design.weights, draw_genomes, self.settings, rng, known)

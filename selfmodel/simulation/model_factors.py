@@ -97,12 +97,6 @@ def nominal(robot: Robot) -> Parameters:
     return Parameters(motor_gains=(1.0,) * robot.model.nu, delay=robot.control_delay)
 
 
-def from_factors(factors: FloatArray, delay: float) -> Parameters:
-    """Returns parameters from ``Parameters.factors`` and a control delay, control steps."""
-    root, limbs, friction, damping, *motors = factors.tolist()
-    return Parameters(root, limbs, friction, damping, tuple(motors), delay)
-
-
 def model_with_parameters(
     robot: Robot, parameters: Parameters, model: mujoco.MjModel | None = None
 ) -> mujoco.MjModel:
@@ -256,11 +250,13 @@ class LogNormal:
             np.exp(deviations * rng.standard_normal(len(deviations)))
             for deviations in (self.factors, self.bodies, self.bodies, contacts)
         )
-        return dataclasses.replace(
-            from_factors(factors, 0),
+        shared, motors = np.split(factors, [len(SHARED)])
+        names = (*SHARED, "contact_stiffness", "contact_damping")
+        return Parameters(
+            motor_gains=tuple(motors.tolist()),
             body_mass=tuple(masses.tolist()),
             body_inertia=tuple(inertias.tolist()),
-            **dict(zip(("contact_stiffness", "contact_damping"), contact.tolist(), strict=False)),
+            **dict(zip(names, [*shared.tolist(), *contact.tolist()], strict=False)),
         )
 
 

@@ -4,7 +4,7 @@ import copy
 import os
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache, partial
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 import mujoco
 import numpy as np
@@ -249,17 +249,11 @@ def _feet(robot: Robot) -> dict[int, tuple[list[int], list[int]]]:
 Key = TypeVar("Key", bound=Hashable)
 
 
-class Cache(Generic[Key]):
-    """A cache with one row of numbers per key: each search computes a row once."""
-
-    def __init__(self) -> None:
-        self._rows: dict[Key, Any] = {}
-
-    def get_or_compute(
-        self, keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
-    ) -> list[FloatArray]:
-        """Returns the row of each key; ``compute`` returns those of distinct keys that are new."""
-        missing = list(dict.fromkeys(key for key in keys if key not in self._rows))
-        if missing:
-            self._rows.update(zip(missing, compute(missing), strict=True))
-        return [self._rows[key] for key in keys]
+def cached_rows(
+    known: dict[Key, FloatArray], keys: Sequence[Key], compute: Callable[[list[Key]], FloatArray]
+) -> list[FloatArray]:
+    """Returns the row of each key; ``compute`` returns those of new, distinct keys, once each."""
+    missing = list(dict.fromkeys(key for key in keys if key not in known))
+    if missing:
+        known.update(zip(missing, compute(missing), strict=True))
+    return [known[key] for key in keys]

@@ -37,9 +37,12 @@ MAX_SEED = 2**63 - 1
 """Largest seed of a trial: the largest integer of most other programs that read logs."""
 
 
-def stage_of(name: str) -> Stage | None:
-    """Returns the stage with a name; None if there is no such stage."""
-    return next((stage for stage in STAGES if stage == name), None)
+def stage_of(name: str) -> Stage:
+    """Returns the stage of that name, or raises ``InputError`` with the nearest names."""
+    for stage in STAGES:
+        if stage == name:
+            return stage
+    raise unknown_name("stage", name, STAGES)
 
 
 @dataclass(frozen=True)
@@ -180,8 +183,7 @@ class Trial:
         }
         orders = {**dict.fromkeys(joints, joint_names), "commands": motor_names}
         trajectory = trajectory_of_arrays(robot, arrays, time, orders)
-        if stage not in STAGES:
-            raise unknown_name("stage", stage, STAGES)
+        stage_of(stage)  # raises InputError
         try:
             played = played_back(trajectory.names.motors, trajectory["commands"])
         except ValueError as error:

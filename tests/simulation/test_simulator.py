@@ -15,7 +15,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorNoise
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import batch_bytes, hypothesis_bytes, largest_batch
-from selfmodel.simulation.simulator import Cache, Run, Simulator
+from selfmodel.simulation.simulator import Run, Simulator, cached_rows
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.drivers import random_controllers
@@ -189,8 +189,8 @@ def test_a_cache_computes_every_key_once():
         computed.extend(keys)
         return np.array([[len(key), -len(key)] for key in keys])
 
-    cache: Cache[str] = Cache()
-    rows = cache.get_or_compute(["a", "bb", "a"], compute)
+    known: dict[str, np.ndarray] = {}
+    rows = cached_rows(known, ["a", "bb", "a"], compute)
     assert np.array_equal(rows, [[1, -1], [2, -2], [1, -1]])
-    assert np.array_equal(cache.get_or_compute(["bb", "ccc"], compute), [[2, -2], [3, -3]])
+    assert np.array_equal(cached_rows(known, ["bb", "ccc"], compute), [[2, -2], [3, -3]])
     assert computed == ["a", "bb", "ccc"]
