@@ -67,3 +67,10 @@ def remove_warm_start(model: mujoco.MjModel) -> None:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART
     for name, least in MIN_ITERATIONS.items():
         setattr(model.opt, name, max(least, getattr(model.opt, name)))
+
+
+def bits(model: mujoco.MjModel) -> bytes:
+    """Returns every number of a model."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()

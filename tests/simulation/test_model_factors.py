@@ -26,6 +26,7 @@ from selfmodel.simulation.model_factors import (
     with_parameters,
 )
 from selfmodel.tasks import ROBOTS
+from tests.helpers.exactness import bits
 from tests.helpers.robots.arms import arm, arm_mjcf, robot_of
 
 FIELDS = (
@@ -97,12 +98,6 @@ def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
         )
 
 
-def bits(model: mujoco.MjModel) -> bytes:
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
 def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
     before, parameters = bits(robot.model), some(robot)
     fitted = with_parameters(robot, parameters)
@@ -125,6 +120,7 @@ def test_masses_and_friction_are_written_in_whatever_way_the_model_defines_them(
     np.testing.assert_allclose(edited.body("base").mass, 1.3 * before.body("base").mass)
     np.testing.assert_allclose(edited.body_mass[2:], 0.7 * before.body_mass[2:])
     np.testing.assert_allclose(edited.geom_friction[:, 0], before.geom_friction[:, 0] * 1.2)
+    np.testing.assert_allclose(edited.dof_dampingpoly, 0.8 * before.dof_dampingpoly)
     np.testing.assert_allclose(edited.pair_friction, [[0.72, 0.84, 0.01, 0.0001, 0.0001]])
     assert_alike(edited, with_parameters(robot, some(robot)).model)
 

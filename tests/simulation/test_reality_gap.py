@@ -3,7 +3,6 @@
 import dataclasses
 import json
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -19,6 +18,7 @@ from selfmodel.simulation.reality_gap import (
     perturbed_model,
 )
 from selfmodel.tasks import ROBOTS
+from tests.helpers.exactness import bits
 
 QUADRUPED = ROBOTS["quadruped"].robot()
 DRAWS = 400
@@ -26,13 +26,6 @@ DRAWS = 400
 
 def drawn(level: float, seed: int = 0, robot: Robot = QUADRUPED) -> RealityGap:
     return draw_gap(robot, level, np.random.default_rng(seed))
-
-
-def bits(model: mujoco.MjModel) -> bytes:
-    """Every number of a model."""
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
 
 
 def factors(gap: RealityGap) -> np.ndarray:
@@ -107,37 +100,6 @@ def test_a_perturbed_model_is_what_the_gap_says_and_leaves_the_robot_as_it_was(r
             np.testing.assert_allclose(getattr(found, field)[motor], expected)
     np.testing.assert_array_equal(found.actuator_forcerange, model.actuator_forcerange)
     assert bits(model) == before
-
-
-def test_contact_pairs_slip_and_curved_damping_damps_as_the_rest_does():
-    mjcf = QUADRUPED.mjcf.replace(
-        "</worldbody>",
-        '</worldbody><contact><pair geom1="ground" geom2="torso" friction="0.8 0.8"/></contact>',
-    ).replace('damping="0.2"', 'damping="0.2 0.02"')
-    robot = Robot("paired", mjcf, QUADRUPED.control_timestep)
-    gap, model = drawn(0.1, robot=robot), robot.model
-    found = perturbed_model(model, gap)
-
-    assert model.npair
-    assert model.dof_dampingpoly.any()
-    pairs = model.pair_friction * np.where(np.arange(5) < 2, gap.friction, 1)
-    np.testing.assert_allclose(found.pair_friction, pairs)
-    np.testing.assert_allclose(found.dof_dampingpoly, model.dof_dampingpoly * gap.damping)
-
-
-def test_a_weaker_servo_aims_at_the_same_angle():
-    weak = dict.fromkeys(QUADRUPED.anatomy.motors, 0.5)
-    model = perturbed_model(
-        QUADRUPED.model, dataclasses.replace(drawn(0.0), level=0.3, motors=weak)
-    )
-    forces = []
-    for own in (QUADRUPED.model, model):
-        data = mujoco.MjData(own)
-        data.ctrl[:] = 0.1
-        mujoco.mj_forward(own, data)
-        forces.append(data.actuator_force)
-
-    np.testing.assert_allclose(forces[1], 0.5 * forces[0])
 
 
 def test_the_gap_is_drawn_from_a_stream_of_its_own():
