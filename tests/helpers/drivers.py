@@ -1,11 +1,15 @@
-"""Random controllers, repertoires and commands for the tests of any robot."""
+"""Random controllers, repertoires, commands and trials for the tests of any robot."""
 
 import numpy as np
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.controllers.playback import played_back
+from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
+from selfmodel.trials.trajectory import collect
+from selfmodel.trials.trial import Trial, TrialPlan
 
 
 def random_controllers(robot: Robot, count: int, seed: int = 0) -> list[Controller]:
@@ -37,3 +41,11 @@ def random_motion(robot: Robot, steps: int, seed: int = 0) -> np.ndarray:
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, len(robot.anatomy.motors))
     return 0.6 * np.sin(2 * np.pi * np.arange(steps)[:, None] * robot.control_timestep + phase)
+
+
+def moving_trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = 200) -> Trial:
+    """Returns a healthy trial in which every joint moves; its path has the number of the seed."""
+    driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
+    plan = TrialPlan("made-up", "before", driver, steps, 0)
+    trajectory = collect(robot.anatomy.names, physical.run(driver, steps))
+    return Trial(plan, robot.name, trajectory, f"{seed}.mcap")

@@ -1,7 +1,6 @@
 """Tests of the state: signals of sliding and fixed bases, known bases, control delays."""
 
 import dataclasses
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,12 +11,7 @@ from scipy.spatial.transform import Rotation
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.logs import read_log
-from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.robots import robot_of as robot_of_log
-from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import (
     BASE_SIGNALS,
@@ -29,17 +23,14 @@ from selfmodel.robot.state import (
     state_writer,
     with_known_base,
 )
-from selfmodel.settings import Settings
 from selfmodel.simulation.model_factors import nominal, with_parameters
-from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.simulation.trial_replay import replay
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.estimation import STATE
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.drivers import random_controllers, random_cpgs, random_of
+from tests.helpers.drivers import random_controllers, random_cpgs
+from tests.helpers.hostile import lacking
 from tests.helpers.robots.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
 
 SLIDING = """
@@ -218,17 +209,9 @@ def trial_of(robot: Robot, steps: int = 200) -> Trial:
     return Trial(plan, robot.name, trajectory, "one.mcap")
 
 
-def without_base(trial: Trial) -> Trial:
-    trajectory = trial.trajectory
-    unknown = {signal: np.full_like(trajectory[signal], np.nan) for signal in BASE_SIGNALS}
-    signals = {**trajectory.signals, **unknown}
-    blind = Trajectory(trajectory.names, trajectory.time, signals)
-    return Trial(trial.plan, trial.robot, blind, "blind.mcap")
-
-
 def test_the_unobserved_base_of_an_arm_is_that_of_its_model():
     trial = trial_of(arm())
-    found = with_known_base(arm(), without_base(trial).trajectory)
+    found = with_known_base(arm(), lacking(trial, BASE_SIGNALS).trajectory)
     for signal in BASE_SIGNALS:
         assert np.array_equal(found[signal], trial.trajectory[signal]), signal
 
@@ -238,51 +221,8 @@ def test_an_observed_base_and_a_floating_base_are_unchanged():
     moved = {**trajectory.signals, "base_position": trajectory["base_position"] + 0.01}
     seen = Trajectory(trajectory.names, trajectory.time, moved)
     assert np.array_equal(with_known_base(arm(), seen)["base_position"], seen["base_position"])
-    floating = without_base(trial_of(ROBOTS["quadruped"].robot(), 20)).trajectory
+    floating = lacking(trial_of(ROBOTS["quadruped"].robot(), 20), BASE_SIGNALS).trajectory
     assert with_known_base(ROBOTS["quadruped"].robot(), floating) is floating
-
-
-def of_0_1(robot: Robot, hidden: str) -> Robot:
-    """Returns the robot with the custom numeric of version 0.1."""
-    numeric = f'<custom><numeric name="selfmodel_hidden_neurons" data="{hidden}"/></custom>'
-    return Robot(
-        robot.name,
-        robot.mjcf.replace("</mujoco>", f"{numeric}</mujoco>"),
-        robot.control_timestep,
-        robot.assets,
-    )
-
-
-def test_a_log_of_0_1_replays_with_the_neurons_of_its_controller(quadruped: Robot, tmp_path: Path):
-    old, path = of_0_1(quadruped, "5"), tmp_path / "old.mcap"
-    (controller,) = random_of(network_for(quadruped, 5), 1)
-    plan = TrialPlan("trial", "single", controller, 60, 0)
-    samples = SimulatedRobot(old, parse("neuron:4", old.anatomy)).run(controller, 60)
-    write_trial(path, old, plan, samples, TrialHeader(Settings()))
-    log = read_log(path)
-    robot = robot_of_log(log)
-
-    assert "selfmodel_hidden_neurons" in robot.mjcf
-    assert log.trial.plan.controller == controller
-    assert replay(log.trial, parse("neuron:4", robot.anatomy), Simulator(robot, 1)).identical
-    assert not replay(log.trial, INTACT, Simulator(robot, 1)).identical
-
-
-@pytest.mark.parametrize("delay", [0.5, 1.5, 4.5])
-def test_a_part_of_a_step_is_exact_in_all_simulations(quadruped: Robot, delay: float):
-    late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
-    (controller,) = random_controllers(late, 1)
-    physical = collect(late.anatomy.names, SimulatedRobot(late).run(controller, 60))
-    simulated = Simulator(late, 1).run([(INTACT, controller)], 60, SIGNALS).trajectory
-    states = {signal: physical[signal] for signal in STATE}
-    segments = cut_segments(physical, states, np.array([0, 20, 40]), 10, STATE)
-    predicted = Simulator(late, 1).predict([INTACT], segments).trajectory
-
-    assert late.control_delay == delay
-    assert all(physical[signal].tobytes() == simulated[signal][0].tobytes() for signal in SIGNALS)
-    for signal in STATE:
-        logged = physical[signal][[[0, 10], [20, 30], [40, 50]]]
-        np.testing.assert_allclose(predicted[signal][0][:, [0, 10]], logged, atol=1e-9)
 
 
 def test_a_delay_of_half_a_step_is_between_its_neighbours(quadruped: Robot):

@@ -37,7 +37,7 @@ from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.drivers import random_motion
+from tests.helpers.drivers import moving_trial
 from tests.helpers.hostile import lacking, unstable
 from tests.helpers.robots.arms import robot_of as arm_of
 
@@ -58,18 +58,9 @@ def prior_of(robot: Robot) -> np.ndarray:
 PRIOR = prior_of(QUADRUPED)
 
 
-def trial(robot: Robot, physical: SimulatedRobot, seed: int, steps: int = STEPS) -> Trial:
-    """A trial in which every joint moves."""
-    driver = played_back(robot.anatomy.motors, random_motion(robot, steps, seed))
-    trajectory = collect(robot.anatomy.names, physical.run(driver, steps))
-    return Trial(
-        TrialPlan("made-up", "before", driver, steps, 0), robot.name, trajectory, f"{seed}.mcap"
-    )
-
-
 def trials(robot: Robot, count: int = 1, steps: int = STEPS) -> list[Trial]:
     """Trials of a physical robot that is as that model says."""
-    return [trial(robot, SimulatedRobot(robot), seed, steps) for seed in range(count)]
+    return [moving_trial(robot, SimulatedRobot(robot), seed, steps) for seed in range(count)]
 
 
 @cache
@@ -101,7 +92,7 @@ def test_delay_and_factors_go_from_nominal_towards_the_truth():
 @search
 def test_the_faults_of_the_robot_in_a_trial_are_no_parameters_of_its_model():
     jam = parse("jam:back_left_knee", QUADRUPED.anatomy)
-    damaged = trial(real(), SimulatedRobot(real(), jam), 0)
+    damaged = moving_trial(real(), SimulatedRobot(real(), jam), 0)
     knowing, unknowing = (
         calibrate(QUADRUPED, [damaged], threads=1, hypotheses=[each]) for each in (jam, INTACT)
     )
@@ -124,7 +115,7 @@ def test_a_delay_of_a_part_of_a_control_step_is_found():
 
 @search
 def test_the_errors_are_those_of_the_models_and_lower_in_a_trial_that_was_not_seen():
-    seen, unseen = trials(real()), [trial(real(), SimulatedRobot(real()), 7)]
+    seen, unseen = trials(real()), [moving_trial(real(), SimulatedRobot(real()), 7)]
 
     assert fitted().error_before == pytest.approx(prediction_error(QUADRUPED, seen, 1))
     assert fitted().error == pytest.approx(prediction_error(fitted().robot, seen, 1), rel=0.02)
@@ -209,7 +200,7 @@ def test_threads_of_the_physics_and_of_the_linear_algebra_do_not_matter():
 def noisy(robot: Robot, physical: Robot, seed: int, steps: int = STEPS) -> Trial:
     """A trial of a real robot with the noise and the delay of a gap, and no other difference."""
     gap = draw_gap(QUADRUPED, 0.05, np.random.default_rng(seed))
-    return trial(robot, SimulatedRobot(physical, gap=gap), seed, steps)
+    return moving_trial(robot, SimulatedRobot(physical, gap=gap), seed, steps)
 
 
 @search
@@ -235,7 +226,9 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
     adrift = dataclasses.replace(QUADRUPED, mjcf=mjcf.replace('pos="0 0 0.3245"', 'pos="0 0 3"'))
     gap = draw_gap(adrift, 0.02, np.random.default_rng(0))
     friction = factor_names(adrift).index("friction")
-    several = [trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k, 24) for k in range(2)]
+    several = [
+        moving_trial(adrift, SimulatedRobot(adrift, gap=gap, stream=k), k, 24) for k in range(2)
+    ]
     found = calibrate(adrift, several, threads=1)
 
     np.testing.assert_allclose(found.deviations[friction], PRIOR[friction], rtol=1e-3)
@@ -243,7 +236,7 @@ def test_what_the_trials_do_not_show_is_as_uncertain_as_before_them_however_many
 
 @search
 def test_a_robot_that_nobody_sees_is_calibrated_from_what_it_has_on_board():
-    seen = [trial(real(), SimulatedRobot(real()), 7)]
+    seen = [moving_trial(real(), SimulatedRobot(real()), 7)]
     found = calibrate(QUADRUPED, [lacking(one, BASE) for one in trials(real())], threads=1)
     off, true = np.log(found.parameters.factors), np.log(TRUE.factors)
 

@@ -13,10 +13,10 @@ from selfmodel.simulation.segments import SegmentErrors, observed_segments
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.trial import Trial
-from tests.simulation.test_calibration import trial
+from tests.helpers.drivers import moving_trial
 
 QUADRUPED = ROBOTS["quadruped"].robot()
-HEALTHY = trial(QUADRUPED, SimulatedRobot(QUADRUPED), seed=1)
+HEALTHY = moving_trial(QUADRUPED, SimulatedRobot(QUADRUPED), seed=1)
 KNEE = QUADRUPED.anatomy.hinges.index("front_left_knee")
 OTHER = QUADRUPED.anatomy.hinges.index("back_right_shoulder")
 

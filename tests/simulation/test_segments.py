@@ -1,11 +1,11 @@
 """Promises of the segments of calibration: known completely, and no more of them."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.simulation.requests import LEAD, WARM_UP
@@ -20,9 +20,8 @@ from selfmodel.simulation.segments import (
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.estimation import BASE, ONBOARD, STATE, estimated_states
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trajectory import collect
-from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.drivers import random_motion
+from selfmodel.trials.trial import Trial
+from tests.helpers.drivers import moving_trial
 from tests.helpers.hostile import lacking, with_value, without_encoders
 
 STEPS = 201
@@ -31,15 +30,7 @@ GAP = draw_gap(QUADRUPED, 0.05, np.random.default_rng(0))
 SEEN = pytest.mark.parametrize("lost", [(), BASE], ids=["seen", "unseen"])
 
 
-def trial(physical: SimulatedRobot, steps: int = STEPS) -> Trial:
-    """A trial in which every joint moves."""
-    driver = played_back(QUADRUPED.anatomy.motors, random_motion(QUADRUPED, steps, 3))
-    trajectory = collect(QUADRUPED.anatomy.names, physical.run(driver, steps))
-    return Trial(
-        TrialPlan("made-up", "before", driver, steps, 0), QUADRUPED.name, trajectory, "a.mcap"
-    )
-
-
+trial = partial(moving_trial, QUADRUPED, seed=3, steps=STEPS)
 WHOLE = trial(SimulatedRobot(QUADRUPED))
 """A trial without noise, all of it observed."""
 
@@ -174,7 +165,7 @@ def test_a_base_is_used_wherever_it_was_seen_for_long_enough():
 
 @pytest.mark.parametrize("steps", [16, 17, 40])
 def test_a_short_trial_has_each_segment_once(steps: int):
-    short = trial(SimulatedRobot(QUADRUPED), steps)
+    short = trial(SimulatedRobot(QUADRUPED), steps=steps)
 
     assert starts(short).tolist() == list(range(LEAD, steps - HORIZON))
     unseen = starts(lacking(short, BASE)).tolist()
@@ -188,9 +179,11 @@ def test_a_trial_without_a_usable_segment_is_refused_by_what_it_lacks():
     numb = lacking(WHOLE, (*BASE, "base_angular_velocity"))
     mute = with_value(numb, "commands", slice(None), 3, np.nan)
     refused = {
-        "16 steps or more.* and the trial has 15: leave": trial(SimulatedRobot(QUADRUPED), 15),
+        "16 steps or more.* and the trial has 15: leave": trial(
+            SimulatedRobot(QUADRUPED), steps=15
+        ),
         "without late steps, .* the log has no such segment": replace(WHOLE, trajectory=late),
-        r"a\.mcap: .* the log has no such segment: leave": blinking,
+        r"3\.mcap: .* the log has no such segment: leave": blinking,
         f"never has base_angular_velocity, commands of {WHOLE.trajectory.names.motors[3]}": mute,
     }
     for message, tried in refused.items():
@@ -222,6 +215,6 @@ def test_an_encoder_that_was_lost_late_costs_only_the_segments_after():
 def test_segments_of_a_long_trial_share_no_step_and_those_of_a_short_one_do(
     steps: int, least: float, most: float
 ):
-    found = observed_segments(QUADRUPED, trial(SimulatedRobot(QUADRUPED), steps))
+    found = observed_segments(QUADRUPED, trial(SimulatedRobot(QUADRUPED), steps=steps))
 
     assert least <= SegmentErrors(QUADRUPED, [found], 1).overlap <= most

@@ -21,12 +21,15 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.simulation.trial_replay import Replay, replay
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.command import refused
 from tests.helpers.drivers import random_controllers, random_cpgs, random_of
+from tests.helpers.hostile import lacking, with_value
 
 TRUTH = "jam:back_left_knee"
+OF_0_1 = '<custom><numeric name="selfmodel_hidden_neurons" data="5"/></custom>'
+"""Custom numeric of the models of version 0.1."""
 
 
 def logged(folder: Path, robot: Robot, truth: str, driver: CommandSource, steps: int = 100) -> Path:
@@ -69,12 +72,17 @@ def test_a_trial_that_oscillators_drove_replays_to_the_bit(quadruped: Robot, tmp
     assert replayed(path, truth, 2).identical
 
 
+@pytest.mark.parametrize("numeric", ["", OF_0_1], ids=["", "of version 0.1"])
 def test_a_trial_of_a_larger_network_replays_to_the_bit_with_its_neurons(
-    quadruped: Robot, tmp_path: Path
+    quadruped: Robot, tmp_path: Path, numeric: str
 ):
+    mjcf = quadruped.mjcf.replace("</mujoco>", f"{numeric}</mujoco>")
     (controller,) = random_of(network_for(quadruped, 5), 1)
-    path = logged(tmp_path, quadruped, "neuron:4", controller)
+    path = logged(tmp_path, dataclasses.replace(quadruped, mjcf=mjcf), "neuron:4", controller)
+    log = read_log(path)
 
+    assert ("selfmodel_hidden_neurons" in robot_of(log).mjcf) == bool(numeric)
+    assert log.trial.plan.controller == controller
     assert replayed(path, "neuron:4").identical
     assert not replayed(path, "intact").identical
 
@@ -83,13 +91,6 @@ def test_a_trial_of_a_larger_network_replays_to_the_bit_with_its_neurons(
 def trial(quadruped: Robot, tmp_path_factory: pytest.TempPathFactory) -> Trial:
     (controller,) = random_controllers(quadruped, 1, seed=3)
     return read_log(logged(tmp_path_factory.mktemp("trial"), quadruped, TRUTH, controller)).trial
-
-
-def changed(trial: Trial, signal: Signal, place: object, value: float) -> Trial:
-    """The trial with another value of a signal at some places."""
-    values = trial.trajectory[signal].copy()
-    values[place] = value
-    return dataclasses.replace(trial, trajectory=trial.trajectory.with_signals({signal: values}))
 
 
 def compared(robot: Robot, trial: Trial, truth: str = TRUTH, tolerance: float = 0.0) -> Replay:
@@ -113,20 +114,20 @@ def test_the_last_bit_of_one_number_is_noticed_and_a_tolerance_forgives_it(
     quadruped: Robot, trial: Trial
 ):
     number = trial.trajectory["joint_positions"][50, 3]
-    other = changed(trial, "joint_positions", (50, 3), np.nextafter(number, 1))
+    other = with_value(trial, "joint_positions", 50, 3, np.nextafter(number, 1))
     strict, lenient = (compared(quadruped, other, tolerance=own) for own in (0.0, 1e-6))
 
     assert (strict.identical, strict.first_divergence_step) == (False, 50)
     assert (lenient.identical, lenient.first_divergence_step) == (False, None)
     # Minus zero is another number to the bit.
     assert trial.trajectory["base_position"][0, 1] == 0
-    signed = compared(quadruped, changed(trial, "base_position", (0, 1), -0.0))
+    signed = compared(quadruped, with_value(trial, "base_position", 0, 1, -0.0))
     assert (signed.identical, signed.first_divergence_step) == (False, None)
 
 
 def test_what_was_not_observed_is_not_compared(quadruped: Robot, trial: Trial):
-    lost = changed(trial, "joint_velocities", slice(40, 60), np.nan)
-    found = compared(quadruped, changed(lost, "joint_velocities", np.s_[:, 2], np.nan))
+    lost = lacking(trial, ("joint_velocities",), slice(40, 60))
+    found = compared(quadruped, with_value(lost, "joint_velocities", slice(None), 2, np.nan))
 
     assert found.identical
     assert found.rms("joint_velocities") == 0
