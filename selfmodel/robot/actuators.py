@@ -161,7 +161,7 @@ def command_ranges(model: mujoco.MjModel) -> Ranges:
     """
     ranges = []
     for motor in range(model.nu):
-        ends = _range(model, motor)
+        ends = command_range(model, motor)
         if ends is None:
             raise InputError(
                 f"expected a command range for each motor, got none for the motor "
@@ -173,12 +173,8 @@ def command_ranges(model: mujoco.MjModel) -> Ranges:
     return tuple(ranges)
 
 
-def has_command_range(model: mujoco.MjModel, motor: int) -> bool:
-    """Returns whether a motor has a command range as in ``command_ranges``."""
-    return _range(model, motor) is not None
-
-
-def _range(model: mujoco.MjModel, motor: int) -> Range | None:
+def command_range(model: mujoco.MjModel, motor: int) -> Range | None:
+    """Returns the lowest and highest command of a motor, as in ``command_ranges``, or None."""
     if model.actuator_ctrllimited[motor]:
         low, high = model.actuator_ctrlrange[motor]
         return float(low), float(high)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.robot.actuators import ancestors, command_ranges, has_command_range
+from selfmodel.robot.actuators import ancestors, command_range, command_ranges
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
 from selfmodel.robot.mjcf.settings import check_patterns, value_of
@@ -166,7 +166,7 @@ def add_command_ranges(work: Work) -> None:
     model, ctrlrange = work.model, work.settings.ctrlrange
     if ctrlrange is not None:
         for motor, element in enumerate(work.children("actuator")):
-            if not has_command_range(model, motor):
+            if command_range(model, motor) is None:
                 ends = f"{ctrlrange[0]!r} {ctrlrange[1]!r}"
                 element.attrib.update(ctrlrange=ends, ctrllimited="true")
     try:
