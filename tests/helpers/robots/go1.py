@@ -18,6 +18,8 @@ HIP, KNEE = 0.9, -1.8
 HOME_HEIGHT = 0.272
 """Height of the trunk in the keyframe ``home``, m."""
 
+FLOOR = '<geom name="floor" type="plane" size="0 0 1" contype="1" conaffinity="0" condim="3"/>'
+TRUNK = '<geom class="collision" type="box" size="0.125 0.04 0.057"/>'
 _LEG = """
 <body name="{leg}_hip" pos="{x} {y} 0">
   <inertial pos="0 0 0" mass="0.68" diaginertia="5e-4 7e-4 5e-4"/>
@@ -54,16 +56,16 @@ _MJCF = """
     </default>
   </default>
   <worldbody>
-    <geom name="floor" type="plane" size="0 0 1" contype="1" conaffinity="0" condim="3"/>
+    {floor}
     <body name="trunk" pos="0 0 0.3">
       <freejoint/>
       <inertial pos="0.022 0 0" mass="5.2" diaginertia="0.017 0.063 0.072"/>
-      <geom class="collision" type="box" size="0.125 0.04 0.057"/>
+      {trunk}
       {legs}
     </body>
   </worldbody>
   <actuator>{motors}</actuator>
-  <keyframe><key name="home" qpos="0 0 {height} 1 0 0 0 {angles}"/></keyframe>
+  <keyframe><key name="home" qpos="{home}"/></keyframe>
 </mujoco>"""
 
 _PLACES = {
@@ -90,7 +92,10 @@ def go1(option: str = OPTION) -> str:
         for part, kind in (("hip", "abduction"), ("thigh", "hip"), ("calf", "knee"))
     )
     angles = f"0 {HIP} {KNEE} " * len(_PLACES)
-    return _MJCF.format(option=option, legs=legs, motors=motors, height=HOME_HEIGHT, angles=angles)
+    home = f"0 0 {HOME_HEIGHT} 1 0 0 0 {angles}"
+    return _MJCF.format(
+        option=option, floor=FLOOR, trunk=TRUNK, legs=legs, motors=motors, home=home
+    )
 
 
 def trot(robot: Robot, steps: int, stride: float = 0.12) -> CommandSource:

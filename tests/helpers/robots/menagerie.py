@@ -1,4 +1,4 @@
-"""A four-legged robot in the layout and with the conventions of MuJoCo Menagerie.
+"""The quadruped of ``go1`` in the layout and with the conventions of MuJoCo Menagerie.
 
 Its visual meshes are in group 2 and do not collide; its collision geoms are in group 3; its files
 are in ``go/xml`` and ``go/meshes``; its first keyframe is not ``home``.
@@ -8,60 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-_LEG = """
-<body name="{0}_thigh" pos="{1} {2} 0">
-  <inertial pos="0 0 -0.07" mass="0.6" diaginertia="0.002 0.002 0.0005"/>
-  <joint name="{0}_hip" class="hip"/>
-  <geom class="visual" mesh="thigh"/>
-  <geom class="collision" type="capsule" size="0.015" fromto="0 0 0 0 0 -0.13"/>
-  <body name="{0}_calf" pos="0 0 -0.15">
-    <inertial pos="0 0 -0.07" mass="0.3" diaginertia="0.001 0.001 0.0002"/>
-    <joint name="{0}_knee" class="knee"/>
-    <geom class="visual" mesh="calf"/>
-    <geom class="{3}" {4}/>
-  </body>
-</body>"""
+from tests.helpers.robots.go1 import FLOOR, TRUNK, go1
 
-_ROBOT = """<mujoco model="go">
-  <compiler angle="radian" meshdir="../meshes/" autolimits="true"/>
-  <option timestep="0.004" cone="elliptic" impratio="100"/>
-  <default>
-    <default class="go">
-      <joint axis="0 1 0" damping="0.5" armature="0.01"/>
-      <position kp="30" forcerange="-24 24" inheritrange="1"/>
-      <default class="hip"><joint range="-0.6 1.6"/></default>
-      <default class="knee"><joint range="-2.4 -0.4"/></default>
-      <default class="visual">
-        <geom type="mesh" contype="0" conaffinity="0" group="2" material="dark"/>
-      </default>
-      <default class="collision">
-        <geom group="3"/>
-        <default class="foot"><geom type="sphere" size="0.02" pos="0 0 -0.15"/></default>
-      </default>
-    </default>
-  </default>
-  <asset>
-    <material name="dark" rgba="0.2 0.2 0.2 1"/>
-    <mesh class="go" name="trunk" file="trunk.stl"/>
-    <mesh class="go" file="thigh.stl" scale="0.001 0.001 0.001"/>
-    <mesh class="go" file="calf.stl" refpos="0 0 0.07"/>
-  </asset>
-  <worldbody>
-    <body name="trunk" pos="0 0 0.4" childclass="go">
-      <inertial pos="0 0 0" mass="5" diaginertia="0.02 0.07 0.08"/>
-      <freejoint name="free"/>
-      <geom class="visual" mesh="trunk"/>
-      <geom class="collision" type="{trunk}"/>
-      {legs}
-    </body>
-  </worldbody>
-  <actuator>{motors}</actuator>
-  <keyframe>
-    <key name="down" qpos="0 0 0.1 1 0 0 0 1.4 -2.3 1.4 -2.3 1.4 -2.3 1.4 -2.3"/>
-    <key name="home" qpos="0 0 0.27 1 0 0 0 0.6 -1.2 0.6 -1.2 0.6 -1.2 0.6 -1.2"/>
-  </keyframe>
-</mujoco>
-"""
+_ASSETS = """<asset><mesh name="trunk" file="trunk.stl"/>
+<mesh file="thigh.stl" scale="0.001 0.001 0.001"/>
+<mesh file="calf.stl" refpos="0 0 0.07"/></asset>"""
+_CLASS = '<default class="visual"><geom type="mesh" group="2"/></default>'
+_MESH = '<geom class="collision" type="mesh" mesh="{0}"/>'
+_SEEN = '<geom class="visual" mesh="{0}"/>'
 
 SCENE = """<mujoco model="go scene">
   <include file="go.xml"/>
@@ -76,7 +30,7 @@ SCENE = """<mujoco model="go scene">
   </asset>
   <worldbody>
     <light pos="0 0 1.5" dir="0 0 -1" directional="true"/>
-    <geom name="floor" size="0 0 0.05" type="plane" material="grid"/>
+    <geom name="floor" size="0 0 0.05" type="plane" material="grid" contype="1" condim="3"/>
   </worldbody>
 </mujoco>
 """
@@ -108,17 +62,22 @@ _SHAPES = {
 
 
 def _robot(*, meshes_collide: bool) -> str:
-    foot = ("collision", 'type="mesh" mesh="calf"') if meshes_collide else ("foot", "")
-    places = {"fl": (0.18, 0.1), "fr": (0.18, -0.1), "bl": (-0.18, 0.1), "br": (-0.18, -0.1)}
-    return _ROBOT.format(
-        trunk='mesh" mesh="trunk' if meshes_collide else 'box" size="0.18 0.07 0.04',
-        legs="".join(_LEG.format(leg, *place, *foot) for leg, place in places.items()),
-        motors="".join(
-            f'<position class="{joint}" name="{leg}_{joint}" joint="{leg}_{joint}"/>'
-            for leg in places
-            for joint in ("hip", "knee")
-        ),
-    )
+    text = go1(option='<option timestep="0.004" cone="elliptic" impratio="100"/>')
+    down = f'<key name="down" qpos="0 0 0.1 1 0 0 0 {"0 1.4 -2.3 " * 4}"/>'
+    thigh, foot = '<geom class="collision" size="0.015"', 'class="foot"/>'
+    trunk, calf = (_MESH, _MESH.removeprefix("<geom ")) if meshes_collide else (TRUNK, foot)
+    for old, new in {
+        FLOOR: "",
+        "<compiler ": '<compiler meshdir="../meshes/" ',
+        "<default>\n    <joint": f"{_ASSETS}<default>{_CLASS}<joint",
+        "<keyframe>": f"<keyframe>{down}",
+        TRUNK: f"{_SEEN}{trunk}".format("trunk"),
+        thigh: _SEEN.format("thigh") + thigh,
+        foot: f"{calf}{_SEEN}".format("calf"),
+    }.items():
+        assert old in text
+        text = text.replace(old, new)
+    return text
 
 
 def ellipsoid(

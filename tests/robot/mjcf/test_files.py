@@ -157,4 +157,4 @@ def test_a_package_in_the_layout_of_menagerie_loads_without_settings(tmp_path: P
     robot = load_mjcf(menagerie(tmp_path) / "xml" / name)
 
     assert robot.root == "trunk"
-    assert len(robot.anatomy.joints) == 8
+    assert len(robot.anatomy.joints) == 12
