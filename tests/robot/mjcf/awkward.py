@@ -173,12 +173,6 @@ AWKWARD: dict[str, Awkward] = {
     "unnamed joints and bodies": Awkward(
         mjcf(motors='<motor joint="left_hip" ctrlrange="-1 1"/>').replace('name="right_hip"', "")
     ),
-    "a ball joint in a limb": Awkward(
-        mjcf(legs=LEGS.replace("<geom", '<joint type="ball"/><geom', 1)), "ball"
-    ),
-    "a slide in a limb": Awkward(
-        mjcf(legs=LEGS.replace('name="left_hip"', 'name="left_hip" type="slide"')), "left_hip"
-    ),
     "an unlimited joint": Awkward(mjcf(legs=LEGS.replace('range="-40 40"', ""))),
     "duplicate names": Awkward(mjcf(legs=LEGS + LEG.format("left", "0")), "repeated name"),
     # Actuators.
@@ -198,7 +192,6 @@ AWKWARD: dict[str, Awkward] = {
         mjcf(torso=TORSO + '<site name="s"/>', motors='<general site="s" ctrlrange="0 1"/>'),
         "drive no joint",
     ),
-    "a muscle": Awkward(mjcf(motors='<muscle name="m" joint="left_hip"/>'), "muscle"),
     "an actuator of nothing": Awkward(mjcf(motors='<motor joint="tail"/>'), "tail"),
     "a motor without a range": Awkward(
         mjcf(motors='<motor name="m" joint="left_hip"/>'), "ctrlrange=[-1, 1]"

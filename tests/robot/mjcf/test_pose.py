@@ -61,41 +61,29 @@ def test_a_robot_starts_and_moves_as_from_its_keyframe(
     assert np.allclose(before.xpos, after.xpos, atol=1e-5)
 
 
-def test_a_keyframe_is_chosen_by_name_or_none(tmp_path: Path):
-    keys = "".join(f'<key name="{n}" qpos="0 0 {z} 1 0 0 0 0 0"/>' for n, z in (("a", 1), ("b", 2)))
-    path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
-
-    heights = [
-        load_mjcf(path, MjcfSettings(keyframe=name)).standing_height
-        for name in ("", "a", "b", "none")
-    ]
-
-    assert heights == [1, 1, 2, 0.35]
-    with pytest.raises(InputError, match=r"unknown keyframe 'c'.* a, b, none"):
-        load_mjcf(path, MjcfSettings(keyframe="c"))
-
-
 @pytest.mark.parametrize(
-    ("names", "chosen"),
+    ("names", "wanted", "chosen"),
     [
-        (("down", "home"), "home"),
-        (("standing", "stand"), "stand"),
-        (("down", "standing"), "standing"),
-        (("down", "up"), "down"),
+        (("a", "b"), "", 0),
+        (("a", "b"), "b", 1),
+        (("a", "b"), "none", None),
+        (("down", "home"), "", 1),
+        (("standing", "stand"), "", 1),
+        (("down", "standing"), "", 1),
     ],
 )
-def test_a_robot_starts_in_the_usual_keyframe_or_the_first(
-    names: tuple[str, ...], chosen: str, tmp_path: Path
+def test_a_robot_starts_in_the_keyframe_of_the_settings_or_the_usual_one_or_the_first(
+    names: tuple[str, ...], wanted: str, chosen: int | None, tmp_path: Path
 ):
-    keys = "".join(
-        f'<key name="{name}" qpos="0 0 .35 1 0 0 0 .{number} 0"/>'
-        for number, name in enumerate(names)
-    )
+    keys = "".join(f'<key name="{n}" qpos="0 0 {z} 1 0 0 0 0 0"/>' for z, n in enumerate(names, 1))
     path = written(tmp_path, mjcf(more=f"<keyframe>{keys}</keyframe>"))
+    robot = load_mjcf(path, MjcfSettings(keyframe=wanted))
+    note = "" if chosen is None else f"the initial pose is the keyframe {names[chosen]}"
 
-    notes = load_mjcf(path).notes
-
-    assert f"the initial pose is the keyframe {chosen}" in notes
+    assert robot.standing_height == (0.35 if chosen is None else chosen + 1)
+    assert [one for one in robot.notes if "keyframe" in one] == [note] * bool(note)
+    with pytest.raises(InputError, match=rf"unknown keyframe 'c'.* {', '.join(names)}, none"):
+        load_mjcf(path, MjcfSettings(keyframe="c"))
 
 
 def test_a_keyframe_that_breaks_an_equality_is_refused(tmp_path: Path):

@@ -27,21 +27,22 @@ def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:
     return load_mjcf(path, read_settings(path, extra)).model
 
 
-def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(tmp_path: Path):
-    model = loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), *GAINS)
+@pytest.mark.parametrize(
+    ("left", "limits"),
+    [
+        (TORQUE_MOTORS.splitlines()[0], [-4, 8]),
+        ('<general name="left" joint="left_hip" gainprm="3" gear="2" ctrlrange="-1 2"/>', [-6, 12]),
+    ],
+)
+def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(
+    left: str, limits: list[float], tmp_path: Path
+):
+    model = loaded(tmp_path, mjcf(motors=left + TORQUE_MOTORS.splitlines()[1]), *GAINS)
 
     assert [model.actuator(motor).name for motor in range(model.nu)] == ["left", "right"]
     assert model.actuator_gear[:, 0].tolist() == [1, 1]
-    assert model.actuator_forcerange.tolist() == [[-4, 8], [-7, 7]]
+    assert model.actuator_forcerange.tolist() == [limits, [-7, 7]]
     assert np.array_equal(model.actuator_ctrlrange, model.jnt_range[model.actuator_trnid[:, 0]])
-
-
-def test_a_gain_of_the_motor_is_part_of_its_torque_limits(tmp_path: Path):
-    left = '<general name="left" joint="left_hip" gainprm="3" gear="2" ctrlrange="-1 2"/>'
-    motors = left + TORQUE_MOTORS.splitlines()[1]
-    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
-
-    assert model.actuator_forcerange.tolist() == [[-6, 12], [-7, 7]]
 
 
 def test_a_motor_with_dynamics_stays(tmp_path: Path):
