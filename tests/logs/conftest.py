@@ -106,6 +106,20 @@ def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:
     return TrialPlan(name, "before", Controller(network_for(robot), genome), steps, seed=7)
 
 
+class MadeUpRobot:
+    """A physical robot with made-up samples, which may stop early, and end with an error."""
+
+    def __init__(self, robot: Robot, steps: int = 10**6, error: Exception | None = None) -> None:
+        self._robot, self._steps, self._error = robot, steps, error
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields made-up samples that depend on the controller."""
+        seed = int(controller.genome.sum() * 100) % 1000
+        yield from made_up(self._robot, min(steps, self._steps), seed)
+        if self._error is not None:
+            raise self._error
+
+
 def timed(samples: Iterable[Sample]) -> Iterator[Sample]:
     """Yields the samples with made-up moments: some late, some missing."""
     for k, sample in enumerate(samples):
