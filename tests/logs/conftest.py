@@ -1,5 +1,7 @@
 """What the tests of the log share: a small robot, made-up trials of it, and one log."""
 
+import errno
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -104,6 +106,11 @@ def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:
     """Returns a plan with a random controller."""
     genome = draw_genomes(np.random.default_rng(1), (network_for(robot).weights,))
     return TrialPlan(name, "before", Controller(network_for(robot), genome), steps, seed=7)
+
+
+def full(*_: object, error: int = errno.ENOSPC) -> None:
+    """Fails as a call of the operating system does, by default on a full disk."""
+    raise OSError(error, os.strerror(error))
 
 
 class MadeUpRobot:

@@ -29,7 +29,7 @@ from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample, Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.logs.conftest import STEPS, MadeUpRobot, made_up, plan_of, timed
+from tests.logs.conftest import STEPS, MadeUpRobot, full, made_up, plan_of, timed
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)
 
@@ -63,10 +63,6 @@ def steps_kept(part: Path, robot: Robot) -> int:
             for name in set(rows) & set(sample.values):
                 assert rows[name][k].tobytes() == sample.values[name].tobytes()
     return len(messages.payloads)
-
-
-def full(*_: object, error: int = errno.ENOSPC) -> None:
-    raise OSError(error, os.strerror(error))
 
 
 def assert_same_bits(trajectory: Trajectory, expected: Trajectory):
