@@ -17,7 +17,15 @@ from rosbags.typesys.store import Typestore
 from selfmodel.arrays import FloatArray
 from selfmodel.logs import SchemaMismatchError, read_log
 from selfmodel.logs.log_file import read_contents
-from selfmodel.logs.messages import description, imu, names_in, schema_text, topics, transforms
+from selfmodel.logs.messages import (
+    DEFINITIONS,
+    description,
+    imu,
+    names_in,
+    schema_text,
+    topics,
+    transforms,
+)
 from selfmodel.logs.records import TRIAL, TrialHeader
 from selfmodel.logs.writer import write_trial
 from selfmodel.physical.simulated import SimulatedRobot
@@ -28,15 +36,6 @@ from tests.logs.conftest import MJCF, plan_of
 from tests.logs.edits import rewritten, says
 
 OURS = "selfmodel_msgs/msg/SensorReadings"
-TYPES = [
-    "sensor_msgs/msg/JointState",
-    "nav_msgs/msg/Odometry",
-    "geometry_msgs/msg/Vector3Stamped",
-    "tf2_msgs/msg/TFMessage",
-    "sensor_msgs/msg/Imu",
-    "std_msgs/msg/String",
-    OURS,
-]
 
 NAME = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 SOME = st.lists(NAME, min_size=1, max_size=5).map(tuple)
@@ -101,7 +100,7 @@ def test_the_description_is_rosbags_string_to_the_byte(store: Typestore, text: s
     assert description(text) == bytes(store.serialize_cdr(made, "std_msgs/msg/String"))
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", [kind.replace("/", "/msg/") for kind in DEFINITIONS])
 def test_schemas_are_rosbags_schemas(store: Typestore, name: str):
     assert schema_text(name) == store.generate_msgdef(name, ros_version=2)[0]
 
