@@ -132,6 +132,9 @@ def _parsed(data: bytes, source: str, known: Sequence[str]) -> Controller:
 _TENSOR = "tensor/"
 """Prefix of the names of a network's tensors."""
 
+_GRAPH = ("input", "output", "inputs", "outputs", "nodes")
+"""Attributes of a network beside its tensors."""
+
 
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     """Returns the arrays that only controllers of a design have."""
@@ -143,11 +146,8 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
 
     if isinstance(design, Policy):
         graph = design.graph
-        sizes = {"inputs": graph.inputs, "outputs": graph.outputs}
-        made = {"nodes": graph.nodes, "interface": design.interface}
-        content = msgspec.json.encode(
-            {"input": graph.input, "output": graph.output, **sizes, **made}
-        )
+        of_graph = {name: getattr(graph, name) for name in _GRAPH}
+        content = msgspec.json.encode({**of_graph, "interface": design.interface})
         tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
         return {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
     if isinstance(design, Compensated):
@@ -192,18 +192,19 @@ def _design(
     from selfmodel.controllers.policy import Interface, Policy  # noqa: PLC0415  # few controllers are one
 
     if kind == POLICY:
-        fields = [("input", str), ("output", str), ("inputs", int), ("outputs", int)]
-        fields += [("nodes", tuple[Node, ...]), ("interface", Interface)]
+        types = (str, str, int, int, tuple[Node, ...], Interface)
+        fields = list(zip((*_GRAPH, "interface"), types, strict=True))
         form = msgspec.defstruct("Content", fields, forbid_unknown_fields=True)
-        content: Any = msgspec.json.decode(arrays["content"].tobytes(), type=form)
+        content = msgspec.json.decode(arrays["content"].tobytes(), type=form)
+        of_graph = msgspec.structs.asdict(content)
+        interface = of_graph.pop("interface")
         tensors = {
             name.removeprefix(_TENSOR): np.asarray(each, dtype=np.float64)
             for name, each in arrays.items()
             if name.startswith(_TENSOR)
         }
-        sizes = content.inputs, content.outputs
-        graph = Graph(content.input, content.output, *sizes, content.nodes, tensors)
-        return Policy(*ends, ranges=ranges, graph=graph, interface=content.interface)
+        graph = Graph(**of_graph, tensors=tensors)
+        return Policy(*ends, ranges=ranges, graph=graph, interface=interface)
     # Without a layer, which could have another within, and so on.
     base = _parsed(arrays["base"].tobytes(), source, (*KINDS, POLICY))
     feedback = bool(arrays["feedback"])

@@ -82,7 +82,6 @@ class LogWriteError(OSError):
         again: str = AGAIN,
         kept: str = "what was written before stays in that file",
     ) -> None:
-        self.reason = cause.strerror or str(cause)
         super().__init__(f"{path}: {_reason(cause, again)}; {kept}")
         self.errno = cause.errno
         self.filename = str(path)

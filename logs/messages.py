@@ -109,18 +109,14 @@ class Template:
         self._add(kind.replace("/msg/", "/"), content)
         self.payload = bytes(self._bytes)
 
-    def _add(self, kind: str, content: Mapping[str, Any]) -> None:
-        if kind == "builtin_interfaces/Time":
-            self._stamps.append(self._reserve(4, 8))
-            return
-        for line in DEFINITIONS[kind].splitlines():
-            field, name = line.split(" ")
-            self._add_field(field, content.get(name))
-
-    def _add_field(self, kind: str, value: Any) -> None:  # noqa: ANN401  # see the class
+    def _add(self, kind: str, value: Any) -> None:  # noqa: ANN401  # see the class
         match kind:
+            case "builtin_interfaces/Time":
+                self._stamps.append(self._reserve(4, 8))
             case "string":
-                self._text(value or "")
+                data = (value or "").encode() + b"\x00"
+                self._length(len(data))
+                self._bytes += data
             case "float64":
                 self._gap(1)
             case "float64[]":
@@ -132,9 +128,11 @@ class Template:
             case _ if kind.endswith("[]"):
                 self._length(len(value))
                 for item in value:
-                    self._add_field(kind.removesuffix("[]"), item)
+                    self._add(kind.removesuffix("[]"), item)
             case _:
-                self._add(kind, value or {})
+                for line in DEFINITIONS[kind].splitlines():
+                    field, name = line.split(" ")
+                    self._add(field, (value or {}).get(name))
 
     def _reserve(self, alignment: int, size: int) -> int:
         """Adds zeros, and returns their offset."""
@@ -145,11 +143,6 @@ class Template:
 
     def _length(self, count: int) -> None:
         struct.pack_into("<I", self._bytes, self._reserve(4, 4), count)
-
-    def _text(self, text: str) -> None:
-        data = text.encode() + b"\x00"
-        self._length(len(data))
-        self._bytes += data
 
     def _gap(self, count: int) -> None:
         if count:

@@ -65,12 +65,10 @@ class TrialRunner:
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
         try:
             return run_trial(physical, plan, path, self.robot, header)
-        except HangError:
-            raise
         except TrialError as error:
             # A note reports a robot that could not be stopped. Calibration, comparators and ratios
             # rest on the trial before the failure.
-            unsafe = bool(getattr(error, "__notes__", ()))
+            unsafe = isinstance(error, HangError) or bool(getattr(error, "__notes__", ()))
             if unsafe or plan.stage == "before" or not path.exists():
                 raise
             trial = read_log(path).trial

@@ -110,39 +110,16 @@ _LEGGED_GYM: Mapping[str, Numbers] = MappingProxyType(
     }
 )
 
+_BODY = ("linear_velocity", "angular_velocity", "gravity")
+_JOINTS = ("joint_positions", "joint_velocities", "last_action")
+
 PRESETS: Mapping[str, tuple[tuple[Observed, ...], float, float]] = MappingProxyType(
     {
-        "mujoco_playground": (
-            _terms(
-                *("linear_velocity", "angular_velocity", "gravity", "joint_positions"),
-                *("joint_velocities", "last_action", "velocity"),
-            ),
-            0.5,
-            1.0,
-        ),
-        "isaac_lab": (
-            _terms(
-                *("linear_velocity", "angular_velocity", "gravity", "velocity"),
-                *("joint_positions", "joint_velocities", "last_action"),
-            ),
-            0.5,
-            1.0,
-        ),
-        "legged_gym": (
-            _terms(
-                *("linear_velocity", "angular_velocity", "gravity", "velocity"),
-                *("joint_positions", "joint_velocities", "last_action"),
-                **_LEGGED_GYM,
-            ),
-            0.25,
-            1.0,
-        ),
+        "mujoco_playground": (_terms(*_BODY, *_JOINTS, "velocity"), 0.5, 1.0),
+        "isaac_lab": (_terms(*_BODY, "velocity", *_JOINTS), 0.5, 1.0),
+        "legged_gym": (_terms(*_BODY, "velocity", *_JOINTS, **_LEGGED_GYM), 0.25, 1.0),
         "unitree_rl_gym": (
-            _terms(
-                *("angular_velocity", "gravity", "velocity", "joint_positions"),
-                *("joint_velocities", "last_action", "phase"),
-                **_LEGGED_GYM,
-            ),
+            _terms(*_BODY[1:], "velocity", *_JOINTS, "phase", **_LEGGED_GYM),
             0.25,
             0.8,
         ),
@@ -160,11 +137,9 @@ def read_policy(path: Path, robot: Robot) -> Policy:
             message names the file and what does not fit.
     """
     what = "a policy file"
+    data = read_file(path, what, 2**20)
     try:
-        text = read_file(path, what, 2**20).decode()
-        file = msgspec.convert(load_toml(text), PolicyFile)
-    except InputError:
-        raise
+        file = msgspec.convert(load_toml(data.decode()), PolicyFile)
     # No ValueError in msgspec 0.19.
     except (ValueError, msgspec.ValidationError) as failure:
         raise InputError(f"{path}: expected {what} as TOML: {failure}") from failure
@@ -194,11 +169,10 @@ def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
     terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
     action = file.action
     motors, joints = action.motors or names.motors, file.joints or names.hinges
-    known = {"motor": names.motors, "joint": names.hinges}
-    for what, chosen in (("motor", motors), ("joint", joints)):
+    for what, chosen, known in (("motor", motors, names.motors), ("joint", joints, names.hinges)):
         for name in chosen:
-            if name not in known[what]:
-                raise unknown_name(what, name, known[what])
+            if name not in known:
+                raise unknown_name(what, name, known)
     holding = dict(zip(names.motors, holding_commands(model).tolist(), strict=True))
     initial = [float(model.qpos0[model.joint(name).qposadr[0]]) for name in joints]
     given = scale if action.scale is None else action.scale
@@ -299,21 +273,21 @@ def _of_onnx(data: bytes, path: Path) -> Graph:
 def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
     from onnx import TensorProto, numpy_helper  # noqa: PLC0415  # optional
 
-    values = [(tensor.name, tensor) for tensor in network.initializer]
-    values += [
-        (node.output[0], attribute.t)
+    constants = [
+        (node.output[0], attribute)
         for node in network.node
         for attribute in node.attribute
-        if node.op_type == "Constant" and attribute.name == "value"
+        if node.op_type == "Constant"
     ]
+    values = [(tensor.name, tensor) for tensor in network.initializer]
+    values += [(name, attribute.t) for name, attribute in constants if attribute.name == "value"]
     if any(tensor.data_location == TensorProto.EXTERNAL for _, tensor in values):
         raise ValueError("its weights are in another file: export it with weights inside")
     tensors = {name: _numbers(numpy_helper.to_array(tensor)) for name, tensor in values}
     tensors |= {
-        node.output[0]: np.array(attribute.floats or attribute.f, dtype=np.float64)
-        for node in network.node
-        for attribute in node.attribute
-        if node.op_type == "Constant" and attribute.name in ("value_float", "value_floats")
+        name: np.array(attribute.floats or attribute.f, dtype=np.float64)
+        for name, attribute in constants
+        if attribute.name in ("value_float", "value_floats")
     }
     inputs = [each for each in network.input if each.name not in tensors]
     if len(inputs) != 1 or not network.output:

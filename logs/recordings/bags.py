@@ -151,9 +151,7 @@ def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
             plain = Path(folder, file.stem)
             with plain.open("wb") as target:
                 zstandard.ZstdDecompressor().copy_stream(source, target)
-            inner = _Found()
-            yield from _stored(plain, inner)
-            found.notes.extend(inner.notes)
+            yield from _stored(plain, _Found(notes=found.notes))
             found.digests[file.name] = source.hexdigest()
         return
     for magic, (read, _) in _FORMATS.items():

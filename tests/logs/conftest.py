@@ -1,5 +1,7 @@
 """What the tests of the log share: a small robot, made-up trials of it, and one log."""
 
+import errno
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -104,6 +106,25 @@ def plan_of(robot: Robot, steps: int, name: str = "00-before") -> TrialPlan:
     """Returns a plan with a random controller."""
     genome = draw_genomes(np.random.default_rng(1), (network_for(robot).weights,))
     return TrialPlan(name, "before", Controller(network_for(robot), genome), steps, seed=7)
+
+
+def full(*_: object, error: int = errno.ENOSPC) -> None:
+    """Fails as a call of the operating system does, by default on a full disk."""
+    raise OSError(error, os.strerror(error))
+
+
+class MadeUpRobot:
+    """A physical robot with made-up samples, which may stop early, and end with an error."""
+
+    def __init__(self, robot: Robot, steps: int = 10**6, error: Exception | None = None) -> None:
+        self._robot, self._steps, self._error = robot, steps, error
+
+    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
+        """Yields made-up samples that depend on the controller."""
+        seed = int(controller.genome.sum() * 100) % 1000
+        yield from made_up(self._robot, min(steps, self._steps), seed)
+        if self._error is not None:
+            raise self._error
 
 
 def timed(samples: Iterable[Sample]) -> Iterator[Sample]:

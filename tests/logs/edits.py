@@ -1,9 +1,10 @@
-"""Sound logs with other content: every checksum and digest is that of the changed records."""
+"""Sound files with other content: every checksum and digest is that of the changed records."""
 
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 from mcap.writer import Writer
 
@@ -48,6 +49,14 @@ def rewritten(path: Path, change: Change, *, more: Sequence[McapRecord] = ()) ->
                 )
     writer.finish()
     path.write_bytes(output.getvalue())
+
+
+def altered(data: bytes, **replaced: object) -> bytes:
+    """Returns an archive with some of its arrays replaced, None for left out."""
+    arrays = {**np.load(io.BytesIO(data), allow_pickle=False), **replaced}
+    file = io.BytesIO()
+    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+    return file.getvalue()
 
 
 def says(name: str, /, **texts: str) -> Change:

@@ -136,11 +136,3 @@ def test_verify_looks_into_the_model(log: Path):
     read_log(log)  # nothing loads it
     with pytest.raises(LogError, match=r"<include> \('/etc/passwd'\)"):
         verify(log)
-
-
-def test_verify_compares_the_digest_of_the_file(log: Path):
-    digest = verify(log).digest
-
-    assert verify(log, digest).model_loaded
-    with pytest.raises(CorruptError, match=f"{'0' * 64}.*{digest}"):
-        verify(log, "0" * 64)

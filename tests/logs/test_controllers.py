@@ -13,6 +13,7 @@ from selfmodel.controllers.network import Network
 from selfmodel.errors import InputError
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.logs.controllers import MAX_CONTROLLER_BYTES, controller_bytes, parse_controller
+from tests.logs.edits import altered
 
 PARTS = st.lists(st.text("abc_é", min_size=1, max_size=5), max_size=5).map(tuple)
 
@@ -27,17 +28,7 @@ def controller() -> Controller:
 
 def archive(**replaced: object) -> bytes:
     """The bytes of a controller's file with some of its arrays replaced, None for left out."""
-    good = controller()
-    arrays: dict[str, object] = {
-        "kind": np.array("network"),
-        "sensors": np.array(good.design.sensors),
-        "motors": np.array(good.design.motors),
-        "hidden": np.array(3),
-        "genome": good.genome,
-    } | replaced
-    file = io.BytesIO()
-    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
-    return file.getvalue()
+    return altered(controller_bytes(controller()), **replaced)
 
 
 def cpg(**replaced: object) -> bytes:

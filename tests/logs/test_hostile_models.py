@@ -12,6 +12,7 @@ from selfmodel.logs import LogError, read_log, robots
 from selfmodel.logs.reader import TrialLog
 from selfmodel.logs.robots import robot_of
 from selfmodel.robot.mjcf import load
+from tests.helpers.robots.menagerie import stl
 from tests.logs.conftest import MJCF
 
 TASKS = Path(__file__).parents[2] / "tasks"
@@ -45,15 +46,6 @@ def mesh(file: str, more: str = "") -> str:
     return model.replace("<worldbody>", '<worldbody><geom type="mesh" mesh="m"/>')
 
 
-def stl(faces: int) -> bytes:
-    """Triangles whose corners all lie on a sphere, so that each is a corner of the hull."""
-    corners = np.random.default_rng(0).normal(size=(faces, 3, 3))
-    corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
-    rows = np.zeros(faces, dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
-    rows["v"] = corners
-    return bytes(80) + struct.pack("<I", faces) + rows.tobytes()
-
-
 def png(width: int, height: int) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     pixels = zlib.compress(bytes((3 * width + 1) * height))
@@ -63,6 +55,10 @@ def png(width: int, height: int) -> bytes:
         for kind, body in chunks
     )
 
+
+CORNERS = np.random.default_rng(0).normal(size=(50, 3, 3))
+STL = stl(CORNERS / np.linalg.norm(CORNERS, axis=-1, keepdims=True))
+"""Triangles whose corners all lie on a sphere, so that each is a corner of the hull."""
 
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -80,11 +76,11 @@ def test_a_child_process_is_the_first_to_open_the_model_of_a_log(
 @pytest.mark.parametrize(
     ("mjcf", "files"),
     [
-        (mesh("m.stl"), {"m.stl": stl(50)}),
+        (mesh("m.stl"), {"m.stl": STL}),
         (mesh("m.obj"), {"m.obj": OBJ}),
         (asset('<texture name="t" type="2d" file="t.png"/>'), {"t.png": png(8, 8)}),
         (asset('<texture name="t" builtin="gradient" width="512" height="3072"/>'), {}),
-        (mesh("m.stl"), {"m.stl": stl(50), "../../etc/passwd": b"", "a\0b": b"", "\x1b[2J": b""}),
+        (mesh("m.stl"), {"m.stl": STL, "../../etc/passwd": b"", "a\0b": b"", "\x1b[2J": b""}),
     ],
 )
 def test_what_is_attached_and_small_loads(trial: TrialLog, mjcf: str, files: dict[str, bytes]):
@@ -104,7 +100,7 @@ def test_what_is_attached_and_small_loads(trial: TrialLog, mjcf: str, files: dic
     ],
 )
 def test_no_file_is_read_but_those_attached(trial: TrialLog, element: str):
-    hostile = attacked(trial, asset(element), {"m.stl": stl(50), ".m.stl": b""})
+    hostile = attacked(trial, asset(element), {"m.stl": STL, ".m.stl": b""})
     with pytest.raises(LogError, match=r"names the file '.*', which is not attached"):
         robot_of(hostile)
 
@@ -149,7 +145,7 @@ def test_what_a_model_in_a_log_may_not_ask_for_is_refused_by_name(
     trial: TrialLog, mjcf: str, match: str
 ):
     with pytest.raises(LogError, match=match) as caught:
-        robot_of(attacked(trial, mjcf, {"m.stl": stl(50)}))
+        robot_of(attacked(trial, mjcf, {"m.stl": STL}))
     assert len(str(caught.value)) < 4000
 
 
@@ -157,7 +153,7 @@ def test_what_a_model_in_a_log_may_not_ask_for_is_refused_by_name(
     ("file", "data", "match"),
     [
         ("m.stl", b"", "is empty"),
-        ("m.stl", stl(50)[:-7], "wrong size"),
+        ("m.stl", STL[:-7], "wrong size"),
         ("m.stl", bytes(80) + b"\xff" * 204, "number of faces"),
         ("m.stl", bytes(80) + struct.pack("<I", 4) + b"\xff" * 200, "not finite"),
         ("m.obj", OBJ + b"f 1 2 9999999\n", "does not exist"),

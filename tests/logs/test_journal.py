@@ -1,12 +1,11 @@
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, UnsearchedFault
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, canonical
@@ -19,29 +18,15 @@ from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.results import result_bytes
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.trajectory import Sample
-from selfmodel.trials.trial import Trial
-from tests.logs.conftest import made_up, plan_of
+from selfmodel.trials.trial import Trial, TrialPlan
+from tests.logs.conftest import MadeUpRobot, plan_of
 
 HEAD = '[{"trials": 1, "ranked": [{"hypothesis": "intact", "distance": 1}], "intact_distance": 1, '
 """The beginning of a diagnosis of which nothing is wrong so far."""
 
 
-class MadeUpRobot:
-    """A physical robot that does nothing but tell numbers."""
-
-    def __init__(self, robot: Robot, stops_after: int = 10**6) -> None:
-        self._robot = robot
-        self._steps = stops_after
-
-    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
-        """Yields samples that depend on the controller."""
-        seed = int(controller.genome.sum() * 100) % 1000
-        return made_up(self._robot, min(steps, self._steps), seed)
-
-
-Run = Callable[..., Trial]
-"""A made-up robot's trial of a plan, and the step after which the robot stops."""
+Run = Callable[[TrialPlan], Trial]
+"""A made-up robot's trial of a plan."""
 
 
 @pytest.fixture
@@ -53,7 +38,7 @@ def journal(biped: Robot, tmp_path: Path) -> FolderJournal:
 def run(biped: Robot, journal: FolderJournal) -> Run:
     """Runs and logs a trial of the biped in the journal's folder."""
     runner = TrialRunner(journal.trials, biped, Settings(), {"before": "neuron:0"})
-    return lambda plan, stops_after=10**6: runner(MadeUpRobot(biped, stops_after), plan)
+    return lambda plan: runner(MadeUpRobot(biped), plan)
 
 
 def diagnosis(robot: Robot) -> Diagnosis:

@@ -103,18 +103,12 @@ def messages(log: str) -> list[tuple[str, int, bytes]]:
         ]
 
 
-def is_slow(entry: dict) -> bool:
-    """Whether a command of the old version fits or searches."""
-    name = entry["command"][0]
-    return name in ("calibrate", "diagnose")
-
-
 @pytest.mark.parametrize(
     "entry",
     [
         pytest.param(
             entry,
-            marks=pytest.mark.search if is_slow(entry) else (),
+            marks=pytest.mark.search if entry["command"][0] in ("calibrate", "diagnose") else (),
             id=" ".join(entry["command"])[:60],
         )
         for entry in EXPECTED

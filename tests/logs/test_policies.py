@@ -1,6 +1,5 @@
 """Promises of policy files, of the networks that they name, and of policies in controller files."""
 
-import io
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,6 +33,7 @@ from tests.helpers.policies import (
 )
 from tests.helpers.robots.arms import robot_of
 from tests.helpers.robots.go1 import HIP, KNEE, go1
+from tests.logs.edits import altered
 
 # ---------------------------------------------------------------- policy files
 
@@ -328,14 +328,6 @@ def test_weights_that_float32_lacks_and_names_of_any_kind_come_back(policy: Cont
     design = replace(policy.design, graph=wide)
     before = Controller(design, np.zeros(0))
     assert parse_controller(controller_bytes(before), "here") == before
-
-
-def altered(data: bytes, **replaced: object) -> bytes:
-    """The bytes of a controller with some of its arrays replaced, None for left out."""
-    arrays = {**np.load(io.BytesIO(data), allow_pickle=False), **replaced}
-    file = io.BytesIO()
-    np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
-    return file.getvalue()
 
 
 def text(content: bytes) -> np.ndarray:

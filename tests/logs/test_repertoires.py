@@ -18,6 +18,7 @@ from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.robot.robot import Robot
 from tests.helpers.damage import damaged
 from tests.helpers.drivers import random_repertoire
+from tests.logs.edits import altered
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +50,12 @@ def test_a_repertoire_of_another_model_is_refused(
 
 @pytest.mark.parametrize("name", ["genomes", "scores", "descriptors", "origin", "controller"])
 def test_an_altered_array_is_noticed(repertoire: Repertoire, name: str):
-    with np.load(io.BytesIO(repertoire_bytes(repertoire))) as file:
-        arrays = dict(file)
-    arrays[name].flat[0] += 1
-    altered = io.BytesIO()
-    np.savez_compressed(altered, **arrays)
+    data = repertoire_bytes(repertoire)
+    array = np.load(io.BytesIO(data))[name]
+    array.flat[0] += 1
 
     with pytest.raises(InputError, match="its digest is wrong, so it was altered or damaged; mak"):
-        parse_repertoire(altered.getvalue(), "here")
+        parse_repertoire(altered(data, **{name: array}), "here")
 
 
 @given(data=st.data())

@@ -1,7 +1,6 @@
 """Salvage: the steps before the first damage are saved, and the original is left alone."""
 
 import io
-import os
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
-from tests.logs.conftest import STEPS, made_up, timed
+from tests.logs.conftest import STEPS, full, made_up, timed
 
 FLUSHED = (0, 1, 51, 101, STEPS)
 """Steps after each chunk of the log."""
@@ -114,11 +113,8 @@ def test_a_sound_log_is_not_salvaged(log: Path, saved: Path):
 def test_a_disk_that_fills_leaves_no_half_of_a_log(
     log: Path, saved: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    def fail(*_: object) -> None:
-        raise OSError(28, os.strerror(28))
-
     spoilt_chunk(log, 3)
-    monkeypatch.setattr(Writer, "add_message", fail)
+    monkeypatch.setattr(Writer, "add_message", full)
     with pytest.raises(LogWriteError, match="the disk is full"):
         salvage(log, saved)
     assert [path.name for path in log.parent.iterdir()] == ["trial.mcap"]

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
+from scipy.spatial.transform import Rotation
 
 from selfmodel.logs.viewers import _roll_pitch_yaw, urdf
 from selfmodel.robot.mjcf.settings import MjcfSettings
@@ -18,18 +19,8 @@ def numbers(element: ET.Element | None, name: str) -> np.ndarray:
     return np.array([float(number) for number in element.attrib[name].split()])
 
 
-def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    quaternion, matrix = np.zeros(4), np.zeros(9)
-    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)
-
-
-def from_origin(element: ET.Element) -> tuple[np.ndarray, np.ndarray]:
-    roll, pitch, yaw = numbers(element.find("origin"), "rpy")
-    x, y, z = np.eye(3)
-    turn = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
-    return numbers(element.find("origin"), "xyz"), turn
+def matrix_of(quaternion: np.ndarray) -> np.ndarray:
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
 @pytest.fixture(params=["biped", *sorted(ROBOTS)])
@@ -49,31 +40,26 @@ def test_shapes_stand_where_the_geoms_do(drawn: Robot):
         first, count = body.geomadr[0], body.geomnum[0]
         geoms = range(first, first + count)
         for geom, visual in zip(geoms, link.findall("visual"), strict=True):
-            place, turn = from_origin(visual)
-            matrix = np.zeros(9)
-            mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
+            origin = visual.find("origin")
+            turn = Rotation.from_euler("xyz", numbers(origin, "rpy")).as_matrix()
+            place = numbers(origin, "xyz")
             np.testing.assert_allclose(place, model.geom_pos[geom], atol=1e-7)
-            np.testing.assert_allclose(turn, matrix.reshape(3, 3), atol=1e-7)
+            np.testing.assert_allclose(turn, matrix_of(model.geom_quat[geom]), atol=1e-7)
 
 
 @pytest.mark.parametrize("pitch", [-np.pi / 2, -1.0, 0.0, np.pi / 2])
 @pytest.mark.parametrize("roll", [-2.0, 0.0, 0.7])
 @pytest.mark.parametrize("yaw", [-3.0, 0.0, 1.1])
 def test_a_turn_is_told_in_angles_even_straight_up_and_down(roll: float, pitch: float, yaw: float):
-    x, y, z = np.eye(3)
-    turn = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, turn.ravel())
-    roll, pitch, yaw = _roll_pitch_yaw(quaternion)
-    told = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
-    np.testing.assert_allclose(told, turn, atol=1e-7)
+    turn = Rotation.from_euler("xyz", (roll, pitch, yaw))
+    told = Rotation.from_euler("xyz", _roll_pitch_yaw(turn.as_quat(scalar_first=True)))
+    np.testing.assert_allclose(told.as_matrix(), turn.as_matrix(), atol=1e-7)
 
 
 def inertia_in_body(model: mujoco.MjModel, name: str) -> np.ndarray:
     """The inertia of a body about its centre of mass, in the body's frame."""
-    body, matrix = model.body(name), np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, body.iquat)
-    turn = matrix.reshape(3, 3)
+    body = model.body(name)
+    turn = matrix_of(body.iquat)
     return turn @ np.diag(body.inertia) @ turn.T
 
 

@@ -29,7 +29,7 @@ from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample, Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.logs.conftest import STEPS, made_up, plan_of, timed
+from tests.logs.conftest import STEPS, MadeUpRobot, full, made_up, plan_of, timed
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True, width=64)
 
@@ -63,10 +63,6 @@ def steps_kept(part: Path, robot: Robot) -> int:
             for name in set(rows) & set(sample.values):
                 assert rows[name][k].tobytes() == sample.values[name].tobytes()
     return len(messages.payloads)
-
-
-def full(*_: object, error: int = errno.ENOSPC) -> None:
-    raise OSError(error, os.strerror(error))
 
 
 def assert_same_bits(trajectory: Trajectory, expected: Trajectory):
@@ -395,21 +391,7 @@ def test_the_robot_stops_before_the_log_is_closed(biped: Robot, tmp_path: Path):
     assert order == [False, False]
 
 
-class Untimed:
-    """A physical robot with made-up samples, which may end with an error."""
-
-    def __init__(self, robot: Robot, steps: int = 10**6, error: Exception | None = None) -> None:
-        self._robot, self._steps, self._error = robot, steps, error
-
-    def run(self, controller: Controller, steps: int) -> Iterator[Sample]:
-        """Yields made-up samples that depend on the controller."""
-        seed = int(controller.genome.sum() * 100) % 1000
-        yield from made_up(self._robot, min(steps, self._steps), seed)
-        if self._error is not None:
-            raise self._error
-
-
-class Timed(Untimed):
+class Timed(MadeUpRobot):
     """A physical robot with a clock of its own."""
 
     def clock(self) -> float:
@@ -421,12 +403,12 @@ class Timed(Untimed):
         return timed(super().run(controller, steps))
 
 
-@pytest.mark.parametrize("kind", [Untimed, Timed])
+@pytest.mark.parametrize("kind", [MadeUpRobot, Timed])
 def test_a_physical_trial_is_that_of_its_log_and_timed_as_the_robot_is(
-    biped: Robot, tmp_path: Path, kind: type[Untimed]
+    biped: Robot, tmp_path: Path, kind: type[MadeUpRobot]
 ):
     path = tmp_path / "trial.mcap"
-    header = TrialHeader(Settings(), timed=kind is Untimed)  # the robot decides
+    header = TrialHeader(Settings(), timed=kind is MadeUpRobot)  # the robot decides
     trial = run_trial(kind(biped), plan_of(biped, 20), path, biped, header)
     log = read_log(path)
 
@@ -442,7 +424,7 @@ def test_a_trial_that_the_robot_cannot_finish_is_a_trial_as_far_as_it_goes(
     error = HangError("step hangs") if case == "hanging" else TrialError("it fell")
     if case == "not stopped":
         error.add_note("the safe command could not be sent")
-    robot = Untimed(biped, MIN_STEPS - (case == "short"), error)
+    robot = MadeUpRobot(biped, MIN_STEPS - (case == "short"), error)
     plan = plan_of(biped, 2 * MIN_STEPS, "02-recovery")
     plan = dataclasses.replace(plan, stage="before" if case == "before" else "recovery")
     run = TrialRunner(tmp_path, biped, Settings())

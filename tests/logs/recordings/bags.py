@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from mcap.writer import Writer as McapWriter
@@ -57,17 +58,36 @@ def write_mcap(
 
     The names of types lack their middle, as in old recordings.
     """
+    rows = []
+    for topic, time, message in sorted(items, key=lambda item: item[1]):
+        kind = message.__msgtype__
+        data = ROS.serialize_cdr(message, kind) if encoding == "cdr" else ros1_payload(message)
+        rows.append((Defined(topic, kind.replace("/msg/", "/"), encoding=encoding), time, data))
+    return write_defined(path, rows, **options)
+
+
+class Defined(NamedTuple):
+    """A topic of MCAP, with the definition of its type."""
+
+    topic: str
+    kind: str
+    definition: str = ""
+    language: str = "ros2msg"
+    encoding: str = "cdr"
+
+
+def write_defined(
+    path: Path, rows: Iterable[tuple[Defined, int, bytes | memoryview]], **options: object
+) -> int:
+    """Writes messages as bytes with their log times; see ``write_mcap``."""
     with path.open("wb") as file:
         writer, channels = McapWriter(file, **options), {}
         writer.start("ros2")
-        for topic, time, message in sorted(items, key=lambda item: item[1]):
-            kind = message.__msgtype__
-            if topic not in channels:
-                schema = writer.register_schema(kind.replace("/msg/", "/"), "ros2msg", b"")
-                channels[topic] = writer.register_channel(topic, encoding, schema)
-            cdr = encoding == "cdr"
-            data = bytes(ROS.serialize_cdr(message, kind) if cdr else ros1_payload(message))
-            writer.add_message(channels[topic], time, data, time)
+        for of, time, data in rows:
+            if of not in channels:
+                schema = writer.register_schema(of.kind, of.language, of.definition.encode())
+                channels[of] = writer.register_channel(of.topic, of.encoding, schema)
+            writer.add_message(channels[of], time, bytes(data), time)
         end = file.tell()
         writer.finish()
     return end
@@ -111,20 +131,6 @@ def storage(folder: Path) -> Path:
     """The one storage file of a bag."""
     (found,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
     return found
-
-
-def spoilt(data: bytes, damage: str, rng: np.random.Generator) -> bytes:
-    """Data with one ``flip`` of a bit, ``cut``, or 64 bytes of ``garbage``, at a random place."""
-    found = bytearray(data)
-    at = int(rng.integers(len(data)))
-    match damage:
-        case "flip":
-            found[at] ^= 1 << int(rng.integers(8))
-        case "cut":
-            del found[at:]
-        case "garbage":
-            found[at : at + 64] = rng.bytes(64)[: len(data) - at]
-    return bytes(found)
 
 
 def made(kind: str, **values: object) -> object:

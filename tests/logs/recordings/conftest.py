@@ -56,6 +56,9 @@ topic = "/left_foot"
 threshold = 5.0
 """
 
+JOINTS_ONLY = MAPPING.partition("[base]")[0].replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
+"""A mapping of joints and of commands that have names."""
+
 
 def angle(joint: int, seconds: float) -> float:
     """Where a joint of the made-up recording is."""
@@ -96,6 +99,8 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_bag(tmp_path_factory.mktemp("recorded") / "bag", recorded())
 
 
-def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> ImportedTrial:
-    """Imports a bag of the biped."""
-    return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
+def imported(
+    path: Path, robot: Robot, mapping: str = MAPPING, run: int | None = None
+) -> ImportedTrial:
+    """Imports a recording of the biped, by default a bag."""
+    return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot, run)

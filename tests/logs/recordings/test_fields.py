@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
 from rosbags.typesys import get_types_from_msg
 
 from selfmodel.errors import InputError
@@ -17,12 +16,14 @@ from selfmodel.robot.robot import Robot
 from tests.logs.recordings.bags import (
     ROS,
     T0,
+    Defined,
     header,
     low_command,
     low_state,
     made,
     storage,
     write_bag,
+    write_defined,
 )
 from tests.logs.recordings.conftest import imported
 
@@ -137,25 +138,15 @@ def of_lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     kind = "lab_msgs/msg/State"
     ROS.register(get_types_from_msg(STATE, kind))
     path = tmp_path_factory.mktemp("lab") / "bag.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros2")
-        known, unknown = (
-            writer.register_schema(kind, encoding, STATE.encode())
-            for encoding in ("ros2msg", "ros2idl")
-        )
-        topics = {
-            "/state": writer.register_channel("/state", "cdr", known),
-            "/undefined": writer.register_channel("/undefined", "cdr", unknown),
-        }
-        for k in range(50):
-            stamp, seen = T0 + k * 10**7, 3 if k < 1 or 20 <= k < 24 else 4
-            joints = [made("lab_msgs/msg/Joint", angle=k / 100 + j) for j in range(seen)]
-            message = made(kind, header=header(stamp), joints=joints, wanted=[1, 2, 3, 4])
-            data = bytes(ROS.serialize_cdr(message, kind))
-            for channel in topics.values():
-                writer.add_message(channel, stamp + 5_000_000, data, stamp)
-        writer.finish()
+    topics = Defined("/state", kind, STATE), Defined("/undefined", kind, STATE, "ros2idl")
+    rows = []
+    for k in range(50):
+        stamp, seen = T0 + k * 10**7, 3 if k < 1 or 20 <= k < 24 else 4
+        joints = [made("lab_msgs/msg/Joint", angle=k / 100 + j) for j in range(seen)]
+        message = made(kind, header=header(stamp), joints=joints, wanted=[1, 2, 3, 4])
+        data = ROS.serialize_cdr(message, kind)
+        rows += [(topic, stamp + 5_000_000, data) for topic in topics]
+    write_defined(path, rows)
     return path
 
 
@@ -199,17 +190,10 @@ def test_a_mistake_has_its_line(right: str, wrong: str, named: str, of_lab: Path
 def test_a_type_of_the_bag_goes_before_that_of_ros(biped: Robot, tmp_path: Path):
     """Types differ between distributions; and a suggestion reads topics that nobody needs."""
     path = tmp_path / "bag.mcap"
-    newer = "geometry_msgs/msg/Twist", "float64[2] linear\nuint8 more\n"
-    other = "geometry_msgs/msg/Accel", ""
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros2")
-        for topic, (kind, definition) in (("/newer", newer), ("/other", other)):
-            schema = writer.register_schema(kind, "ros2msg", definition.encode())
-            channel = writer.register_channel(topic, "cdr", schema)
-            data = b"\0\1\0\0" + np.array([1.0, 2.0]).tobytes() + b"\7"
-            writer.add_message(channel, T0, data, T0)
-        writer.finish()
+    newer = Defined("/newer", "geometry_msgs/msg/Twist", "float64[2] linear\nuint8 more\n")
+    other = Defined("/other", "geometry_msgs/msg/Accel")
+    data = b"\0\1\0\0" + np.array([1.0, 2.0]).tobytes() + b"\7"
+    write_defined(path, [(newer, T0, data), (other, T0, data)])
 
     found = read_bag(path).series
 
@@ -238,12 +222,7 @@ LINE = "=" * 80
 )
 def test_an_odd_definition_damages_no_bag(*, definition: str, is_defined: bool, tmp_path: Path):
     path = tmp_path / "bag.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros2")
-        schema = writer.register_schema("lab_msgs/msg/Odd", "ros2msg", definition.encode())
-        writer.add_message(writer.register_channel("/odd", "cdr", schema), T0, b"\0\1\0\0\7", T0)
-        writer.finish()
+    write_defined(path, [(Defined("/odd", "lab_msgs/msg/Odd", definition), T0, b"\0\1\0\0\7")])
 
     series = read_bag(path).series["/odd"]
 

@@ -100,11 +100,6 @@ def test_nothing_is_a_gap_within_its_own_rate(periods: list[int]):
     assert np.flatnonzero(silent).tolist() == [lost]
 
 
-def test_samples_within_a_control_step_are_no_gap():
-    times = np.cumsum([0, 2, 2, 2, 6, 2, 2, 2, 2, 12, 2, 2]).astype(float)
-    assert np.flatnonzero(np.diff(times) > reach(times, 10.0)[:-1]).tolist() == [8]
-
-
 def test_a_measurement_that_is_held_grows_too_old():
     times, values = np.array([0.0, 1.0, 2.0]), np.ones((3, 1))
     result = hold(times, values, np.array([-0.1, 0.0, 2.4, 3.5, 3.6]), reach(times))

@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.logs.recordings.importer import ImportedTrial, import_recording
-from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.robot.robot import Robot
 from tests.logs.recordings.bags import T0, joint_state, write_bag, write_ros1
-from tests.logs.recordings.conftest import JOINTS, MAPPING
+from tests.logs.recordings.conftest import JOINTS, JOINTS_ONLY, imported
 from tests.logs.recordings.table_files import MAPPING as OF_TABLE, columns, write_npz
-
-
-def imported(path: Path, robot: Robot, mapping: str, run: int | None = None) -> ImportedTrial:
-    return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot, run)
 
 
 def test_a_table_of_two_runs_is_refused_until_one_is_chosen(biped: Robot, tmp_path: Path):
@@ -47,8 +41,6 @@ def test_every_topic_of_a_bag_has_its_own_part_of_a_run(
     *, rare: bool, ros1: bool, biped: Robot, tmp_path: Path
 ):
     """The clock of a simulation restarts; a rare topic has too few messages to show it."""
-    mapping, _, _ = MAPPING.partition("[base]")
-    mapping = mapping.replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
     every = 40 if rare else 2
     runs = [
         [
@@ -72,9 +64,9 @@ def test_every_topic_of_a_bag_has_its_own_part_of_a_run(
         bag = write_ros1(tmp_path / "a.bag", chain(*runs), key=lambda _: 0)
 
     with pytest.raises(InputError, match=r"2 runs of 0\.995, 1\.495 s"):
-        imported(bag, biped, mapping)
+        imported(bag, biped, JOINTS_ONLY)
     for run, low in ((1, 0), (2, 10)):
-        found = imported(bag, biped, mapping, run).trajectory
+        found = imported(bag, biped, JOINTS_ONLY, run).trajectory
         for signal in ("joint_positions", "commands"):
             values = found[signal][:, 0]
             assert low <= values.min() <= values.max() < low + 4
@@ -110,11 +102,9 @@ def test_runs_of_the_time_stamps_are_found_too(biped: Robot, tmp_path: Path):
         stamp = T0 + k * 5_000_000 - (20 * 10**9 if k >= 150 else 0)
         state = joint_state(stamp, JOINTS, [k / 1000] * 4)
         items += [(topic, T0 + k * 5_000_000, state) for topic in ("/joint_states", "/commands")]
-    mapping, _, _ = MAPPING.partition("[base]")
-    mapping = mapping.replace('order = ["RHY", "RHX", "LHY", "LHX"]\n', "")
     path = write_ros1(tmp_path / "a.bag", items)
 
     with pytest.raises(InputError, match=r"2 runs of 0\.745, 1\.245 s"):
-        imported(path, biped, mapping)
-    assert imported(path, biped, mapping, 2).trajectory["joint_positions"][0, 0] == 0.15
-    assert imported(path, biped, f'clock = "log"\n{mapping}').trajectory.steps == 200
+        imported(path, biped, JOINTS_ONLY)
+    assert imported(path, biped, JOINTS_ONLY, 2).trajectory["joint_positions"][0, 0] == 0.15
+    assert imported(path, biped, f'clock = "log"\n{JOINTS_ONLY}').trajectory.steps == 200

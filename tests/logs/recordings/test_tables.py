@@ -12,14 +12,13 @@ import pytest
 from selfmodel.arrays import frozen
 from selfmodel.errors import InputError
 from selfmodel.logs.recordings import tables
-from selfmodel.logs.recordings.importer import ImportedTrial, import_recording
-from selfmodel.logs.recordings.mapping_file import parse_mapping
 from selfmodel.logs.recordings.recording import TABLE, Series
 from selfmodel.logs.recordings.suggest import suggest
 from selfmodel.logs.recordings.tables import export, read_table
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
+from tests.logs.recordings.conftest import imported
 from tests.logs.recordings.table_files import MAPPING, WRITERS, columns, write_csv, write_npz
 
 START = 1_700_000_000_123_456_789
@@ -131,16 +130,12 @@ def test_numbers_of_every_type_of_parquet_are_columns_and_missing_ones_are_nan(t
 # ---------------------------------------------------------------- import
 
 
-def imported(path: Path, robot: Robot, mapping: str = MAPPING) -> ImportedTrial:
-    return import_recording(path, parse_mapping(mapping, "MAP.toml"), robot)
-
-
 @pytest.mark.parametrize("form", WRITERS)
 def test_columns_become_signals_in_the_models_units_and_signs(
     form: str, biped: Robot, tmp_path: Path
 ):
     found = columns()
-    recording = imported(WRITERS[form](tmp_path / f"t.{form}", found), biped)
+    recording = imported(WRITERS[form](tmp_path / f"t.{form}", found), biped, MAPPING)
     signals = recording.trajectory
 
     assert (signals.steps, recording.clock) == (20, "column")
@@ -205,7 +200,7 @@ def test_rows_are_sorted_and_those_without_a_time_or_number_are_left_out(
     twice["q_0"][-1] = 9.0  # the first of equal times is kept
     twice["time"][27] = np.nan
     twice["q_2"][:4] = np.nan, np.inf, 1e300, np.nan
-    recording = imported(write_csv(tmp_path / "t.csv", twice), biped)
+    recording = imported(write_csv(tmp_path / "t.csv", twice), biped, MAPPING)
     positions = recording.trajectory["joint_positions"]
 
     np.testing.assert_array_equal(positions[:, 0], found["q_0"][::2])
