@@ -4,7 +4,7 @@ import base64
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, mean_of_known
 from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.diagnosis.choice import prepared_trial
 from selfmodel.diagnosis.losses import simulate
@@ -133,7 +133,7 @@ def _heat_map(
             value_label="root mean square error, 1: large",
             begin=tuple(begins.tolist()),
             end=tuple(ends.tolist()),
-            rows=tuple(charts.Row(name, tuple(row.tolist())) for name, row in rows),
+            rows=tuple(charts.Group(name, tuple(row.tolist())) for name, row in rows),
             largest=max(largest, 1.0),
             marks=marks,
         )
@@ -172,21 +172,12 @@ def sensor_errors(
             predicted = result.trajectory[signal][0]
             predicted = predicted if isinstance(request, Segments) else predicted[rows]
             error = difference(signal, predicted, trajectory[signal][rows])
-            errors.append(_rms(error / PREDICTION_ERROR_SCALES[signal]))
+            squares = (error / PREDICTION_ERROR_SCALES[signal]) ** 2
+            errors.append(np.sqrt(mean_of_known(squares, axis=1, empty=np.nan)).T)
             names += [f"{prefix}{name}" for name in trajectory.names.columns(signal)]
     if not errors:
         return None
     return names, trajectory.time[rows[:, [0, -1]]].T, np.concatenate(errors)
-
-
-def _rms(errors: FloatArray) -> FloatArray:
-    """Returns the root mean square over the steps of windows, ``(columns, windows)``."""
-    known = np.isfinite(errors)
-    counts = known.sum(axis=1)
-    squares = np.where(known, errors, 0.0) ** 2
-    mean = np.full(counts.shape, np.nan)
-    np.divide(squares.sum(axis=1), counts, out=mean, where=counts > 0)
-    return np.asarray(np.sqrt(mean).T)
 
 
 def separation_section(subject: Subject) -> Section:
