@@ -7,7 +7,6 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.report.campaign import (
     MAX_INTEGER,
-    is_campaign,
     other_lists,
     read_table,
     report_of_campaign,
@@ -96,7 +95,6 @@ def test_figures_beyond_the_limit_are_left_out_and_named(folder: Path):
 
 
 def test_a_folder_without_tables_is_no_campaign(tmp_path: Path):
-    assert not is_campaign(tmp_path)
     with pytest.raises(InputError, match="or of a campaign with a table such as"):
         report_of_campaign(tmp_path)
 
