@@ -50,8 +50,8 @@ FILE = "separating.npz"
 
 def residual_section(subject: Subject) -> Section | None:
     """Returns the section of the residual; None if the comparator has no losses over time."""
-    offsets, marks = _axis(subject)
-    items = [*_loss_charts(subject, offsets, marks), *_heat_map(subject, offsets, marks)]
+    begins, marks = _axis(subject)
+    items = [*_loss_charts(subject, begins, marks), *_heat_map(subject, begins, marks)]
     if not items:
         return None
     text = [RESIDUAL]
@@ -65,33 +65,27 @@ def residual_section(subject: Subject) -> Section | None:
     return Section("residual", "Residual over time", tuple(text), tuple(items))
 
 
-def _axis(subject: Subject) -> tuple[dict[str, float], tuple[charts.Mark, ...]]:
-    """Returns a time axis of all trials, one after the other: their beginnings, s, and marks.
-
-    The beginnings are by the path of a trial; marks are of them and of a change of the robot.
-    """
-    offsets: dict[str, float] = {}
-    marks: list[charts.Mark] = []
-    now = 0.0
-    for trial in subject.damaged:
-        offsets[trial.path] = now
-        marks.append(charts.Mark(subject.names[trial.path], now))
-        change = subject.change_of(trial)
-        if change is not None:
-            marks.append(charts.Mark("change of the robot", *(now + time for time in change)))
-        now += float(trial.trajectory.time[-1]) + subject.robot.control_timestep
-    return offsets, tuple(marks)
+def _axis(subject: Subject) -> tuple[FloatArray, tuple[charts.Mark, ...]]:
+    """Returns where each trial begins, s, one after the other, and marks there and at a change."""
+    step, marks = subject.robot.control_timestep, list[charts.Mark]()
+    lengths = [float(trial.trajectory.time[-1]) + step for trial in subject.damaged]
+    begins = np.cumsum([0.0, *lengths[:-1]])
+    for trial, begin in zip(subject.damaged, begins.tolist(), strict=True):
+        marks.append(charts.Mark(subject.names[trial.path], begin))
+        if (change := subject.change_of(trial)) is not None:
+            marks.append(charts.Mark("change of the robot", *(begin + time for time in change)))
+    return begins, tuple(marks)
 
 
 def _loss_charts(
-    subject: Subject, offsets: dict[str, float], marks: tuple[charts.Mark, ...]
+    subject: Subject, begins: FloatArray, marks: tuple[charts.Mark, ...]
 ) -> list[Item]:
     table, trials = subject.losses, subject.damaged
     timeline = table.timeline(trials)
     if timeline is None:
         return []
-    begin = np.array([offsets[trials[int(i)].path] for i in timeline.trial])
-    middle = tuple((begin + (timeline.begin + timeline.end) / 2).tolist())
+    middles = begins[timeline.trial] + (timeline.begin + timeline.end) / 2
+    middle = tuple(middles.tolist())
     names, hypotheses = zip(*subject.shown_hypotheses, strict=True)
     best = subject.diagnosis.best
     losses = dict(zip(names, table.losses(hypotheses, trials), strict=True))
@@ -112,12 +106,10 @@ def _loss_charts(
     ]
 
 
-def _heat_map(
-    subject: Subject, offsets: dict[str, float], marks: tuple[charts.Mark, ...]
-) -> list[Item]:
+def _heat_map(subject: Subject, begins: FloatArray, marks: tuple[charts.Mark, ...]) -> list[Item]:
     best = subject.diagnosis.best
-    by_trial = [(trial.path, sensor_errors(subject, trial, best)) for trial in subject.damaged]
-    known = [(offsets[path], one) for path, one in by_trial if one is not None]
+    by_trial = [sensor_errors(subject, trial, best) for trial in subject.damaged]
+    known = [(at, one) for at, one in zip(begins, by_trial, strict=True) if one is not None]
     if not known:
         return []
     names = known[0][1][0]

@@ -14,8 +14,9 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.arrays import finite_or_none
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError
 from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.plugins import check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
 from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
@@ -328,8 +329,7 @@ def check_format(wanted: str | None) -> None:
 
 def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
     """Returns the content of the files of tables by their name; a table without a row has none."""
-    if wanted not in FORMATS:
-        raise unknown_name("table format", wanted, FORMATS)
+    check_known("table format", wanted, FORMATS)
     suffix, write = FORMATS[wanted]
     return {f"{table.name}.{suffix}": write(table) for table in tables if len(table.records)}
 
