@@ -13,7 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from selfmodel.arrays import finite_or_none
+from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import check_known
@@ -111,18 +111,6 @@ def medians(rows: Sequence[Row], *names: str) -> Row:
 def recovered_over_before(rows: Sequence[Row]) -> list[float]:
     """Returns the recovered part of the score before the failure, where that is above 0."""
     return [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
-
-
-def as_json(value: Any) -> Any:  # noqa: ANN401  # JSON
-    """Returns rows or summaries as JSON: intervals as objects, unknown numbers as null."""
-    match value:
-        case Interval():
-            return as_json(dataclasses.asdict(value))
-        case Mapping():
-            return {key: as_json(inner) for key, inner in value.items()}
-        case list() | tuple():
-            return [as_json(inner) for inner in value]
-    return finite_or_none(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)
@@ -270,7 +258,7 @@ def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -
 
 def json_bytes(facts: Mapping[str, Any]) -> bytes:
     """Returns rows and summaries as a JSON file."""
-    return f"{json.dumps(as_json(facts), indent=1, allow_nan=False)}\n".encode()
+    return f"{json.dumps(to_json(facts), indent=1, allow_nan=False)}\n".encode()
 
 
 def csv_bytes(frame: pd.DataFrame) -> bytes:
