@@ -6,7 +6,6 @@ The reader is narrow on purpose: it takes every table (``*.csv``, ``*.jsonl``, a
 value its type, and ``_column`` those of a CSV file theirs.
 """
 
-import base64
 import csv
 import io
 import math
@@ -137,8 +136,7 @@ def _figures(folder: Path, most: int) -> Section | None:
             continue
         data = read_file(path, "a figure", most)
         most -= len(data)
-        encoded = base64.b64encode(data).decode("ascii")
-        shown.append(Picture(encodable(path.stem), MEDIA_TYPES[path.suffix], encoded))
+        shown.append(Picture(encodable(path.stem), MEDIA_TYPES[path.suffix], data))
     text = f"Left out, because the report would become too large: {', '.join(left_out)}."
     if not shown and not left_out:
         return None

@@ -135,17 +135,17 @@ class Table(Item, frozen=True, tag="table"):
 
 
 class Picture(Item, frozen=True, tag="picture"):
-    """A picture: media type, such as ``image/png``, and the file in base64."""
+    """A picture: media type, such as ``image/png``, and the file, base64 in JSON."""
 
     media_type: str
-    data: str
+    data: bytes
 
 
 class Attachment(Item, frozen=True, tag="file"):
-    """A file that the reader can save: its name, and the file in base64."""
+    """A file that the reader can save: its name and content, base64 in JSON."""
 
     name: str
-    data: str
+    data: bytes
 
 
 class Section(msgspec.Struct, frozen=True):

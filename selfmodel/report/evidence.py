@@ -1,7 +1,5 @@
 """Sections of the evidence: loss over time and by sensor, and what cannot be distinguished."""
 
-import base64
-
 import numpy as np
 
 from selfmodel.arrays import FloatArray, mean_of_known
@@ -218,9 +216,8 @@ def _separating_trials(subject: Subject) -> tuple[Item, ...]:
     )
     if separating is None:
         return (chart,)
-    data = base64.b64encode(controller_bytes(separating)).decode("ascii")
     title = f"the controller of a separating trial, for selfmodel trial --controller {FILE}"
-    return chart, charts.Attachment(title, FILE, data)
+    return chart, charts.Attachment(title, FILE, controller_bytes(separating))
 
 
 def _separating_controller(subject: Subject, steps: int) -> Controller | None:
