@@ -23,7 +23,7 @@ from selfmodel.robot.motion import (
     visible_geoms,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.trajectory import Trajectory
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 MAX_POSES = 400_000
@@ -57,8 +57,7 @@ class Motion:
     @property
     def displacement(self) -> float:
         """Forward displacement, m; NaN if the simulation diverged."""
-        x = self.trajectory["base_position"][:, 0]
-        return np.nan if self.diverged else float(x[-1] - x[0])
+        return np.nan if self.diverged else float(forward_displacement(self.trajectory))
 
     @property
     def is_drawn(self) -> bool:
