@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.studies.study import Study, points_of, rows_in, study_in
+from selfmodel.studies.study import Study, points_of, rows_in, shared_in
 from tests.helpers.grids import cell
 
 
@@ -57,7 +57,7 @@ def test_rows_have_the_axes_and_what_the_function_returned(
             for _ in range(count)
         ]
     )
-    assert (study_in(tmp_path), study_in(tmp_path / "none")) == ("mine", None)
+    assert (shared_in(tmp_path)["study"], shared_in(tmp_path / "none")) == ("mine", {})
 
 
 def test_a_study_is_extended_by_points_and_refuses_other_settings_before_anything_is_run(
