@@ -8,6 +8,7 @@ import pandas as pd
 from selfmodel.cli.commands import Compare
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.tables import show
+from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
 from selfmodel.studies import figures, tables as formats
 from selfmodel.studies.comparisons import LEVEL
@@ -46,7 +47,7 @@ def compare(options: Compare) -> None:
             "marginal_means": mean_rows,
             "files": files,
         }
-        print_json(formats.as_json(facts), indent=1)
+        print_json(to_json(facts), indent=1)
         return
     _print_comparison(found, pair_rows, means)
     print_lines(*files)
@@ -54,7 +55,7 @@ def compare(options: Compare) -> None:
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """Returns the rows of a frame of statistics; the names of a table as one text."""
-    rows = formats.as_json(frame.to_dict("records"))
+    rows = to_json(frame.to_dict("records"))
     return [{**row, "table": ", ".join(row["table"])} for row in rows]
 
 

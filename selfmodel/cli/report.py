@@ -11,7 +11,8 @@ from selfmodel.cli.output import print_json, print_lines
 from selfmodel.errors import InputError, WorkError
 from selfmodel.faults.kind import FaultKind
 from selfmodel.logs.files import write_new
-from selfmodel.report import campaign, subject as subjects
+from selfmodel.report import subject as subjects
+from selfmodel.report.campaign import report_of_campaign
 from selfmodel.report.charts import REPORT, Report, html_of
 from selfmodel.report.content import report_of
 from selfmodel.simulation.simulator import thread_count
@@ -50,12 +51,7 @@ def _of_folder(folder: Path, options: MakeReport, kinds: Sequence[FaultKind]) ->
     if subjects.is_run(folder):
         comparator = options.comparator
         return report_of(subjects.subject_of_run(folder, options.threads, comparator, kinds))
-    if campaign.is_campaign(folder):
-        return campaign.report_of_campaign(folder)
-    raise InputError(
-        f"{folder}: expected the folder of a run with its trials and diagnoses.json, or of a "
-        f"campaign with a table such as results.csv, got neither"
-    )
+    return report_of_campaign(folder)
 
 
 def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:

@@ -12,6 +12,7 @@ from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
+from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
@@ -105,7 +106,7 @@ def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Re
     paths = [str(path) for path in formats.write_files(study.folder, files)]
     if options.as_json:
         failures = [{"run": one.name, "error": one.error} for one in failed]
-        facts = formats.as_json({**found.facts, "failures": failures, "files": paths})
+        facts = to_json({**found.facts, "failures": failures, "files": paths})
         print_json(facts, indent=1)
     else:
         if len(rows := found.shown.shown):

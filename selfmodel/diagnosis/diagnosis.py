@@ -332,13 +332,13 @@ def diagnosis_from_dict(values: Mapping[str, Any], parse: Callable[[str], Hypoth
 
 
 def to_json(value: object) -> Any:  # noqa: ANN401  # JSON values
-    """Returns the JSON values of a record of a diagnosis, by the names of its attributes."""
+    """Returns the JSON values of a record, by the names of its attributes; NaN is None."""
     match value:
         case Hypothesis():
             return str(value)
         case Mapping():
             return {key: to_json(one) for key, one in value.items()}
-        case tuple():
+        case list() | tuple():
             return [to_json(one) for one in value]
         case float():
             return finite_or_none(value)  # infinite if a simulation diverged

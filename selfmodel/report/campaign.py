@@ -6,7 +6,6 @@ The reader is narrow on purpose: it takes every table (``*.csv``, ``*.jsonl``, a
 value its type, and ``_column`` those of a CSV file theirs.
 """
 
-import base64
 import csv
 import io
 import math
@@ -15,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, counted
 from selfmodel.files import check_regular, encodable, read_file
 from selfmodel.logs.results import parse_json
 from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Report, Section, Table
@@ -48,11 +47,6 @@ Record = Mapping[str, Cell]
 """A row of a table: cells by the name of their column."""
 
 
-def is_campaign(folder: Path) -> bool:
-    """Returns whether a folder has tables of results."""
-    return any(_table_files(folder))
-
-
 def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Report:
     """Returns the report of a campaign, with figures up to a size of all together, bytes.
 
@@ -63,8 +57,8 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     tables = {name: records for name, records in tables.items() if records}
     if not tables:
         raise InputError(
-            f"{folder}: expected the folder of a run, or of a campaign with a table such as "
-            f"results.csv, got neither"
+            f"{folder}: expected the folder of a run with its trials and diagnoses.json, or of a "
+            f"campaign with a table such as results.csv, got neither"
         )
     scored = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
     rows = next(filter(None, scored), [])
@@ -85,8 +79,7 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
 def _headline(tables: Mapping[str, Sequence[Record]], rows: Sequence[Record]) -> str:
     """Returns what the campaign has; ``rows`` are those with a judged diagnosis."""
     counts = ", ".join(
-        f"{len(records)} {'row' if len(records) == 1 else 'rows'} in {encodable(name)}"
-        for name, records in tables.items()
+        f"{counted(len(records), 'row')} in {encodable(name)}" for name, records in tables.items()
     )
     if not rows:
         return f"The campaign has {counts}."
@@ -143,8 +136,7 @@ def _figures(folder: Path, most: int) -> Section | None:
             continue
         data = read_file(path, "a figure", most)
         most -= len(data)
-        encoded = base64.b64encode(data).decode("ascii")
-        shown.append(Picture(encodable(path.stem), MEDIA_TYPES[path.suffix], encoded))
+        shown.append(Picture(encodable(path.stem), MEDIA_TYPES[path.suffix], data))
     text = f"Left out, because the report would become too large: {', '.join(left_out)}."
     if not shown and not left_out:
         return None

@@ -62,14 +62,14 @@ class LineChart(Item, frozen=True, tag="line"):
 
 
 class Group(msgspec.Struct, frozen=True):
-    """Bars with one label, in the order of ``BarChart.names``; NaN where unknown."""
+    """Values with one label, NaN where unknown: bars, or a row of a heat map."""
 
     label: str
     values: Numbers
 
 
 class BarChart(Item, frozen=True, tag="bars"):
-    """Horizontal bars in groups; ``names`` are those of the bars of a group."""
+    """Horizontal bars in groups; ``names`` are those of the bars of a group, in order."""
 
     x_label: str
     names: tuple[str, ...]
@@ -95,13 +95,6 @@ class IntervalChart(Item, frozen=True, tag="intervals"):
     limits: tuple[float, float] | None = None
 
 
-class Row(msgspec.Struct, frozen=True):
-    """A row of a heat map: its name, and its value in each column, NaN where unknown."""
-
-    label: str
-    values: Numbers
-
-
 class HeatMap(Item, frozen=True, tag="heat"):
     """Values by row and column; ``largest`` has the strongest colour, columns begin and end."""
 
@@ -109,7 +102,7 @@ class HeatMap(Item, frozen=True, tag="heat"):
     value_label: str
     begin: Numbers
     end: Numbers
-    rows: tuple[Row, ...]
+    rows: tuple[Group, ...]
     largest: float
     marks: tuple[Mark, ...] = ()
 
@@ -142,17 +135,17 @@ class Table(Item, frozen=True, tag="table"):
 
 
 class Picture(Item, frozen=True, tag="picture"):
-    """A picture: media type, such as ``image/png``, and the file in base64."""
+    """A picture: media type, such as ``image/png``, and the file, base64 in JSON."""
 
     media_type: str
-    data: str
+    data: bytes
 
 
 class Attachment(Item, frozen=True, tag="file"):
-    """A file that the reader can save: its name, and the file in base64."""
+    """A file that the reader can save: its name and content, base64 in JSON."""
 
     name: str
-    data: str
+    data: bytes
 
 
 class Section(msgspec.Struct, frozen=True):

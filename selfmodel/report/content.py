@@ -1,5 +1,6 @@
 """Content of a report: its first sentences and its sections, from a subject."""
 
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -25,8 +26,6 @@ from selfmodel.report.scene import Motion, Shot, scene_of
 from selfmodel.report.subject import Subject
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.simulation.trial_replay import replay
-from selfmodel.trials.signals import SIGNALS
-from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
 NOT_FINISHED = "The recovery is not finished"
@@ -125,8 +124,7 @@ def _shot(subject: Subject, trial: Trial, hypotheses: Sequence[tuple[str, Hypoth
     rollouts = []
     for name, hypothesis in hypotheses:
         result = replay(trial, hypothesis, subject.simulator)
-        signals = {signal: result.simulated[signal] for signal in SIGNALS}
-        trajectory = Trajectory(result.simulated.names, trial.trajectory.time, signals)
+        trajectory = dataclasses.replace(result.simulated, time=trial.trajectory.time)
         rollouts.append(Motion(name, hypothesis, trajectory, result.diverged))
     change = subject.change_of(trial)
     mark = None if change is None else change[0]

@@ -1,10 +1,8 @@
 """Sections of the evidence: loss over time and by sensor, and what cannot be distinguished."""
 
-import base64
-
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, mean_of_known
 from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.diagnosis.choice import prepared_trial
 from selfmodel.diagnosis.losses import simulate
@@ -50,8 +48,8 @@ FILE = "separating.npz"
 
 def residual_section(subject: Subject) -> Section | None:
     """Returns the section of the residual; None if the comparator has no losses over time."""
-    offsets, marks = _axis(subject)
-    items = [*_loss_charts(subject, offsets, marks), *_heat_map(subject, offsets, marks)]
+    begins, marks = _axis(subject)
+    items = [*_loss_charts(subject, begins, marks), *_heat_map(subject, begins, marks)]
     if not items:
         return None
     text = [RESIDUAL]
@@ -65,33 +63,27 @@ def residual_section(subject: Subject) -> Section | None:
     return Section("residual", "Residual over time", tuple(text), tuple(items))
 
 
-def _axis(subject: Subject) -> tuple[dict[str, float], tuple[charts.Mark, ...]]:
-    """Returns a time axis of all trials, one after the other: their beginnings, s, and marks.
-
-    The beginnings are by the path of a trial; marks are of them and of a change of the robot.
-    """
-    offsets: dict[str, float] = {}
-    marks: list[charts.Mark] = []
-    now = 0.0
-    for trial in subject.damaged:
-        offsets[trial.path] = now
-        marks.append(charts.Mark(subject.names[trial.path], now))
-        change = subject.change_of(trial)
-        if change is not None:
-            marks.append(charts.Mark("change of the robot", *(now + time for time in change)))
-        now += float(trial.trajectory.time[-1]) + subject.robot.control_timestep
-    return offsets, tuple(marks)
+def _axis(subject: Subject) -> tuple[FloatArray, tuple[charts.Mark, ...]]:
+    """Returns where each trial begins, s, one after the other, and marks there and at a change."""
+    step, marks = subject.robot.control_timestep, list[charts.Mark]()
+    lengths = [float(trial.trajectory.time[-1]) + step for trial in subject.damaged]
+    begins = np.cumsum([0.0, *lengths[:-1]])
+    for trial, begin in zip(subject.damaged, begins.tolist(), strict=True):
+        marks.append(charts.Mark(subject.names[trial.path], begin))
+        if (change := subject.change_of(trial)) is not None:
+            marks.append(charts.Mark("change of the robot", *(begin + time for time in change)))
+    return begins, tuple(marks)
 
 
 def _loss_charts(
-    subject: Subject, offsets: dict[str, float], marks: tuple[charts.Mark, ...]
+    subject: Subject, begins: FloatArray, marks: tuple[charts.Mark, ...]
 ) -> list[Item]:
     table, trials = subject.losses, subject.damaged
     timeline = table.timeline(trials)
     if timeline is None:
         return []
-    begin = np.array([offsets[trials[int(i)].path] for i in timeline.trial])
-    middle = tuple((begin + (timeline.begin + timeline.end) / 2).tolist())
+    middles = begins[timeline.trial] + (timeline.begin + timeline.end) / 2
+    middle = tuple(middles.tolist())
     names, hypotheses = zip(*subject.shown_hypotheses, strict=True)
     best = subject.diagnosis.best
     losses = dict(zip(names, table.losses(hypotheses, trials), strict=True))
@@ -112,12 +104,10 @@ def _loss_charts(
     ]
 
 
-def _heat_map(
-    subject: Subject, offsets: dict[str, float], marks: tuple[charts.Mark, ...]
-) -> list[Item]:
+def _heat_map(subject: Subject, begins: FloatArray, marks: tuple[charts.Mark, ...]) -> list[Item]:
     best = subject.diagnosis.best
-    by_trial = [(trial.path, sensor_errors(subject, trial, best)) for trial in subject.damaged]
-    known = [(offsets[path], one) for path, one in by_trial if one is not None]
+    by_trial = [sensor_errors(subject, trial, best) for trial in subject.damaged]
+    known = [(at, one) for at, one in zip(begins, by_trial, strict=True) if one is not None]
     if not known:
         return []
     names = known[0][1][0]
@@ -133,7 +123,7 @@ def _heat_map(
             value_label="root mean square error, 1: large",
             begin=tuple(begins.tolist()),
             end=tuple(ends.tolist()),
-            rows=tuple(charts.Row(name, tuple(row.tolist())) for name, row in rows),
+            rows=tuple(charts.Group(name, tuple(row.tolist())) for name, row in rows),
             largest=max(largest, 1.0),
             marks=marks,
         )
@@ -172,21 +162,12 @@ def sensor_errors(
             predicted = result.trajectory[signal][0]
             predicted = predicted if isinstance(request, Segments) else predicted[rows]
             error = difference(signal, predicted, trajectory[signal][rows])
-            errors.append(_rms(error / PREDICTION_ERROR_SCALES[signal]))
+            squares = (error / PREDICTION_ERROR_SCALES[signal]) ** 2
+            errors.append(np.sqrt(mean_of_known(squares, axis=1, empty=np.nan)).T)
             names += [f"{prefix}{name}" for name in trajectory.names.columns(signal)]
     if not errors:
         return None
     return names, trajectory.time[rows[:, [0, -1]]].T, np.concatenate(errors)
-
-
-def _rms(errors: FloatArray) -> FloatArray:
-    """Returns the root mean square over the steps of windows, ``(columns, windows)``."""
-    known = np.isfinite(errors)
-    counts = known.sum(axis=1)
-    squares = np.where(known, errors, 0.0) ** 2
-    mean = np.full(counts.shape, np.nan)
-    np.divide(squares.sum(axis=1), counts, out=mean, where=counts > 0)
-    return np.asarray(np.sqrt(mean).T)
 
 
 def separation_section(subject: Subject) -> Section:
@@ -235,9 +216,8 @@ def _separating_trials(subject: Subject) -> tuple[Item, ...]:
     )
     if separating is None:
         return (chart,)
-    data = base64.b64encode(controller_bytes(separating)).decode("ascii")
     title = f"the controller of a separating trial, for selfmodel trial --controller {FILE}"
-    return chart, charts.Attachment(title, FILE, data)
+    return chart, charts.Attachment(title, FILE, controller_bytes(separating))
 
 
 def _separating_controller(subject: Subject, steps: int) -> Controller | None:

@@ -1,16 +1,15 @@
 """The robots of a report on one timeline, as JSON: bodies with their shapes, and poses over time.
 
-Poses are by forward kinematics of the robot's own model. Arrays are 16-bit numbers in base64.
+Poses are by forward kinematics of the robot's own model. Arrays are bytes of 16-bit numbers, which
+are base64 in JSON.
 """
 
-import base64
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.faults.build import build, detached_bodies, jammed_bodies
@@ -24,7 +23,7 @@ from selfmodel.robot.motion import (
     visible_geoms,
 )
 from selfmodel.robot.robot import Robot
-from selfmodel.trials.trajectory import Trajectory
+from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 MAX_POSES = 400_000
@@ -58,8 +57,7 @@ class Motion:
     @property
     def displacement(self) -> float:
         """Forward displacement, m; NaN if the simulation diverged."""
-        x = self.trajectory["base_position"][:, 0]
-        return np.nan if self.diverged else float(x[-1] - x[0])
+        return np.nan if self.diverged else float(forward_displacement(self.trajectory))
 
     @property
     def is_drawn(self) -> bool:
@@ -127,7 +125,7 @@ def geometry_of(robot: Robot) -> dict[str, Any]:
             for shape in shapes
         ],
         "meshes": [
-            {"vertices": quantised(vertices), "faces": _base64(corners.astype("<u4"))}
+            {"vertices": quantised(vertices), "faces": corners.astype("<u4").tobytes()}
             for vertices, corners in (
                 simplified(*triangles_of(model, one), faces) for one in meshes
             )
@@ -195,17 +193,13 @@ def _motion(robot: Robot, bodies: IndexArray, motion: Motion, steps: IndexArray)
 def quantised(values: FloatArray) -> dict[str, Any]:
     """Returns numbers, ``(rows, columns)``, as 16-bit numbers between the bounds of each column.
 
-    They are ``low`` and ``span`` of each column and, in ``data``, little-endian numbers q in
-    base64, in row-major order: a value is ``low + span * q / 65535``.
+    They are ``low`` and ``span`` of each column and, in ``data``, little-endian numbers q
+    in row-major order: a value is ``low + span * q / 65535``.
     """
     low, high = values.min(axis=0), values.max(axis=0)
     span = high - low
     levels = np.round((values - low) / np.where(span > 0, span, 1.0) * LEVELS)
-    return {"low": low.tolist(), "span": span.tolist(), "data": _base64(levels.astype("<u2"))}
-
-
-def _base64(values: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+    return {"low": low.tolist(), "span": span.tolist(), "data": levels.astype("<u2").tobytes()}
 
 
 def simplified(

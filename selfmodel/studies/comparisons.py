@@ -30,7 +30,7 @@ and wrong, ``number`` for other values; one in a table.
 """
 
 
-def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
+def compare(outcomes: pd.DataFrame) -> pd.DataFrame:
     """Returns the paired comparisons of all methods of each table, a row each.
 
     Two methods differ if a test over runs and a test over seeds both reject equality: the first is
@@ -40,7 +40,6 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
 
     Args:
         outcomes: Outcomes of all methods, with the columns ``OUTCOME``.
-        seed: Seed of the bootstrap and of the sign flips, the same for each pair.
 
     Returns:
         ``table``; ``first``, the method with the larger mean, and ``second``; ``n``, the number of
@@ -62,7 +61,7 @@ def compare(outcomes: pd.DataFrame, seed: int = 0) -> pd.DataFrame:
         for methods in itertools.combinations(runs.columns, 2):
             both = runs[list(methods)].dropna().astype(float)
             if len(both):
-                pairs.append({"table": table, **_compared(both, measure, seed)})
+                pairs.append({"table": table, **_compared(both, measure)})
         over_runs = statistics.holm([pair["p_runs"] for pair in pairs])
         over_both = statistics.holm([max(pair["p_runs"], pair["p_seeds"]) for pair in pairs])
         for pair, p_runs, p in zip(pairs, over_runs, over_both, strict=True):
@@ -164,14 +163,14 @@ def _tables(outcomes: pd.DataFrame) -> Iterator[tuple[tuple[str, ...], str, pd.D
         yield table, str(measure), runs
 
 
-def _compared(runs: pd.DataFrame, measure: str, seed: int) -> dict[str, Any]:
+def _compared(runs: pd.DataFrame, measure: str) -> dict[str, Any]:
     """Returns the comparison of two methods, the columns, on runs that both have, not corrected."""
     means = {name: float(np.mean(runs[name].to_numpy())) for name in runs}
     first, second = sorted(means, key=lambda name: -means[name])  # stable: by name if equal
     found = (runs[first] - runs[second]).tolist()
     seeds = runs.index.get_level_values("seed").tolist()
     only_first, only_second = sum(one > 0 for one in found), sum(one < 0 for one in found)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)  # of the bootstrap and the sign flips, the same for each pair
     if measure == "share":
         interval = statistics.paired_proportion_interval(found, seeds, rng)
         p = statistics.exact_mcnemar(only_first, only_second)

@@ -336,17 +336,15 @@ def _outline(
 ) -> FloatArray:
     """Returns points in a plane, whose convex hull is the outline of a geom, ``(n, 2)``, m.
 
-    Capsules and spheres are exact, other geoms are drawn as their bounding boxes.
+    Capsules are exact, other geoms are drawn as their bounding boxes.
     """
-    kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
-    is_capsule = kind == mujoco.mjtGeom.mjGEOM_CAPSULE
-    if is_round := is_capsule or kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        local = np.array([(0, 0, -1), (0, 0, 1)]) * (size[1] if is_capsule else 0.0)
-    else:
-        local = model.geom_aabb[geom, :3] + CORNERS * model.geom_aabb[geom, 3:]
+    is_capsule = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE
+    radius, half, _ = model.geom_size[geom]
+    middle, reach = model.geom_aabb[geom].reshape(2, 3)
+    local = np.array([(0, 0, -half), (0, 0, half)]) if is_capsule else middle + CORNERS * reach
     rotation = data.geom_xmat[geom].reshape(3, 3)
     points: FloatArray = (data.geom_xpos[geom] + local @ rotation.T) @ plane
-    return (points[:, None] + size[0] * CIRCLE).reshape(-1, 2) if is_round else points
+    return (points[:, None] + radius * CIRCLE).reshape(-1, 2) if is_capsule else points
 
 
 def look(number: int) -> Style:

@@ -18,11 +18,10 @@ import pandas as pd
 
 from selfmodel.settings import Settings
 from selfmodel.studies import figures, tables
-from selfmodel.studies.cells import finished
 from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, study_rows
-from selfmodel.studies.study import RUNS, SHARED, Row, grouped
+from selfmodel.studies.study import Row, grouped, shared_in
 from selfmodel.studies.tables import Table, table_of
 from selfmodel.tasks import ROBOTS
 
@@ -133,7 +132,7 @@ class PaperResults:
 
 def collect(folder: Path) -> PaperResults:
     """Returns all results in the folder of an experiment."""
-    first = next(finished(folder / RUNS), None)
+    settings = shared_in(folder).get("settings")
 
     def rows(table: str, columns: Sequence[str]) -> list[Row]:
         every = study_rows("paper", folder, table)
@@ -141,7 +140,7 @@ def collect(folder: Path) -> PaperResults:
         return [{name: row[name] for name in columns} for row in every]
 
     return PaperResults(
-        None if first is None else Settings(**first.parameters[SHARED]["settings"]),
+        None if settings is None else Settings(**settings),
         rows("recoveries", KINDS["paper"].columns),
         rows("trials", (*RUN, "comparator", "number", "stage", "hypothesis", "displacement")),
         rows("evolution", (*RUN, "evaluations", "before", "best")),

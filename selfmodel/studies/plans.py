@@ -183,10 +183,7 @@ def suite(
     chosen = repair_parameters(repair, search, score)
     entries = {body: robot_entry(body) for body in bodies}
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
-    known = {case for entry in entries.values() for case in entry.cases}
-    for case in cases:
-        if case not in known:
-            raise unknown_name("case of these bodies", str(case), map(str, sorted(known)))
+    _check_cases("case of these bodies", cases, known_cases(bodies))
     points: list[Point] = []
     for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
         entry, robot = entries[body], entries[body].robot()
@@ -218,11 +215,8 @@ def paper(
     is exact, and is not calibrated.
     """
     for robot in robots:
-        if robot not in ROBOTS:
-            raise unknown_name("robot of the paper", robot, ROBOTS)
-    for case in cases:
-        if case not in TABLE_ONE:
-            raise unknown_name("case of Table I", str(case), map(str, TABLE_ONE))
+        plugins.check_known("robot of the paper", robot, ROBOTS)
+    _check_cases("case of Table I", cases, TABLE_ONE)
     for comparator in comparators:
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
@@ -316,8 +310,7 @@ def _check(
         raise InputError("expected at least one case or one damage of an ablation, got neither")
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
-    if next_trial not in NEXT_TRIAL:
-        raise unknown_name("choice of the next trial", next_trial, NEXT_TRIAL)
+    plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
     if next_trial != BANK and trials < 2:
         raise InputError(
             f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
@@ -336,12 +329,16 @@ def _failures(
     """Returns the failures of a robot: the number in Table I, or None, and the notation."""
     searched, anatomy = plugins.kinds(kinds), entry.robot().anatomy
     HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
-    for case in cases or ():
-        if case not in entry.cases:
-            raise unknown_name(f"case of {robot}", str(case), map(str, entry.cases))
+    _check_cases(f"case of {robot}", cases or (), entry.cases)
     numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
     named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
     return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
+
+
+def _check_cases(what: str, cases: Sequence[int], known: Iterable[int]) -> None:
+    names = list(map(str, known))
+    for case in cases:
+        plugins.check_known(what, str(case), names)
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
@@ -372,8 +369,7 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
         bodies += [domain] if is_body else [f"{domain}-{task}" for task in chosen]
     known = tasks_of(domains)
     for task in tasks or ():
-        if task not in known:
-            raise unknown_name("task of these domains", task, known)
+        plugins.check_known("task of these domains", task, known)
     return tuple(dict.fromkeys(bodies))
 
 

@@ -26,7 +26,6 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
-from selfmodel.files import read_file
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.physical_trial import run_trial
@@ -52,8 +51,6 @@ from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 GAIT, CALIBRATED = "gait.npz", "calibrated.xml"
 """Files of a gait, and of the self-model that was fitted to the healthy trials of a run."""
-
-MAX_GAIT_BYTES = 2**24
 
 HEALTHY_TRIALS = 2
 """Number of trials before the failure, in a run whose trials all comparators share."""
@@ -156,13 +153,12 @@ def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
 
 
 def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
-    """Returns the cell of a gait of a bank; its parameters contain the file.
+    """Returns the cell of a gait of a bank; its parameters contain the gait.
 
     The bank is a folder with the file ``ROBOT-K.npz``, or the gaits of another study.
     """
     name = robot["robot"]
-    bank_gait(bank, name, number)
-    data = read_file(_bank_file(bank, name, number), "a gait", MAX_GAIT_BYTES)
+    data = controller_bytes(bank_gait(bank, name, number))
     parameters = {**robot, "controller": base64.b64encode(data).decode()}
     function = f"{__name__}:keep_gait"
     return Cell(function, f"{robot_key(name)}-{number}", parameters, kind="gaits")
@@ -176,14 +172,11 @@ def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
 
 def bank_gait(bank: Path, robot: str, number: int) -> Controller:
     """Returns a gait of a bank; see ``given_gait_cell``."""
-    return read_controller(_bank_file(bank, robot, number), robot_entry(robot).robot())
-
-
-def _bank_file(bank: Path, robot: str, number: int) -> Path:
     key = robot_key(robot)
     evolved = sorted(bank.glob(f"{key}-seed{number:03d}-*/{GAIT}"))
     given = bank / f"{key}-{number}.npz"
-    return evolved[0] if evolved and not given.exists() else given
+    path = evolved[0] if evolved and not given.exists() else given
+    return read_controller(path, robot_entry(robot).robot())
 
 
 def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str]:

@@ -15,7 +15,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, counted
 from selfmodel.files import read_file
 from selfmodel.studies import comparisons
-from selfmodel.studies.study import Row, rows_in, study_in
+from selfmodel.studies.study import Row, rows_in, shared_in
 
 INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
 """Columns of whole numbers, of which some may be unknown."""
@@ -204,7 +204,7 @@ def load(path: str | Path) -> LoadedStudy:
     """
     place = Path(path)
     if place.is_dir():
-        name = study_in(place) or "none"
+        name = str(shared_in(place).get("study"))
         if name not in KINDS:
             raise InputError(
                 f"{place}: expected the folder of a study ({', '.join(KINDS)}) with a finished "

@@ -137,10 +137,10 @@ def rows_in(folder: Path, table: str | None = None) -> list[Row]:
     return rows
 
 
-def study_in(folder: Path) -> str | None:
-    """Returns the name of the study whose runs are in a folder; None without a finished run."""
+def shared_in(folder: Path) -> Mapping[str, Any]:
+    """Returns what the finished runs in a folder share, with the ``study``; nothing without one."""
     first = next(finished(folder / RUNS), None)
-    return None if first is None else str(first.parameters.get(SHARED, {}).get("study"))
+    return {} if first is None else dict(first.parameters.get(SHARED, {}))
 
 
 def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:

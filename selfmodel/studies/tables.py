@@ -13,9 +13,10 @@ from typing import Any
 
 import pandas as pd
 
-from selfmodel.arrays import finite_or_none
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.diagnosis.diagnosis import to_json
+from selfmodel.errors import InputError
 from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.plugins import check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
 from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
@@ -110,18 +111,6 @@ def medians(rows: Sequence[Row], *names: str) -> Row:
 def recovered_over_before(rows: Sequence[Row]) -> list[float]:
     """Returns the recovered part of the score before the failure, where that is above 0."""
     return [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
-
-
-def as_json(value: Any) -> Any:  # noqa: ANN401  # JSON
-    """Returns rows or summaries as JSON: intervals as objects, unknown numbers as null."""
-    match value:
-        case Interval():
-            return as_json(dataclasses.asdict(value))
-        case Mapping():
-            return {key: as_json(inner) for key, inner in value.items()}
-        case list() | tuple():
-            return [as_json(inner) for inner in value]
-    return finite_or_none(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)
@@ -269,7 +258,7 @@ def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -
 
 def json_bytes(facts: Mapping[str, Any]) -> bytes:
     """Returns rows and summaries as a JSON file."""
-    return f"{json.dumps(as_json(facts), indent=1, allow_nan=False)}\n".encode()
+    return f"{json.dumps(to_json(facts), indent=1, allow_nan=False)}\n".encode()
 
 
 def csv_bytes(frame: pd.DataFrame) -> bytes:
@@ -328,8 +317,7 @@ def check_format(wanted: str | None) -> None:
 
 def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
     """Returns the content of the files of tables by their name; a table without a row has none."""
-    if wanted not in FORMATS:
-        raise unknown_name("table format", wanted, FORMATS)
+    check_known("table format", wanted, FORMATS)
     suffix, write = FORMATS[wanted]
     return {f"{table.name}.{suffix}": write(table) for table in tables if len(table.records)}
 

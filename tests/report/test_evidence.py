@@ -1,6 +1,5 @@
 """The evidence in a report: losses over time, errors by sensor, and what would separate."""
 
-import base64
 import dataclasses
 
 import numpy as np
@@ -88,6 +87,6 @@ def test_a_trial_is_evolved_that_separates_the_alternatives_and_can_be_saved(sub
     assert [group.label for group in tried] == ["01-after", "02-recovery"]
     assert 1 >= separating.values[0] > max(group.values[0] for group in tried) >= 0
     assert isinstance(attachment, Attachment)
-    controller = parse_controller(base64.b64decode(attachment.data), attachment.name)
+    controller = parse_controller(attachment.data, attachment.name)
     assert controller.design == subject.damaged[0].plan.controller.design
     assert controller not in [trial.plan.controller for trial in subject.damaged]

@@ -10,7 +10,7 @@ import pytest
 from selfmodel.errors import InputError, WorkError, describe
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs.results import SEARCHES, read_searches, write_searches
+from selfmodel.logs.results import SEARCHES, read_searches
 from selfmodel.recovery.result import SearchBegins
 from selfmodel.report.progress import RunProgress
 from selfmodel.robot.robot import Robot
@@ -36,16 +36,6 @@ def recorded(folder: Path, robot: Robot) -> RunProgress:
     return progress
 
 
-def test_the_searches_are_read_back_from_the_folder(tmp_path: Path, quadruped: Robot):
-    searches = recorded(tmp_path, quadruped).searches
-
-    write_searches(tmp_path, searches)
-
-    assert read_searches(tmp_path) == searches
-    assert [one.best for one in searches] == [(0.1, 0.30000000000000004), (None,)]
-    assert [one.hypothesis for one in searches] == ["intact", ""]
-
-
 @pytest.mark.parametrize("kind", [WorkError, KeyboardInterrupt])
 def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trials(
     tmp_path: Path, quadruped: Robot, kind: type[BaseException]
@@ -68,6 +58,8 @@ def test_a_failure_keeps_the_searches_and_names_the_folder_of_the_finished_trial
     assert describe(early.value) == "before the first trial"
     assert describe(failure.value) == f"the robot is gone; the finished trials are in {tmp_path}"
     assert read_searches(tmp_path) == progress.searches
+    assert [one.best for one in progress.searches] == [(0.1, 0.30000000000000004), (None,)]
+    assert [one.hypothesis for one in progress.searches] == ["intact", ""]
     page = (tmp_path / "report.html").read_text()
     assert "The recovery is not finished: the trial 00-before was run." in page
 

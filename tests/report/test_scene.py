@@ -1,6 +1,5 @@
 """The robots of a report: their shapes, and poses that are those of the log."""
 
-import base64
 import json
 from typing import Any
 
@@ -26,7 +25,7 @@ STEPS = 30
 def decoded(packed: dict[str, Any]) -> np.ndarray:
     """The numbers of ``quantised``, ``(rows, columns)``, as the page decodes them."""
     low, span = np.array(packed["low"]), np.array(packed["span"])
-    levels = np.frombuffer(base64.b64decode(packed["data"]), "<u2").reshape(-1, len(low))
+    levels = np.frombuffer(packed["data"], "<u2").reshape(-1, len(low))
     return low + span * levels / 65535
 
 
@@ -103,7 +102,7 @@ def test_every_body_of_the_robot_has_its_shapes_and_the_world_has_none(robot: Ro
     assert "world" not in geometry["bodies"]
     assert {shape["body"] for shape in geometry["shapes"]} == set(range(len(geometry["bodies"])))
     assert geometry["bodies"][geometry["root"]] == robot.root
-    json.dumps(geometry, allow_nan=False)
+    json.dumps(geometry, allow_nan=False, default=bytes.hex)
     boxes = np.flatnonzero(robot.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
     sizes = [robot.model.geom_size[geom].tolist() for geom in boxes]
     assert [one["size"] for one in geometry["shapes"] if one["type"] == "box"] == sizes

@@ -1,6 +1,5 @@
 """Rows of studies from their files and folders, and what they compare."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
@@ -116,11 +115,3 @@ def test_methods_are_compared_in_metres_and_by_the_oracle_of_the_same_physical_r
     assert values[("after 3 trials", "m"), 2] == 2
     # No table after more trials than a method had, of the oracle apart.
     assert {table[1] for table in found["table"]} == {"after 1 trial", "after 3 trials"}
-
-
-def test_rows_of_other_methods_are_read_from_their_lines(tmp_path: Path):
-    path = tmp_path / "results.jsonl"
-    rows = [rival("oracle", [2.0]), rival("random-search", [1.0, 0.5])]
-    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
-
-    assert (load(path).kind, len(load(path).rows)) == ("rivals", 2)

@@ -1,15 +1,13 @@
 """Promises of a study: points times a function, rows of one table, one set of shared parameters."""
 
-import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from hypothesis import given, strategies as st
 
 from selfmodel.errors import InputError
-from selfmodel.studies.study import Study, _difference, points_of, rows_in, study_in
+from selfmodel.studies.study import Study, points_of, rows_in, shared_in
 from tests.helpers.grids import cell
 
 
@@ -27,7 +25,7 @@ def threads() -> Iterator[ThreadPoolExecutor]:
 
 
 def study(folder: Path, points: dict, form: str = "row", **changes: object) -> Study:
-    shared = {"size": 3, "form": form}
+    shared = {"size": 3, "form": form, "pair": (0.1, None)}
     return Study("mine", folder, f"{__name__}:work", points, {**shared, **changes})
 
 
@@ -59,7 +57,7 @@ def test_rows_have_the_axes_and_what_the_function_returned(
             for _ in range(count)
         ]
     )
-    assert (study_in(tmp_path), study_in(tmp_path / "none")) == ("mine", None)
+    assert (shared_in(tmp_path)["study"], shared_in(tmp_path / "none")) == ("mine", {})
 
 
 def test_a_study_is_extended_by_points_and_refuses_other_settings_before_anything_is_run(
@@ -74,6 +72,8 @@ def test_a_study_is_extended_by_points_and_refuses_other_settings_before_anythin
     for changes, difference in (
         ({"size": 4}, "size is 3 there, requested is 4"),
         ({"more": None}, "more is absent there, requested is null"),
+        ({"more": {}}, "more is absent there, requested is {}"),
+        ({"form": {"of": ["row"]}}, 'form is "row" there, requested is absent'),
     ):
         with pytest.raises(InputError, match=difference):
             study(tmp_path, points_of(factor=[3]), **changes).run(executor=threads)
@@ -91,16 +91,3 @@ def test_a_run_whose_needs_are_others_is_refused(tmp_path: Path, threads: Thread
     assert needing(0).rows()[0]["needs"] == ["gait"]
     with pytest.raises(InputError, match="factor=1, made with other inputs, such as another gait"):
         needing(1).run(executor=threads)
-
-
-@given(
-    st.recursive(
-        st.none() | st.booleans() | st.floats(allow_nan=False) | st.text(),
-        lambda inner: st.dictionaries(st.text(), inner) | st.lists(inner),
-        max_leaves=8,
-    )
-)
-def test_a_value_differs_from_another_and_not_from_what_its_file_says(value: object):
-    assert _difference(json.loads(json.dumps(value)), value) is None
-    assert _difference({"a": value}, {}) is not None
-    assert _difference({"a": value}, {"a": [value]}) is not None

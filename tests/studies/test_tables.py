@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import compare
@@ -16,7 +17,6 @@ from selfmodel.studies.statistics import Interval
 from selfmodel.studies.tables import (
     FORMATS,
     ablation_scores,
-    as_json,
     check_format,
     csv_bytes,
     suite_summaries,
@@ -86,7 +86,7 @@ def test_every_format_has_its_file():
 
 
 def test_what_is_unknown_is_null_in_json():
-    assert as_json({"a": [math.nan, Interval(1.0, math.nan, 2.0)]}) == {
+    assert to_json({"a": [math.nan, Interval(1.0, math.nan, 2.0)]}) == {
         "a": [None, {"estimate": 1.0, "low": None, "high": 2.0}]
     }
 
