@@ -18,7 +18,7 @@ def draw(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
 
 def search(seed: int = 0, seeds: tuple = (), **changes: float) -> Evolution:
     settings = dataclasses.replace(Settings(), **changes)
-    return Evolution(LENGTH, draw, settings, np.random.default_rng(seed), seeds)
+    return Evolution(LENGTH, settings, np.random.default_rng(seed), seeds, draw=draw)
 
 
 def test_the_defaults_are_the_papers_numbers():
@@ -178,7 +178,7 @@ def test_another_population_keeps_the_papers_proportions(population: int):
 
 def test_a_noisy_fitness_is_evaluated_again_so_that_luck_does_not_last():
     numbers = Settings().scaled(20)
-    noisy = Evolution(LENGTH, draw, numbers, np.random.default_rng(0), noisy=True)
+    noisy = Evolution(LENGTH, numbers, np.random.default_rng(0), draw=draw, noisy=True)
     genomes = noisy.ask()
     noisy.tell(genomes[:, 0])
     lucky = genomes[np.argmax(genomes[:, 0])]

@@ -113,10 +113,10 @@ def watched(quadruped: Robot) -> SimpleNamespace:
 
     class Spy(Evolution):
         def __init__(
-            self, length: int, draw: Draw, settings: Settings, rng: Generator, seeds: list
+            self, length: int, settings: Settings, rng: Generator, seeds: list, *, draw: Draw
         ) -> None:
             started.append([np.asarray(seed).tobytes() for seed in seeds])
-            super().__init__(length, draw, settings, rng, seeds)
+            super().__init__(length, settings, rng, seeds, draw=draw)
 
     events: list[Event] = []
     simulator, diagnoses = Watched(quadruped), []

@@ -37,7 +37,7 @@ from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs, random_repertoire
 from tests.helpers.hostile import unstable
 
-NOISY_EA = partial(Evolution, noisy=True)
+NOISY_EA = partial(Evolution, draw=draw_genomes, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
 TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=40)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
@@ -274,8 +274,8 @@ GAITS = Settings().scaled(40)
 def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped: Robot):
     found, known = random_repertoire(quadruped, 1000), np.full(68, 0.3)
     make = from_repertoire(found)
-    asked = make(68, draw_genomes, GAITS, np.random.default_rng(0), [known]).ask()
-    other = make(68, draw_genomes, GAITS, np.random.default_rng(1), [known]).ask()
+    asked = make(68, GAITS, np.random.default_rng(0), [known]).ask()
+    other = make(68, GAITS, np.random.default_rng(1), [known]).ask()
     short = dataclasses.replace(GAITS, steps=100)
 
     assert len(asked) == 1 + round(GAITS.evaluations / 8 * 5)  # 200 of 1,000 steps each
@@ -285,6 +285,6 @@ def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped
     assert len(set(drawn)) == len(drawn)
     assert not np.array_equal(asked, other)
     few = random_repertoire(quadruped, 2)
-    assert len(from_repertoire(few)(68, draw_genomes, GAITS, np.random.default_rng(0)).ask()) == 4
-    cheap = make(68, draw_genomes, short, np.random.default_rng(0)).ask()
+    assert len(from_repertoire(few)(68, GAITS, np.random.default_rng(0)).ask()) == 4
+    cheap = make(68, short, np.random.default_rng(0)).ask()
     assert len(cheap) == round(GAITS.evaluations / 8)
