@@ -407,12 +407,6 @@ def test_logged_trials_are_diagnosed_in_turn_and_each_diagnosis_seeds_the_next(q
     assert diagnose_trials(trials[:2], search(1), 4, lambda _: None) == diagnoses[1]
 
 
-def test_without_a_trial_there_is_nothing_to_explain(quadruped: Robot):
-    search = DiagnosticSearch(Simulator(quadruped, 1), FORWARD_DISPLACEMENT, TINY)
-    with pytest.raises(InputError, match="at least one trial to explain, got none"):
-        diagnose_trials([], search, 0, lambda _: None)
-
-
 def test_a_trial_that_other_software_drove_is_explained_by_its_commands(quadruped: Robot):
     (trial,) = trials_of(quadruped, 1)
     playback = Playback(quadruped.anatomy.motors, trial.trajectory["commands"])
