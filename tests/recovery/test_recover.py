@@ -55,21 +55,6 @@ TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
 TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
 
 
-class Watched(Simulator):
-    """Counts how often each pair of hypothesis and controller is simulated."""
-
-    def __init__(self, robot: Robot) -> None:
-        super().__init__(robot, threads=2)
-        self.seen: Counter = Counter()
-        self.on_run: Callable[[Sequence[Run]], object] = lambda _runs: None
-
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates as ever."""
-        self.seen.update((*run, steps) for run in runs)
-        self.on_run(runs)
-        return super().run(runs, steps, record)
-
-
 class Sealed:
     """A physical robot of which nothing but ``run`` can be reached."""
 
@@ -119,9 +104,16 @@ def watched(quadruped: Robot) -> SimpleNamespace:
             super().__init__(length, settings, rng, seeds, draw=draw)
 
     events: list[Event] = []
-    simulator, diagnoses = Watched(quadruped), []
+    simulator, diagnoses, seen = Simulator(quadruped, 2), [], Counter()
     batches: list[tuple[Event, set[Hypothesis]]] = []
-    simulator.on_run = lambda runs: batches.append((events[-1], {fault for fault, _ in runs}))
+    simulate = simulator.run
+
+    def run(runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
+        seen.update((*run, steps) for run in runs)
+        batches.append((events[-1], {fault for fault, _ in runs}))
+        return simulate(runs, steps, record)
+
+    simulator.run = run
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("selfmodel.recovery.repair.Evolution", Spy)
         patch.setattr("selfmodel.diagnosis.search.Evolution", Spy)
@@ -131,7 +123,7 @@ def watched(quadruped: Robot) -> SimpleNamespace:
         outcome=outcome,
         events=events,
         batches=batches,
-        seen=simulator.seen,
+        seen=seen,
         diagnoses=diagnoses,
         started=started,
     )

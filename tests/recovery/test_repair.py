@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -32,7 +33,6 @@ from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import DESIGNS, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs, random_repertoire
@@ -42,19 +42,6 @@ NOISY_EA = partial(Evolution, draw=draw_genomes, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
 TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=40)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
-
-
-class Watched(Simulator):
-    """A simulator that notes the hypotheses and the steps of each batch under conditions."""
-
-    def __init__(self, robot: Robot, threads: int = 2) -> None:
-        super().__init__(robot, threads)
-        self.asked: list[tuple[list[Hypothesis], int]] = []
-
-    def run_under(self, conditions, uncertainty, drivers, steps, record) -> SimulationResult:  # noqa: ANN001  # those of Simulator
-        """Simulates as ever."""
-        self.asked.append(([one.hypothesis for one in conditions], steps))
-        return super().run_under(conditions, uncertainty, drivers, steps, record)
 
 
 def found_by(
@@ -95,7 +82,7 @@ def test_the_mean_and_the_lower_tail_count_alike_and_one_divergence_rejects_nobo
 def test_a_repair_is_of_its_seed_at_any_number_of_threads(quadruped: Robot, repair: MakeRepair):
     weak = parse("motor:front_left_knee=0.5", quadruped.anatomy)
     one, two = (
-        found_by(Watched(quadruped, threads), TINY, make=repair, hypotheses=(weak, INTACT))
+        found_by(Simulator(quadruped, threads), TINY, make=repair, hypotheses=(weak, INTACT))
         for threads in (1, 2)
     )
 
@@ -196,8 +183,10 @@ def test_rollouts_have_half_of_the_steps_at_first_with_a_score_that_grows_with_t
     quadruped: Robot, score: Score, steps: set[int]
 ):
     settings = dataclasses.replace(Settings().scaled(6), generations=3, steps=420)
-    found_by(simulator := Watched(quadruped), settings, score)
-    random, *searched, first, last = (number for _, number in simulator.asked)
+    simulator = Simulator(quadruped, 2)
+    simulator.run_under = run_under = Mock(wraps=simulator.run_under)
+    found_by(simulator, settings, score)
+    random, *searched, first, last = (call.args[3] for call in run_under.call_args_list)
 
     assert random == SHORT_STEPS
     assert searched == sorted(searched)
