@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.errors import InputError
-
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IndexArray = NDArray[np.intp]
@@ -66,16 +64,6 @@ def held(values: FloatArray, axis: int = 0) -> FloatArray:
 
 def data_frame(
     content: Sequence[Mapping[str, Any]] | Mapping[str, FloatArray | IndexArray],
-) -> Any:  # noqa: ANN401  # pandas is optional
-    """Returns a ``pandas.DataFrame`` of rows, with one column per key, or of columns by name.
-
-    Raises:
-        InputError: pandas is not installed.
-    """
-    try:
-        pandas = importlib.import_module("pandas")
-    except ImportError as error:
-        raise InputError(
-            "to_pandas() needs pandas, which is not installed: pip install 'selfmodel[tables]'"
-        ) from error
-    return pandas.DataFrame(content)
+) -> Any:  # noqa: ANN401  # pandas has no types
+    """Returns a ``pandas.DataFrame`` of rows, with one column per key, or of columns by name."""
+    return importlib.import_module("pandas").DataFrame(content)  # slow to import

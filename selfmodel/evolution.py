@@ -67,11 +67,11 @@ class Evolution:
 
     Args:
         length: Number of values of a genome.
-        draw: Draws the values of random genomes and of mutations.
         settings: Parameters of the search.
         rng: Source of all random numbers.
         seeds: Genomes of the first generation beside random genomes; the first
             ``settings.population`` seeds are used.
+        draw: Draws the values of random genomes and of mutations.
         noisy: Whether fitness is comparable within a generation only: survivors are evaluated
             again with their children, so that the luck of one does not last.
     """
@@ -79,11 +79,11 @@ class Evolution:
     def __init__(
         self,
         length: int,
-        draw: Draw,
         settings: Settings,
         rng: np.random.Generator,
         seeds: Sequence[FloatArray] = (),
         *,
+        draw: Draw,
         noisy: bool = False,
     ) -> None:
         self._settings, self._draw, self._rng, self._noisy = settings, draw, rng, noisy

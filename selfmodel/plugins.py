@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from selfmodel.comparators import COMPARATORS
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.evolution import Evolution
@@ -53,7 +53,7 @@ DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
 """Name of the score of each repair, unless another is given."""
 
 SEARCHES: Mapping[str, MakeSearch] = MappingProxyType(
-    {"cma-es": CmaEs, "ea": partial(Evolution, noisy=True)}
+    {"cma-es": CmaEs, "ea": partial(Evolution, draw=draw_genomes, noisy=True)}
 )
 """Searches of the robust repair that need nothing else, by name."""
 

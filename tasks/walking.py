@@ -117,8 +117,8 @@ class Walk(base.Task):
         self._robot, self._start_level = robot, reality.start
         self._gap = reality.gap if reality.gap.level > 0 else None
         hidden = reality.hypothesis
-        self._limbs = simulated.detached_limbs(robot, hidden) if self._gap else ()
-        self.variant = simulated.physical_variant(robot, hidden, reality.seed, self._gap)
+        made = simulated.physical_variant(robot, hidden, reality.seed, self._gap)
+        self.variant, self._limbs = made
         self._fields = observed_fields(robot, [self.variant])
         self._start = self._end = 0.0
         self._begin(np.random.default_rng(0))  # for the specs, before the first episode

@@ -1,15 +1,17 @@
 """Promises of the evolutionary algorithm: the paper's numbers, and it finds what it seeks."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.evolution import Evolution, Generation, evolve
+from selfmodel.evolution import Evolution, Generation, GenomeSearch, evolve
+from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.settings import Settings
 
-LENGTH = 12
+LENGTH, RNG = 12, np.random.default_rng(0)
 
 
 def draw(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
@@ -18,7 +20,15 @@ def draw(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
 
 def search(seed: int = 0, seeds: tuple = (), **changes: float) -> Evolution:
     settings = dataclasses.replace(Settings(), **changes)
-    return Evolution(LENGTH, draw, settings, np.random.default_rng(seed), seeds)
+    return Evolution(LENGTH, settings, np.random.default_rng(seed), seeds, draw=draw)
+
+
+def evolved(seed: int = 0) -> tuple[Evolution, list[Generation]]:
+    """A whole search for the largest sum, with its progress."""
+    evolution, generations = search(seed), []
+    total = partial(np.sum, axis=1)
+    evolve(evolution, total, generations.append, evolution.generations_left)
+    return evolution, generations
 
 
 def test_the_defaults_are_the_papers_numbers():
@@ -48,14 +58,7 @@ def test_a_search_evaluates_everybody_once_and_then_only_children():
 
 
 def test_fitness_rises_and_never_falls():
-    generations: list[Generation] = []
-    evolution = search()
-    evolve(
-        evolution,
-        lambda genomes: genomes.sum(axis=1),
-        generations.append,
-        evolution.generations_left,
-    )
+    evolution, generations = evolved()
     best = [generation.best for generation in generations]
 
     assert best == sorted(best)
@@ -65,17 +68,8 @@ def test_fitness_rises_and_never_falls():
 
 
 def test_the_same_seed_finds_the_same_and_another_seed_another():
-    def best(seed: int) -> bytes:
-        evolution = search(seed)
-        evolve(
-            evolution,
-            lambda genomes: genomes.sum(axis=1),
-            lambda _: None,
-            evolution.generations_left,
-        )
-        return evolution.best.tobytes()
-
-    assert best(3) == best(3) != best(4)
+    first, again, other = (evolved(seed)[0].best.tobytes() for seed in (3, 3, 4))
+    assert first == again != other
 
 
 def test_seeds_start_the_worst_do_not_survive_and_of_equals_the_earlier_do():
@@ -142,11 +136,10 @@ def test_a_parent_is_the_best_of_three_survivors():
 
 
 @pytest.mark.parametrize("fitness", [np.zeros(99), np.full(100, np.nan)])
-def test_a_fitness_that_does_not_fit_is_refused(fitness: np.ndarray):
-    with pytest.raises(
-        ValueError, match="expected a fitness other than NaN for each of the 100 genomes"
-    ):
-        search().tell(fitness)
+@pytest.mark.parametrize("own", [search(), CmaEs(LENGTH, Settings().scaled(50), RNG)])
+def test_a_fitness_that_does_not_fit_is_refused(own: GenomeSearch, fitness: np.ndarray):
+    with pytest.raises(ValueError, match="a fitness other than NaN for each of the 100 genomes"):
+        own.tell(fitness)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +171,7 @@ def test_another_population_keeps_the_papers_proportions(population: int):
 
 def test_a_noisy_fitness_is_evaluated_again_so_that_luck_does_not_last():
     numbers = Settings().scaled(20)
-    noisy = Evolution(LENGTH, draw, numbers, np.random.default_rng(0), noisy=True)
+    noisy = Evolution(LENGTH, numbers, np.random.default_rng(0), draw=draw, noisy=True)
     genomes = noisy.ask()
     noisy.tell(genomes[:, 0])
     lucky = genomes[np.argmax(genomes[:, 0])]

@@ -9,8 +9,7 @@ from selfmodel.rotation import cross, rotation_between
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:
-    """In MuJoCo's order, w first."""
-    return np.roll(rotation.as_quat(), 1, axis=-1)
+    return rotation.as_quat(scalar_first=True)
 
 
 def rotations(count: int, seed: int = 0) -> Rotation:

@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.rivals.methods import METHODS, Fitness, Problem, Search
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.controllers.controller import Controller, Design
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -201,7 +201,7 @@ def search_of(
     """Returns a search by CMA-ES with a number of evaluations."""
 
     def search(fitness: Fitness) -> Sequence[Controller]:
-        cma_es = CmaEs(design.weights, draw_genomes, settings, rng, ())
+        cma_es = CmaEs(design.weights, settings, rng, ())
         known: dict[Controller, float] = {}
 
         def evaluated(genomes: FloatArray) -> FloatArray:

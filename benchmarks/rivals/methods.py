@@ -138,7 +138,7 @@ def physical_evolution(problem: Problem) -> None:
     Source: the paper, section IV: the control experiment.
     """
     length = problem.design.weights
-    search = Evolution(length, draw_genomes, problem.settings, problem.rng)
+    search = Evolution(length, problem.settings, problem.rng, draw=draw_genomes)
     while problem.left:
         genomes = search.ask()
         fitness = [problem.run(problem.controller(one)) for one in genomes[: problem.left]]

@@ -265,12 +265,8 @@ class Diagnosis:
         """
         return {**to_json(self), "reason": self.reason or None}
 
-    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
-        """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
+        """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first."""
         return data_frame([to_json(candidate) for candidate in self.ranked])
 
 

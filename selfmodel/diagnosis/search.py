@@ -90,10 +90,10 @@ def evolved(
 
     search = Evolution(
         settings.genes * GENE_VALUES,
-        np.random.Generator.random,
         settings,
         rng,
         [space.encode(hypothesis, settings.genes) for hypothesis in seeds],
+        draw=np.random.Generator.random,
     )
     evolve(search, fitness, on_generation, search.generations_left)
     return by_distance(totals), search.evaluations

@@ -115,9 +115,8 @@ class SimulatedRobot:
     ) -> None:
         self._robot = robot
         self._gap = gap if gap is not None and gap.level > 0 else None
-        self._limbs = detached_limbs(robot, hidden) if self._gap is not None else ()
         seed = gap.seed if gap else OWN_SEED
-        self._variant = physical_variant(robot, hidden, seed, self._gap)
+        self._variant, self._limbs = physical_variant(robot, hidden, seed, self._gap)
         self._noise = np.random.SeedSequence(seed, spawn_key=(stream,))
 
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
@@ -187,23 +186,20 @@ class SimulatedRobot:
 
 
 def physical_variant(
-    robot: Robot, hidden: Hypothesis, seed: int, gap: RealityGap | None = None
-) -> ModelVariant:
-    """Returns the model of a physical robot, with the debris of its detached limbs if it has a gap.
+    robot: Robot, hidden: Hypothesis, seed: int, gap: RealityGap | None
+) -> tuple[ModelVariant, tuple[str, ...]]:
+    """Returns the model of a physical robot, and the root body of each limb of its debris.
 
-    The seed is that of the random parts of the faults.
+    A robot with a gap has the debris of the limbs that a hypothesis detaches, in the order of its
+    faults. The seed is that of the random parts of the faults.
     """
     if gap is None:
-        return build(robot, hidden, seed)
-    limbs = detached_limbs(robot, hidden)
-    edits = [partial(add_debris, limbs=limbs)] if limbs else []
-    return build(robot, hidden, seed, edits=edits, perturb=partial(perturbed_model, gap=gap))
-
-
-def detached_limbs(robot: Robot, hidden: Hypothesis) -> tuple[str, ...]:
-    """Returns the root body of each limb that a hypothesis detaches, in the order of its faults."""
+        return build(robot, hidden, seed), ()
     joints = [robot.anatomy.joint(each.part) for each in hidden.faults if each.kind is BROKEN]
-    return tuple(min(one.bodies, key=lambda name: robot.model.body(name).id) for one in joints)
+    limbs = tuple(min(one.bodies, key=lambda name: robot.model.body(name).id) for one in joints)
+    edits = [partial(add_debris, limbs=limbs)] if limbs else []
+    perturb = partial(perturbed_model, gap=gap)
+    return build(robot, hidden, seed, edits=edits, perturb=perturb), limbs
 
 
 def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import draw_genomes
 from selfmodel.evolution import Draw, check_fitness, first_generation
 from selfmodel.settings import Settings
 
@@ -49,8 +50,9 @@ class CmaEs:
     the evaluations that a repair affords.
 
     Args:
-        length, draw, settings, rng, seeds: As of ``Evolution``; all seeds are used.
-        share: Size of the first generation, relative to the population of the paper's EA.
+        length, settings, rng, seeds, draw: As of ``Evolution``; all seeds are used.
+        random: Random genomes of the first generation, besides the seeds; None for a share of the
+            EA's population, seeds included.
         deviation: Standard deviation of the first generation of a run from a random genome.
         seed_deviation: Likewise from a seed.
         starts: Number of runs that start.
@@ -60,12 +62,12 @@ class CmaEs:
     def __init__(
         self,
         length: int,
-        draw: Draw,
         settings: Settings,
         rng: np.random.Generator,
         seeds: Sequence[FloatArray] = (),
         *,
-        share: float = RANDOM_SHARE,
+        draw: Draw = draw_genomes,
+        random: int | None = None,
         deviation: float = DEVIATION,
         seed_deviation: float = SEED_DEVIATION,
         starts: int = STARTS,
@@ -74,7 +76,9 @@ class CmaEs:
         self._rng, self._deviations, self._seeds = rng, (seed_deviation, deviation), len(seeds)
         self._starts = starts
         self._population = population or max(MIN_POPULATION, round(SHARE * settings.population))
-        size = max(starts + len(seeds), round(share * settings.population))
+        if random is None:
+            random = round(RANDOM_SHARE * settings.population) - len(seeds)
+        size = max(starts, random) + len(seeds)
         self._asked = first_generation(size, length, draw, rng, seeds)
         self._runs: list[_Run] = []
         self.generation = 0

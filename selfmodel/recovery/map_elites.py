@@ -209,7 +209,7 @@ def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, 
         repertoire: The repertoire.
         evaluate: The evaluation, such as ``simulated_evaluation(simulator, diagnosed, steps)``.
     """
-    gaits = repertoire.controllers(range(len(repertoire)))
+    gaits = [repertoire.controller(k) for k in range(len(repertoire))]
     scores, _ = evaluate(gaits)
     best_first = np.argsort(-scores, kind="stable")
     return tuple(gaits[i] for i in best_first if scores[i] > -np.inf)

@@ -16,7 +16,6 @@ from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.problem import Calibrate
-from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
@@ -235,8 +234,6 @@ def diagnose_trials(
         after: Numbers of trials after which to diagnose, including the number of all trials; after
             each trial, if not given.
     """
-    if not trials:
-        raise InputError("expected at least one trial to explain, got none")
     diagnoses: tuple[Diagnosis, ...] = ()
     for number in range(1, len(trials) + 1) if after is None else sorted(after):
         diagnoses = (_diagnosed(diagnose, trials[:number], diagnoses, seed, on_event),)

@@ -11,6 +11,7 @@ transfer).
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from selfmodel import evolution
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import Draw, Evolution, GenerationCallback, GenomeSearch
+from selfmodel.evolution import Evolution, GenerationCallback, GenomeSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.cma_es import SEED_DEVIATION, CmaEs
 from selfmodel.recovery.repertoire import Repertoire
@@ -131,11 +132,9 @@ MakeRepair = Callable[[Simulator, Settings, Design, Score], Repair]
 """Function that makes a repair from the self-model, the settings, the design of the controllers and
 the score."""
 
-MakeSearch = Callable[
-    [int, Draw, Settings, np.random.Generator, Sequence[FloatArray]], GenomeSearch
-]
-"""Function from the length of a genome, the distribution of random genomes, the settings, the
-random number generator and initial genomes to a search."""
+MakeSearch = Callable[[int, Settings, np.random.Generator, Sequence[FloatArray]], GenomeSearch]
+"""Function from the length of a genome, the settings, the random number generator and initial
+genomes to a search."""
 
 
 @dataclass(eq=False)
@@ -170,7 +169,7 @@ class RepairSearch:
             return np.array(cached_rows(self._known, runs, self._simulate))
 
         known = _genomes_of(design, seeds)
-        search = Evolution(design.weights, draw_genomes, self.settings, rng, known)
+        search = Evolution(design.weights, self.settings, rng, known, draw=draw_genomes)
         evolution.evolve(search, fitness, on_generation, search.generations_left)
         self.evaluations += search.evaluations
         if search.best_fitness == -np.inf:
@@ -286,7 +285,7 @@ class RobustRepair:
         """
         design, stats, whole = self.design, self.simulator.stats, self.settings.steps
         known = _genomes_of(design, seeds)
-        search = self.make_search(design.weights, draw_genomes, self.settings, rng, known)
+        search = self.make_search(design.weights, self.settings, rng, known)
         total, begin = rollouts * whole, stats.steps
         halved = HALVED * total if self.score.grows_with_time else 0.0
         short, half = min(SHORT_STEPS, whole), min(whole, max(SHORT_STEPS, whole // 2))
@@ -381,42 +380,33 @@ def from_repertoire(repertoire: Repertoire) -> MakeSearch:
 
     def make(
         length: int,
-        _draw: Draw,
         settings: Settings,
         rng: np.random.Generator,
         seeds: Sequence[FloatArray] = (),
     ) -> CmaEs:
         longer = settings.steps / min(SHORT_STEPS, settings.steps)
         gaits = min(len(repertoire), round(REPERTOIRE_COST * settings.evaluations * longer))
-        share = (gaits + len(seeds)) / settings.population
-        return CmaEs(length, drawn, settings, rng, seeds, share=share, deviation=SEED_DEVIATION)
+        return CmaEs(
+            *(length, settings, rng, seeds), draw=drawn, random=gaits, deviation=SEED_DEVIATION
+        )
 
     return make
 
 
-def around_identity(
-    length: int,
-    _draw: Draw,
-    settings: Settings,
-    rng: np.random.Generator,
-    seeds: Sequence[FloatArray] = (),
-) -> CmaEs:
-    """Returns a run of CMA-ES from the best known layer, or else near that which changes nothing.
+def _near_identity(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
+    return np.clip(LAYER_DEVIATION * rng.standard_normal(shape), -1, 1)
 
-    A first generation of random ones has as many genomes as the next.
-    """
 
-    def near(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
-        return np.clip(LAYER_DEVIATION * rng.standard_normal(shape), -1, 1)
-
-    return CmaEs(
-        *(length, near, settings, rng, seeds),
-        share=(LAYER_POPULATION + len(seeds)) / settings.population,
-        deviation=LAYER_DEVIATION,
-        seed_deviation=LAYER_DEVIATION,
-        starts=1,
-        population=LAYER_POPULATION,
-    )
+around_identity: MakeSearch = partial(
+    CmaEs,
+    draw=_near_identity,
+    random=LAYER_POPULATION,
+    deviation=LAYER_DEVIATION,
+    seed_deviation=LAYER_DEVIATION,
+    starts=1,
+    population=LAYER_POPULATION,
+)
+"""Makes a run of CMA-ES from the best known layer, or else near that which changes nothing."""
 
 
 def layered(controller: Controller) -> Controller:

@@ -4,14 +4,13 @@ Files of repertoires are read without MuJoCo, which this module does not load.
 """
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET  # the model of a robot: MuJoCo has compiled it
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray, frozen
+from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.controller import Controller, Design
 
 if TYPE_CHECKING:
@@ -85,10 +84,6 @@ class Repertoire:
     def controller(self, gait: int) -> Controller:
         """Returns the controller of a gait."""
         return Controller(self.design, self.genomes[gait])
-
-    def controllers(self, gaits: Sequence[int] | IndexArray) -> list[Controller]:
-        """Returns the controllers of some gaits, in their order."""
-        return [self.controller(int(gait)) for gait in gaits]
 
 
 def model_digest(robot: "selfmodel.robot.robot.Robot") -> str:

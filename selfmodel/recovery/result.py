@@ -141,12 +141,8 @@ class Recovery:
             },
         }
 
-    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
-        """Returns the physical trials as a ``pandas.DataFrame``, one row per trial.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
+        """Returns the physical trials as a ``pandas.DataFrame``, one row per trial."""
         return data_frame(self._rows())
 
     def _rows(self) -> list[dict[str, Any]]:

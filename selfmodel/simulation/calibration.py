@@ -110,12 +110,8 @@ class Calibration:
             "suspicion": None if self.suspicion is None else self.suspicion.to_dict(),
         }
 
-    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
-        """Returns the factors as a ``pandas.DataFrame``: name, factor, deviation, determined.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
+        """Returns the factors as a ``pandas.DataFrame``: name, factor, deviation, determined."""
         return data_frame(self.rows())
 
     @property

@@ -66,12 +66,8 @@ class Replay:
             "rms": {signal: finite_or_none(rms) for signal, rms in rms_values},
         }
 
-    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
-        """Returns the errors as a ``pandas.DataFrame``, one row per step, one column per signal.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
+        """Returns the errors as a ``pandas.DataFrame``, one row per step, one column per signal."""
         steps = np.arange(self.simulated.steps)
         return data_frame({"step": steps, **{str(name): own for name, own in self.errors.items()}})
 

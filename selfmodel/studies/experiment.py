@@ -30,12 +30,13 @@ from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import (
     TRACKING,
     UPRIGHT,
+    Reference,
     Score,
     check_measurable,
     observed_of,
+    tracking,
     upright_within,
 )
-from selfmodel.recovery.tracking import Reference, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import RealityGap

@@ -193,16 +193,13 @@ class Trial:
         plan = TrialPlan(name, stage, controller or played, trajectory.steps, seed=0)
         return cls(plan, robot.name, trajectory, f"{name} ({_digest(trajectory)[:16]})")
 
-    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas is optional
+    def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
         """Returns the signals as a ``pandas.DataFrame``, with the columns of ``logs export``.
 
         Example:
             >>> import selfmodel
             >>> selfmodel.read_log("after.mcap").trial.to_pandas()["base_position.x"].shape
             (60,)
-
-        Raises:
-            InputError: pandas is not installed.
         """
         return data_frame(columns_of(self.trajectory))
 

@@ -45,13 +45,14 @@ def test_commands_stay_in_their_ranges_with_every_layer(base: Design, genome: li
     assert np.all((commands >= centre - half) & (commands <= centre + half))
 
 
-DESIGNS = [BASES["policy"], BASES["history"], *map(layer, BASES.values())]
+LARGE = Network(tuple("abcdefgh"), tuple("ABCDEFGH"))
+DESIGNS = [*BASES.values(), LARGE, *map(layer, BASES.values())]
 
 
 @pytest.mark.parametrize("design", DESIGNS, ids=lambda one: one.description)
 @settings(max_examples=10)
-@given(rows=st.integers(1, 40), place=st.integers(0, 39))
-def test_a_row_of_a_policy_or_a_layer_is_the_same_to_the_bit_in_any_batch(
+@given(rows=st.integers(1, 130), place=st.integers(0, 129))
+def test_a_row_of_any_design_is_the_same_to_the_bit_in_any_batch_and_place(
     design: Design, rows: int, place: int
 ):
     row = slice(place % rows, place % rows + 1)

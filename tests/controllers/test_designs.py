@@ -17,6 +17,7 @@ from selfmodel.controllers.controller import (
 )
 from selfmodel.controllers.cpg import MAX_FEEDBACK, MAX_FREQUENCY, MIN_FREQUENCY, Cpg
 from selfmodel.controllers.network import Network
+from selfmodel.controllers.playback import Playback
 from selfmodel.errors import InputError
 from selfmodel.faults.notation import parse
 from selfmodel.robot.designs import cpg_for, network_for
@@ -115,19 +116,6 @@ def test_a_reading_changes_the_commands_of_a_cpg_only_with_feedback():
     assert np.array_equal(unheard, quiet)
 
 
-@DESIGNS
-@settings(max_examples=15)
-@given(rows=st.integers(1, 130), place=st.integers(0, 129))
-def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(design: Design, rows: int, place: int):
-    place %= rows
-    drawn = genomes(design, rows, rows)
-    readings = np.random.default_rng(place).normal(size=(10, rows, len(design.sensors)))
-    row = slice(place, place + 1)
-    together = commanded(design, drawn, readings)[:, row]
-
-    assert together.tobytes() == commanded(design, drawn[row], readings[:, row]).tobytes()
-
-
 def test_a_robot_with_a_cpg_moves_the_same_to_the_bit_in_any_batch_on_any_threads(robot: Robot):
     texts = ["intact", f"break:{robot.anatomy.joints[0].name}"]
     texts += [f"sensor:{robot.anatomy.sensors[0].name}", "intact"]
@@ -204,6 +192,8 @@ def test_a_batch_with_another_design_is_refused(quadruped: Robot):
     other = Controller(CPG, genomes(CPG)[0])
     with pytest.raises(ValueError, match=r"got 1 x a CPG of 8 .*; 1 x a CPG of 2 sensors"):
         make_batch([one, other], [frozenset()] * 2, sensors=8)
+    with pytest.raises(ValueError, match=r"got 1 x a network of .*; 1 playbacks"):
+        make_batch([network, Playback((), np.zeros((1, 0)))], [frozenset()] * 2, sensors=8)
 
 
 @DESIGNS

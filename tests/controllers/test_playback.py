@@ -5,8 +5,6 @@ import pytest
 
 from selfmodel.controllers.controller import make_batch
 from selfmodel.controllers.playback import Playback, played_back
-from selfmodel.robot.robot import Robot
-from tests.helpers.drivers import random_controllers
 
 COMMANDS = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
 
@@ -70,11 +68,3 @@ def test_a_recording_cannot_be_changed_from_outside():
     assert np.array_equal(playback.commands, COMMANDS)
     with pytest.raises(ValueError, match="read-only"):
         playback.commands[0] = 1
-
-
-def test_a_batch_of_playbacks_and_controllers_is_refused(quadruped: Robot):
-    motors = quadruped.anatomy.motors
-    (controller,) = random_controllers(quadruped, 1)
-    mixed = [controller, Playback(motors, np.zeros((1, len(motors))))]
-    with pytest.raises(ValueError, match=r"got 1 x a network of .*; 1 playbacks"):
-        make_batch(mixed, [frozenset()] * 2, sensors=8)

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import sys
 
 import pytest
 from hypothesis import given, strategies as st
@@ -21,7 +20,6 @@ from selfmodel.diagnosis.diagnosis import (
     output_of,
     to_json,
 )
-from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.registry import PAPER_KINDS
@@ -150,12 +148,3 @@ def test_the_output_has_the_names_of_python_and_keys_of_0_1_are_read(found: Diag
     common = ("diagnosis", "verdict", "test", "intact_distance")
     early |= {key: values[key] for key in common}
     assert diagnosis_from_dict(early, SPACE.parse) == found
-
-
-def test_a_table_without_pandas_is_refused_with_the_remedy(
-    found: Diagnosis, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-
-    with pytest.raises(InputError, match=r"pip install 'selfmodel\[tables\]'"):
-        found.to_pandas()

@@ -197,18 +197,11 @@ def test_a_safe_command_that_fails_is_told_beside_what_ended_the_trial(tmp_path:
 
 def test_a_second_ctrl_c_does_not_keep_the_safe_command_from_the_robot():
     bench = Bench({7: KeyboardInterrupt()})
-    sent = []
-    results = iter([None, KeyboardInterrupt(), None])
-
-    def stop() -> None:
-        if (result := next(results)) is not None:
-            raise result
-        sent.append(bench.done[-1] if bench.done else "")
-
-    bench.stop = stop
+    sent, stop = [], failing(None, KeyboardInterrupt(), None)
+    bench.stop = lambda: (stop(), sent.append(bench.done[-1:]))
     with pytest.raises(KeyboardInterrupt):
         driven(bench)
-    assert sent == ["", "step"]
+    assert sent == [[], ["step"]]
 
 
 @pytest.mark.parametrize("ends", ["while the log is written", "while the robot is stopped"])

@@ -3,15 +3,17 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import WorkError
-from selfmodel.evolution import Evolution, Generation
+from selfmodel.evolution import Evolution, Generation, GenerationCallback
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
+from selfmodel.progress import ignore
 from selfmodel.recovery import repair as module
 from selfmodel.recovery.repair import (
     COST,
@@ -31,59 +33,35 @@ from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import DESIGNS, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs, random_repertoire
 from tests.helpers.hostile import unstable
 
-NOISY_EA = partial(Evolution, noisy=True)
+NOISY_EA = partial(Evolution, draw=draw_genomes, noisy=True)
 LAST = Score("last", ("base_position",), lambda *given: given[2]["base_position"][..., -1, 0])
 TINY = dataclasses.replace(Settings().scaled(8), generations=2, steps=40)
 SMALL = dataclasses.replace(Settings().scaled(20), generations=8, steps=100)
 
 
-class Watched(Simulator):
-    """A simulator that notes the hypotheses and the steps of each batch under conditions."""
-
-    def __init__(self, robot: Robot, threads: int = 2) -> None:
-        super().__init__(robot, threads)
-        self.asked: list[tuple[list[Hypothesis], int]] = []
-
-    def run_under(self, conditions, uncertainty, drivers, steps, record) -> SimulationResult:  # noqa: ANN001  # those of Simulator
-        """Simulates as ever."""
-        self.asked.append(([one.hypothesis for one in conditions], steps))
-        return super().run_under(conditions, uncertainty, drivers, steps, record)
-
-
 def found_by(
-    make: MakeRepair,
-    simulator: Simulator,
-    *,
-    hypotheses: Sequence[Hypothesis] = (INTACT,),
-    design: Design | None = None,
-    seeds: Sequence[Controller] = (),
-) -> tuple[CandidateController, ...]:
-    """The candidates of a tiny repair."""
-    repair = make(simulator, TINY, design or network_for(simulator.robot), DISPLACEMENT)
-    assumed = partial(assumed_uncertainty, simulator.robot)
-    return repair(hypotheses, assumed, seeds, np.random.default_rng(0), lambda _: None)
-
-
-def repaired(
     simulator: Simulator,
     settings: Settings = SMALL,
     score: Score = DISPLACEMENT,
     *,
+    make: MakeRepair = RobustRepair,
     hypotheses: Sequence[Hypothesis] = (INTACT,),
+    design: Design | None = None,
     seeds: Sequence[Controller] = (),
     seed: int = 0,
+    on_generation: GenerationCallback = ignore,
     **options: object,
-) -> tuple[tuple[CandidateController, ...], list[Generation]]:
-    robot, generations = simulator.robot, []
-    repair = RobustRepair(simulator, settings, network_for(robot), score, **options)
+) -> tuple[CandidateController, ...]:
+    """The candidates of a small repair."""
+    robot = simulator.robot
+    repair = make(simulator, settings, design or network_for(robot), score, **options)
     rng, assumed = np.random.default_rng(seed), partial(assumed_uncertainty, robot)
-    return repair(hypotheses, assumed, seeds, rng, generations.append), generations
+    return repair(hypotheses, assumed, seeds, rng, on_generation)
 
 
 def fitness_of(simulator: Simulator) -> RobustFitness:
@@ -104,7 +82,7 @@ def test_the_mean_and_the_lower_tail_count_alike_and_one_divergence_rejects_nobo
 def test_a_repair_is_of_its_seed_at_any_number_of_threads(quadruped: Robot, repair: MakeRepair):
     weak = parse("motor:front_left_knee=0.5", quadruped.anatomy)
     one, two = (
-        found_by(repair, Watched(quadruped, threads), hypotheses=(weak, INTACT))
+        found_by(Simulator(quadruped, threads), TINY, make=repair, hypotheses=(weak, INTACT))
         for threads in (1, 2)
     )
 
@@ -117,7 +95,7 @@ def test_a_repair_is_of_its_seed_at_any_number_of_threads(quadruped: Robot, repa
 @pytest.mark.parametrize("repair", [RepairSearch, RobustRepair])
 def test_a_repair_that_no_simulation_survives_is_an_error(quadruped: Robot, repair: MakeRepair):
     with pytest.raises(WorkError, match=r"as intact, got (0 of 8|none) with .*: check"):
-        found_by(repair, Simulator(unstable(quadruped), 2))
+        found_by(Simulator(unstable(quadruped), 2), TINY, make=repair)
 
 
 @pytest.mark.parametrize("kind", ["network", "cpg"])
@@ -127,7 +105,7 @@ def test_a_repair_of_one_design_does_not_start_from_controllers_of_another(
 ):
     seeds = [*random_controllers(quadruped, 2), *random_cpgs(quadruped, 2)]
     design = DESIGNS[kind](quadruped, None)
-    found = found_by(repair, Simulator(quadruped, 1), design=design, seeds=seeds)
+    found = found_by(Simulator(quadruped, 1), TINY, make=repair, design=design, seeds=seeds)
 
     assert {each.controller.design for each in found} == {design}
 
@@ -135,7 +113,7 @@ def test_a_repair_of_one_design_does_not_start_from_controllers_of_another(
 def test_the_papers_repair_returns_its_survivors_with_their_exact_fitness(quadruped: Robot):
     seeds = random_controllers(quadruped, 8, seed=3)
     simulator = Simulator(quadruped, 2)
-    found = found_by(RepairSearch, simulator, seeds=seeds)
+    found = found_by(simulator, TINY, make=RepairSearch, seeds=seeds)
     runs = [(INTACT, each.controller) for each in found]
     trajectory = simulator.run(runs, TINY.steps, ["base_position"]).trajectory
     of_seeds = simulator.run([(INTACT, each) for each in seeds], TINY.steps, ["base_position"])
@@ -164,7 +142,7 @@ def test_scores_are_those_of_each_condition_and_minus_infinity_of_a_divergence(q
 @pytest.mark.search
 def test_candidates_are_better_than_chance_under_new_conditions_and_best_first(quadruped: Robot):
     simulator = Simulator(quadruped, 2)
-    found, _ = repaired(simulator)
+    found = found_by(simulator)
     fitness = fitness_of(simulator)
     by_chance, best = (
         robust(fitness(drivers, 8, SMALL.steps, np.random.default_rng(1)))
@@ -184,7 +162,8 @@ def test_it_costs_what_it_may_and_reports_its_progress(
 ):
     simulator = Simulator(quadruped, 2)
     seeds = random_controllers(quadruped, known)
-    found, generations = repaired(simulator, seeds=seeds, **options)
+    generations: list[Generation] = []
+    found = found_by(simulator, seeds=seeds, on_generation=generations.append, **options)
     cost, spent = rollouts_of(SMALL, known=bool(known)), simulator.stats.steps / SMALL.steps
 
     assert abs(spent - cost) < SMALL.population, "the largest difference is a generation"
@@ -204,8 +183,10 @@ def test_rollouts_have_half_of_the_steps_at_first_with_a_score_that_grows_with_t
     quadruped: Robot, score: Score, steps: set[int]
 ):
     settings = dataclasses.replace(Settings().scaled(6), generations=3, steps=420)
-    repaired(simulator := Watched(quadruped), settings, score)
-    random, *searched, first, last = (number for _, number in simulator.asked)
+    simulator = Simulator(quadruped, 2)
+    simulator.run_under = run_under = Mock(wraps=simulator.run_under)
+    found_by(simulator, settings, score)
+    random, *searched, first, last = (call.args[3] for call in run_under.call_args_list)
 
     assert random == SHORT_STEPS
     assert searched == sorted(searched)
@@ -240,9 +221,9 @@ def test_a_candidate_whose_simulations_mostly_diverge_is_none(
     monkeypatch.setattr(module, "_comparisons", lambda _: ((8, 10), (4, 10)))
     if number is None:
         with pytest.raises(WorkError, match="got 16 of 40 with the best 4 of"):
-            repaired(Simulator(quadruped, 2), TINY)
+            found_by(Simulator(quadruped, 2), TINY)
     else:
-        assert len(repaired(Simulator(quadruped, 2), TINY)[0]) == number
+        assert len(found_by(Simulator(quadruped, 2), TINY)) == number
 
 
 @pytest.mark.parametrize(("population", "generations"), [(2, 1), (3, 2)])
@@ -251,7 +232,7 @@ def test_the_least_search_finds_a_controller_that_is_not_known(
 ):
     least = dataclasses.replace(Settings().scaled(population), generations=generations, steps=10)
     known = random_controllers(quadruped, 3)
-    found, _ = repaired(Simulator(quadruped, 1), least, seeds=known, make_search=NOISY_EA)
+    found = found_by(Simulator(quadruped, 1), least, seeds=known, make_search=NOISY_EA)
 
     assert found
     assert not {own.controller for own in found} & {*known}
@@ -260,8 +241,8 @@ def test_the_least_search_finds_a_controller_that_is_not_known(
 @pytest.mark.search
 def test_mutants_of_a_known_controller_are_candidates_and_itself_is_not(quadruped: Robot):
     least = dataclasses.replace(Settings().scaled(12), generations=1, steps=100)
-    known = repaired(Simulator(quadruped, 2), TINY, seed=5)[0][0].controller
-    found, _ = repaired(Simulator(quadruped, 2), least, seeds=(known,))
+    known = found_by(Simulator(quadruped, 2), TINY, seed=5)[0].controller
+    found = found_by(Simulator(quadruped, 2), least, seeds=(known,))
     different = [np.count_nonzero(own.controller.genome != known.genome) for own in found]
 
     assert min(different) <= 5, "one in a hundred weights of a mutant is drawn anew"
@@ -274,8 +255,8 @@ GAITS = Settings().scaled(40)
 def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped: Robot):
     found, known = random_repertoire(quadruped, 1000), np.full(68, 0.3)
     make = from_repertoire(found)
-    asked = make(68, draw_genomes, GAITS, np.random.default_rng(0), [known]).ask()
-    other = make(68, draw_genomes, GAITS, np.random.default_rng(1), [known]).ask()
+    asked = make(68, GAITS, np.random.default_rng(0), [known]).ask()
+    other = make(68, GAITS, np.random.default_rng(1), [known]).ask()
     short = dataclasses.replace(GAITS, steps=100)
 
     assert len(asked) == 1 + round(GAITS.evaluations / 8 * 5)  # 200 of 1,000 steps each
@@ -285,6 +266,6 @@ def test_a_repertoire_begins_with_known_controllers_and_distinct_gaits(quadruped
     assert len(set(drawn)) == len(drawn)
     assert not np.array_equal(asked, other)
     few = random_repertoire(quadruped, 2)
-    assert len(from_repertoire(few)(68, draw_genomes, GAITS, np.random.default_rng(0)).ask()) == 4
-    cheap = make(68, draw_genomes, short, np.random.default_rng(0)).ask()
+    assert len(from_repertoire(few)(68, GAITS, np.random.default_rng(0)).ask()) == 4
+    cheap = make(68, short, np.random.default_rng(0)).ask()
     assert len(cheap) == round(GAITS.evaluations / 8)

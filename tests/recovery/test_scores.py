@@ -181,20 +181,12 @@ def test_height_is_measured_from_the_ground_of_the_hypothesis(quadruped: Robot):
 def test_the_score_of_a_run_does_not_depend_on_its_batch(quadruped: Robot, name: str):
     score = SCORES[name]
     runs = [(INTACT, driver) for driver in random_controllers(quadruped, 6, seed=3)]
-    batch = Simulator(quadruped, 1).run(runs, 150, score.record).trajectory
-    alone = [
-        score.of(
-            quadruped,
-            INTACT,
-            Trajectory(
-                batch.names,
-                batch.time,
-                {signal: values[k : k + 1] for signal, values in batch.signals.items()},
-            ),
-        )[0]
-        for k in range(len(runs))
-    ]
-    assert score.of(quadruped, INTACT, batch).tolist() == alone
+    simulator = Simulator(quadruped, 1)
+    together, *alone = (
+        score.of(quadruped, INTACT, simulator.run(some, 150, score.record).trajectory)
+        for some in (runs, *([run] for run in runs))
+    )
+    assert together.tolist() == np.concatenate(alone).tolist()
 
 
 @pytest.mark.parametrize(("planned", "fall"), [(60, 39), (40, None)])

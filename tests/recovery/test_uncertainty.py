@@ -34,26 +34,23 @@ from tests.helpers.hostile import lacking
 pytestmark = [pytest.mark.search, pytest.mark.usefixtures("coarse_calibration")]
 
 
-def healthy_trial(robot: Robot, gap: float, folder: Path, steps: int = 600) -> Trial:
+def trials(robot: Robot, gap: float, folder: Path, count: int = 1, steps: int = 200) -> list[Trial]:
     physical = selfmodel.simulated_robot(robot, gap=gap, seed=1)
-    (walk,) = random_controllers(robot, 1, seed=3)
-    return selfmodel.run_trial(
-        physical, walk, folder / "walk.mcap", robot=robot, steps=steps, stage="before"
-    )
-
-
-def fitted(robot: Robot, trial: Trial) -> tuple[Simulator, Calibration]:
-    calibration = calibrate(robot, [trial], 1)
-    return Simulator(calibration.robot, 1), calibration
+    return [
+        selfmodel.run_trial(
+            physical, walk, folder / f"{number}.mcap", robot=robot, steps=steps, stage="before"
+        )
+        for number, walk in enumerate(random_controllers(robot, count, seed=3))
+    ]
 
 
 def test_the_noise_is_that_of_the_physical_robot_and_less_than_assumed_is_known(
     quadruped: Robot, tmp_path: Path
 ):
     level = 0.1
-    trial = healthy_trial(quadruped, level, tmp_path)
-    simulator, calibration = fitted(quadruped, trial)
-    found = estimated_uncertainty(simulator, [trial], calibration)
+    (trial,) = trials(quadruped, level, tmp_path, steps=600)
+    calibration = calibrate(quadruped, [trial], 1)
+    found = estimated_uncertainty(Simulator(calibration.robot, 1), [trial], calibration)
     assumed = assumed_uncertainty(quadruped)
     touch = np.array([sensor.kind == "touch" for sensor in quadruped.anatomy.sensors])
 
@@ -80,7 +77,7 @@ def test_the_noise_is_that_of_the_physical_robot_and_less_than_assumed_is_known(
 def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
     quadruped: Robot, tmp_path: Path
 ):
-    trial = healthy_trial(quadruped, 0.1, tmp_path, steps=300)
+    (trial,) = trials(quadruped, 0.1, tmp_path, steps=300)
     blind = lacking(trial, ("base_position", "base_orientation"))
     found = estimated_uncertainty(Simulator(quadruped, 1), [blind], None)
 
@@ -88,16 +85,6 @@ def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
     # Without a calibration, the parameters are as uncertain as before.
     assert found.models.draw(np.random.default_rng(0)).differs
     assert found.delays == assumed_uncertainty(quadruped).delays
-
-
-def trials(robot: Robot, gap: float, folder: Path, count: int = 1) -> list[Trial]:
-    physical = selfmodel.simulated_robot(robot, gap=gap, seed=1)
-    return [
-        selfmodel.run_trial(
-            physical, walk, folder / f"{number}.mcap", robot=robot, steps=200, stage="before"
-        )
-        for number, walk in enumerate(random_controllers(robot, count, seed=3))
-    ]
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,12 @@
 """Tests of the Gymnasium environments: Gymnasium's own checks, ids, seeds and vectors."""
 
 import copy
+import importlib
 import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
 import gymnasium
 import numpy as np
@@ -178,23 +178,14 @@ WRAPPED = [
 ]
 
 
-@pytest.fixture
-def shimmy() -> ModuleType:
-    """The package; it needs imageio, and warns about environments that it cannot register."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return pytest.importorskip(
-            "shimmy",
-            reason="Shimmy is not installed: pip install --group dev",
-            exc_type=ImportError,
-        )
-
-
 @pytest.mark.bodies
 @pytest.mark.parametrize(("domain", "task", "kwargs"), WRAPPED)
 def test_gymnasiums_checks_pass_through_shimmy_whose_seed_is_that_of_the_episodes(
-    shimmy: ModuleType, domain: str, task: str, kwargs: dict
+    domain: str, task: str, kwargs: dict
 ):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about environments that it cannot register
+        shimmy = importlib.import_module("shimmy")
     wrapped = shimmy.DmControlCompatibilityV0(tasks.load(domain, task, {**kwargs, "random": 0}))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -110,6 +110,8 @@ def test_a_welded_joint_keeps_its_angle_although_the_suite_draws_another():
         ("suite-walker-run", "walk", "unknown task of suite-walker-run 'walk'.*run"),
         ("suite-walkr", "walk", "unknown robot 'suite-walkr': did you mean suite-walker"),
         ("walker", "walk", "unknown robot 'walker'.*suite-walker"),
+        ("quadrupd", "walk", "unknown robot 'quadrupd': did you mean quadruped"),
+        ("hexapod", "wlk", "unknown task of hexapod 'wlk': did you mean walk"),
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest(domain: str, task: str, message: str):

@@ -196,10 +196,3 @@ def test_told_to_stand_it_stands(robot: Robot):
     assert not path.diverged.any()
     assert drift.max() < STANDING_DRIFT
     assert position[:, 2].min() > 0.8 * robot.standing_height
-
-
-def test_an_unknown_robot_or_task_names_the_nearest():
-    with pytest.raises(InputError, match="unknown robot 'quadrupd': did you mean quadruped"):
-        tasks.load("quadrupd", "walk")
-    with pytest.raises(InputError, match="unknown task of hexapod 'wlk': did you mean walk"):
-        tasks.load("hexapod", "wlk")

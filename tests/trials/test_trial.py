@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import selfmodel
@@ -113,15 +114,12 @@ def test_times_may_begin_anywhere_and_jitter_and_orientations_be_rounded_or_miss
 
 
 def test_a_trial_is_a_table_of_pandas(biped: Robot):  # noqa: F811
-    pandas = pytest.importorskip(
-        "pandas", reason="pandas is not installed: pip install 'selfmodel[tables]'"
-    )
     position = np.tile([1.0, np.nan, 1.0], (6, 1))
     trial = Trial.from_arrays(biped, **arrays(biped), base_position=position)
 
     table = trial.to_pandas()
 
-    assert isinstance(table, pandas.DataFrame)
+    assert isinstance(table, pd.DataFrame)
     assert list(table) == list(columns_of(trial.trajectory))
     assert {"time", "position.left_hip_x", "command.left_hip_x", "base_position.y"} <= set(table)
     assert "velocity.left_hip_x" not in table
