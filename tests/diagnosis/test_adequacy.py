@@ -26,16 +26,15 @@ from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.model_factors import model_with_parameters, nominal, with_model
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPart, TrialPlan, trial_names
+from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
+from tests.diagnosis import synthetic
 from tests.helpers.drivers import random_motion
 from tests.helpers.memory import in_memory
 
@@ -119,16 +118,7 @@ def problem_of(
         assert [*hypotheses[: len(healthy)]] == [INTACT] * len(healthy)
         return SimpleNamespace(robot=refit or robot)
 
-    return Problem(
-        table,
-        HypothesisSpace.of(DEFAULT_KINDS, robot.anatomy),
-        trials,
-        surrogate=table.surrogate(trials),
-        healthy_trials=healthy,
-        names=trial_names(trials),
-        settings=Settings(),
-        calibrate=calibrated,
-    )
+    return synthetic.problem_of(table, robot, trials, healthy, DEFAULT_KINDS, calibrate=calibrated)
 
 
 def doubted(problem: Problem, accused: str, ratio: float = 2.0) -> Doubt | None:

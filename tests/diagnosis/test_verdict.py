@@ -29,7 +29,6 @@ from selfmodel.diagnosis.verdict import (
 )
 from selfmodel.faults import BROKEN, JAMMED
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
@@ -40,7 +39,8 @@ from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import forward_displacement
-from selfmodel.trials.trial import Stage, Trial, TrialPlan, trial_names
+from selfmodel.trials.trial import Stage, Trial, TrialPlan
+from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import in_memory
@@ -258,25 +258,17 @@ def logged(robot: Robot, truth: str, path: str) -> Trial:
     return dataclasses.replace(run, path=path)
 
 
-def problem_of(robot: Robot, *trials: Trial) -> Problem:
+def with_healthy(robot: Robot, *trials: Trial) -> Problem:
     """The problem of some trials, with a trial of the healthy robot."""
     healthy = logged(robot, "intact", "healthy.mcap")
     table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
-    return Problem(
-        table,
-        HypothesisSpace.of(PAPER_KINDS, robot.anatomy),
-        trials,
-        surrogate=table.surrogate(trials),
-        healthy_trials=[healthy],
-        names=trial_names(trials),
-        settings=Settings(),
-    )
+    return problem_of(table, robot, trials, [healthy], PAPER_KINDS)
 
 
 @pytest.fixture(scope="module")
 def lame(quadruped: Robot) -> Problem:
     """The problem of one trial with a weak motor; its losses are kept from test to test."""
-    return problem_of(quadruped, logged(quadruped, LAME, "lame.mcap"))
+    return with_healthy(quadruped, logged(quadruped, LAME, "lame.mcap"))
 
 
 def parsed(robot: Robot) -> list[list[Hypothesis]]:
@@ -328,15 +320,7 @@ def test_each_hypothesis_that_is_said_to_be_alike_has_a_probability(
 
     assert found.indistinguishable == (one,)
     assert set(found.probability) == {LAME, str(one), "intact"}
-    alone = Problem(
-        lame.table,
-        lame.space,
-        lame.trials,
-        surrogate=lame.surrogate,
-        healthy_trials=(),
-        names=lame.names,
-        settings=lame.settings,
-    )
+    alone = dataclasses.replace(lame, healthy_trials=())
     assert diagnosis_of(alone, [best], best).probability == {}, "nothing tells what is right"
 
 
@@ -349,7 +333,7 @@ def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
         monkeypatch.setattr(f"selfmodel.diagnosis.verdict.{alternatives}", lambda *_: [])
     names = {"monday.mcap": "intact", "tuesday.mcap": LAME}
     trials = [logged(quadruped, truth, path) for path, truth in names.items()]
-    found = diagnosis_of(problem_of(quadruped, *trials), [INTACT], INTACT)
+    found = diagnosis_of(with_healthy(quadruped, *trials), [INTACT], INTACT)
 
     assert found.verdict == "unexplained"
     assert found.residual is not None
