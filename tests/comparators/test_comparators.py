@@ -23,6 +23,7 @@ from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces, distances_of
 from tests.helpers.drivers import random_controllers
+from tests.helpers.gaits import batch, changed, gait, logged
 
 Both = tuple[Trial, Trajectory]
 
@@ -117,6 +118,41 @@ def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated
     np.testing.assert_array_equal(
         distances_of(FORWARD_DISPLACEMENT.prepare(trial), simulated), np.abs(ways - ways[0])
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    # A lag compares neighbours of unobserved values.
+    [("sensor-series", 0.01), ("paper-sensors", 0.01), ("gait-pattern", 0), ("noisy-transfer", 0)],
+)
+def test_what_was_not_observed_is_not_compared(name: str, least: float):
+    walking = gait()
+    hidden = {signal: walking[signal].copy() for signal in ("sensors", "joint_positions")}
+    for values, column, rows in zip(hidden.values(), (2, 1), ((0, 120), (300, 350)), strict=True):
+        values[:, column] = values[slice(*rows)] = np.nan
+    trial = logged(changed(walking, **hidden))
+    prepared = COMPARATORS[name].prepare(trial)
+    strange, lost = (
+        changed(
+            walking,
+            **{each: np.where(np.isnan(hidden[each]), value, walking[each]) for each in hidden},
+        )
+        for value in (7.0, 5.0 if least else np.nan)
+    )
+    readings = walking["sensors"].copy()
+    readings[200:260, 0] = 1 - readings[200:260, 0]
+    runs = batch(walking, strange, lost, changed(walking, sensors=readings))
+    if isinstance(prepared.request, Ensemble):
+        each = {
+            signal: np.repeat(values[:, np.newaxis], prepared.request.members, axis=1)
+            for signal, values in runs.signals.items()
+        }
+        runs = Trajectory(runs.names, runs.time, each)
+
+    check_comparator(COMPARATORS[name], trial, runs)
+    distances = distances_of(prepared, runs)
+    assert np.all(distances[:3] <= least * distances[3])
+    assert distances[3] > 0
 
 
 @dataclass(frozen=True)
