@@ -28,15 +28,14 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.model_factors import model_with_parameters, nominal, with_model
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
+from selfmodel.trials.trial import Trial, TrialPart
 from tests.diagnosis import synthetic
 from tests.helpers.drivers import random_motion
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 STEPS = 400
 GAITS = {"first": (1.0, 0.3), "second": (0.3, 1.0), "third": (0.8, 0.8)}
@@ -75,9 +74,9 @@ def moved(robot: Robot, gait: str, *, pace: int = 1, truth: str = "intact") -> T
     """A trial of a robot under sinusoids of a gait, ``pace`` times as fast."""
     sizes = np.resize(GAITS[gait], robot.model.nu)
     commands = sizes * random_motion(robot, pace * STEPS, seed=2)[::pace]
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    plan = TrialPlan("imported", "after", played_back(robot.anatomy.motors, commands), STEPS, 0)
-    return dataclasses.replace(in_memory(robot)(physical, plan), path=f"{truth}-{gait}-{pace}.mcap")
+    driver = played_back(robot.anatomy.motors, commands)
+    run = trial_of(robot, truth, driver, steps=STEPS, name="imported")
+    return dataclasses.replace(run, path=f"{truth}-{gait}-{pace}.mcap")
 
 
 @pytest.fixture(scope="module")
@@ -286,9 +285,9 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
         for one in (moved(real, "first"), moved(real, "first", pace=3))
     )
     slow[250:300] = fast[250:300]
-    plan = TrialPlan("imported", "after", played_back(real.anatomy.motors, slow), STEPS, 0)
-    physical = SimulatedRobot(real, parse(WEAK, real.anatomy))
-    trial = dataclasses.replace(in_memory(real)(physical, plan), path="logs/part.mcap")
+    driver = played_back(real.anatomy.motors, slow)
+    run = trial_of(real, WEAK, driver, steps=STEPS, name="imported")
+    trial = dataclasses.replace(run, path="logs/part.mcap")
     problem, times = problem_of(table, trial, healthy), trial.trajectory.time
     doubt = doubted(problem, WEAK)
 
@@ -305,7 +304,7 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
     rest = problem_of(table, without, healthy)
     assert not faster_joints(rest.trials, rest)
 
-    written = dataclasses.replace(trial, plan=dataclasses.replace(plan, name="after"))
+    written = dataclasses.replace(trial, plan=dataclasses.replace(run.plan, name="after"))
     for other in (moved(real, "first", pace=3), written):  # fast throughout; and not imported
         assert not fast_parts([KNEE], problem_of(table, other, healthy))
 

@@ -26,20 +26,19 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import SERVO_GAIN
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation import requests, rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
+from selfmodel.trials.trial import Trial, TrialPart
 from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
 from tests.helpers.hostile import exploding
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 from tests.helpers.robots.arms import arm_mjcf, robot_of
 
 STEPS = 60
@@ -88,10 +87,9 @@ def in_pieces(gives: Callable[[int], object]) -> Plain:
 
 def jammed(robot: Robot, *steps: int) -> list[Trial]:
     """Trials of a jammed robot, each with a controller of its own."""
-    damaged = SimulatedRobot(robot, parse(f"jam:{KNEE}", robot.anatomy))
     gaits = random_controllers(robot, 1 + len(steps))[1:]
     return [
-        in_memory(robot)(damaged, TrialPlan(f"{k}", "after", gait, count, 0))
+        trial_of(robot, f"jam:{KNEE}", gait, steps=count, name=f"{k}")
         for k, (gait, count) in enumerate(zip(gaits, steps, strict=True))
     ]
 

@@ -30,18 +30,17 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.trial import Stage, Trial, TrialPlan
+from selfmodel.trials.trial import Trial
 from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 CASES = ROBOTS["quadruped"].cases
@@ -49,17 +48,7 @@ GAIT = 4
 """Index of a random controller under which every failure below is detectable."""
 
 
-def trial(
-    robot: Robot,
-    truth: str,
-    controller: Controller,
-    stage: Stage = "after",
-    steps: int = SMALL.steps,
-) -> Trial:
-    """A trial of a damaged robot."""
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    plan = TrialPlan(f"{stage}-{truth}-{hash(controller)}", stage, controller, steps, 0)
-    return in_memory(robot)(physical, plan)
+trial = partial(trial_of, steps=SMALL.steps)
 
 
 def diagnosed(
@@ -82,7 +71,7 @@ def gait(quadruped: Robot) -> Controller:
 
 @pytest.fixture(scope="module")
 def before(quadruped: Robot, gait: Controller) -> list[Trial]:
-    return [trial(quadruped, "intact", gait, "before")]
+    return [trial(quadruped, "intact", gait, stage="before")]
 
 
 @pytest.mark.parametrize(
@@ -234,8 +223,7 @@ OF_ONE_SET = (
 def logged(robot: Robot, truth: str, path: str) -> Trial:
     """A trial of a damaged robot with the plan of an import, and a log of its own."""
     (gait,) = random_controllers(robot, 1)
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    run = in_memory(robot)(physical, TrialPlan("imported", "after", gait, 200, 0))
+    run = trial_of(robot, truth, gait, steps=200, name="imported")
     return dataclasses.replace(run, path=path)
 
 
