@@ -29,7 +29,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.joints import excesses, joints_of
-from selfmodel.diagnosis.losses import LossTable, by_total_loss
+from selfmodel.diagnosis.losses import by_total_loss
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.trials.trajectory import Trajectory
@@ -291,25 +291,20 @@ def share_left(accused: Hypothesis, fit: Fit, problem: Problem) -> float:
 
 
 def refit_reason(accused: Hypothesis, problem: Problem) -> str:
-    """Returns why a self-model that is fitted to all trials leaves a doubt; empty without."""
+    """Returns why a self-model that is fitted to all trials leaves a doubt; empty without.
+
+    It leaves one if it predicts neither the trials significantly worse than the fault does, nor the
+    healthy trials significantly worse than the self-model that is fitted to them alone.
+    """
     if (refit := problem.refitted(INTACT)) is None:
         return f"the trials are too short for a fit that could explain them without {accused}"
-    if is_explained_without(accused, refit.table, problem):
-        return f"a self-model that is fitted to all trials predicts them as well without {accused}"
-    return ""
-
-
-def is_explained_without(accused: Hypothesis, refit: LossTable, problem: Problem) -> bool:
-    """Returns whether a self-model fitted to all trials predicts them as well without a fault.
-
-    It predicts neither the trials significantly worse than the fault does, nor the healthy trials
-    significantly worse than the self-model that is fitted to them alone.
-    """
-    known = problem.table
-    return not any(
-        significance.is_better(known.losses([fault], trials)[0], refit.losses([INTACT], trials)[0])
+    known, fitted = problem.table.losses, refit.table.losses
+    is_needed = any(
+        significance.is_better(known([fault], trials)[0], fitted([INTACT], trials)[0])
         for fault, trials in ((accused, problem.trials), (INTACT, problem.healthy_trials))
     )
+    without = f"a self-model that is fitted to all trials predicts them as well without {accused}"
+    return "" if is_needed else without
 
 
 def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tuple[float, float]]:

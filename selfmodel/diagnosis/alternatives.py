@@ -36,13 +36,13 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     neighbours = dict.fromkeys(
         [*space.with_one_less(best), *space.with_one_replaced(best), *space.with_one_more(INTACT)]
     )
-    smaller = [one for one in neighbours if len(one) <= len(best) and not has_more(one, best)]
+    smaller = [one for one in neighbours if len(one) <= len(best) and best.lacking(one)]
     few = best_severities(by_total_loss(smaller, problem.coarse))[: search.SHORTLIST_SIZE]
     fitted = [
         _with_fitted_others(one, best, problem)
         for one in followed(few, "alternatives", problem.observer)
     ]
-    others = [one for one in dict.fromkeys([*few, *fitted, INTACT]) if not has_more(one, best)]
+    others = [one for one in dict.fromkeys([*few, *fitted, INTACT]) if best.lacking(one)]
     leads = {}
     for one in by_total_loss(others, problem.losses):
         lead = significance.lead(*problem.losses([best, one]))
@@ -83,11 +83,6 @@ def best_severities(hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
     for one in hypotheses:
         first.setdefault(one.without_severities, one)
     return list(first.values())
-
-
-def has_more(one: Hypothesis, best: Hypothesis) -> bool:
-    """Returns whether a hypothesis has all faults of the best one, whatever their severities."""
-    return best.without_severities <= one.without_severities
 
 
 def undetectable(best: Hypothesis, problem: Problem) -> list[Hypothesis]:

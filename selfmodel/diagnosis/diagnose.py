@@ -32,7 +32,7 @@ from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, suitable
 from selfmodel.progress import Progress
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, trial_names
+from selfmodel.trials.trial import Trial, TrialPart, trial_names
 
 REFINEMENT_STARTS = 2
 """Hypotheses from the EA that the refinement starts from, best first."""
@@ -85,7 +85,7 @@ class DiagnosticSearch:
         anatomy = simulator.robot.anatomy
         is_whole = set(kinds).issuperset(suitable(DEFAULT_KINDS, anatomy))
         self._is_extended = is_whole and not simulator.robot.has_fixed_base
-        self._healthy_trials = tuple(healthy_trials)
+        self._healthy_trials = [*map(TrialPart, healthy_trials)]
         self._proposed: set[Hypothesis] = set()
         self.losses = LossTable(simulator, comparator)
         self.evaluations = 0
@@ -103,10 +103,11 @@ class DiagnosticSearch:
         ``observer`` is called after each generation, and with the progress of each later stage.
         """
         table, coarse_trials = surrogate = self.losses.surrogate(trials)
-        problem_of = partial(
-            Problem,
+        space = self._space.including(seeds[:1])
+        problem = Problem(
             self.losses,
-            trials=trials,
+            space,
+            [*map(TrialPart, trials)],
             surrogate=surrogate,
             healthy_trials=self._healthy_trials,
             names=trial_names(trials),
@@ -114,8 +115,6 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
-        space = self._space.including(seeds[:1])
-        problem = problem_of(space)
         known = [one for one in seeds if problem.space.has(one)]
         distances = partial(table.distances, trials=coarse_trials)
         ranked, evaluations = evolved(
@@ -129,7 +128,7 @@ class DiagnosticSearch:
         diagnosis = self._refined_diagnosis(starts, trials, problem)
         better = diagnosis.unsearched.named if diagnosis.unsearched and self._is_extended else ()
         if named := [one for one in better if len(one) <= self._settings.genes]:
-            problem = problem_of(space.including(named))
+            problem = replace(problem, space=space.including(named))
             diagnosis = self._refined_diagnosis([*named, *starts], trials, problem)
         asked = self._space.kinds
         also = tuple(kind.name for kind in problem.space.kinds if kind not in asked)

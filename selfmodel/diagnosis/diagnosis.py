@@ -12,7 +12,7 @@ import msgspec
 from selfmodel.arrays import data_frame, finite_or_none
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.trials.trial import Trial, TrialPart, whole
+from selfmodel.trials.trial import Trial, TrialPart
 
 Verdict = Literal["intact", "explained", "ambiguous", "unexplained", "not judged"]
 """Verdicts on the best hypothesis.
@@ -136,19 +136,19 @@ class Change:
             f"of {self.trial}; before: {self.before}"
         )
 
-    def since(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+    def since(self, trials: Sequence[Trial]) -> list[TrialPart]:
         """Returns the parts of all trials of the diagnosis from the change on.
 
         The first piece after the change is left out: the change may lie in it, and then neither
         hypothesis predicts it.
         """
         first, *rest = trials[self.index :]
-        return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *rest]
+        return [TrialPart(first, begin=math.nextafter(self.time, math.inf)), *map(TrialPart, rest)]
 
-    def until(self, trials: Sequence[Trial]) -> list[Trial | TrialPart]:
+    def until(self, trials: Sequence[Trial]) -> list[TrialPart]:
         """Returns the parts of all trials of the diagnosis up to the change."""
         *earlier, last = trials[: self.index + 1]
-        return [*earlier, TrialPart(last, end=self.time)]
+        return [*map(TrialPart, earlier), TrialPart(last, end=self.time)]
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class Diagnosis:
         """Returns the rows of the trials that the diagnosis is about: those after a change."""
         if self.change is None:
             return list(trials)
-        return [whole(part).rows for part in self.change.since(trials)]
+        return [part.rows for part in self.change.since(trials)]
 
     def __repr__(self) -> str:
         lines = [f"<Diagnosis of {counted(self.trials, 'trial')}: {self.best}, {self.verdict}"]

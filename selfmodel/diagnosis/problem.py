@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -42,13 +42,14 @@ MAX_JAM_SPREAD = 0.05
 """Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 
+@dataclass(eq=False)
 class Problem:
     """Trials to explain, or parts of them, and the losses of hypotheses about them.
 
     Jams at the angles at which the encoders end are added to the hypotheses, and gains of servos
     that equal weak motors in the trials are left out.
 
-    Args:
+    Attributes:
         table: Losses of the comparator.
         space: The hypotheses about the robot.
         trials: Trials to explain, or parts of them.
@@ -59,38 +60,36 @@ class Problem:
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
         observer: Called with the progress of each stage.
-
-    Attributes:
-        healthy_motions: Healthy trials, and healthy parts of the trials to explain.
         has_test: Whether hypotheses are compared by a paired test.
     """
 
-    def __init__(
-        self,
-        table: LossTable,
-        space: HypothesisSpace,
-        trials: Parts,
-        *,
-        surrogate: tuple[LossTable, Parts],
-        healthy_trials: Parts,
-        names: Mapping[str, str],
-        settings: Settings,
-        calibrate: Calibrate | None = None,
-        healthy_parts: Parts = (),
-        observer: Observer = ignore,
-    ) -> None:
-        self.table, self.surrogate, self.names, self.settings = table, surrogate, names, settings
-        self.calibrate, self.observer = calibrate, observer
-        self.trials, self.healthy_trials = [*map(whole, trials)], [*map(whole, healthy_trials)]
-        self.healthy_motions = [*self.healthy_trials, *map(whole, healthy_parts)]
-        jams = observed_jams([part.rows for part in self.trials], space.anatomy)
-        self.space = self._told_apart(replace(space, observed=jams))
-        self._refits: dict[Hypothesis, Problem | None] = {}
-        self.has_test = table.is_piecewise([part.trial for part in self.trials])
+    table: LossTable
+    space: HypothesisSpace
+    trials: Sequence[TrialPart]
+    surrogate: tuple[LossTable, Parts]
+    healthy_trials: Sequence[TrialPart]
+    names: Mapping[str, str]
+    settings: Settings
+    calibrate: Calibrate | None = None
+    healthy_parts: Sequence[TrialPart] = ()
+    observer: Observer = ignore
+    has_test: bool = field(init=False)
+    _is_comparable: bool = field(init=False)
+    _refits: "dict[Hypothesis, Problem | None]" = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        jams = observed_jams([part.rows for part in self.trials], self.space.anatomy)
+        self.space = self._told_apart(replace(self.space, observed=jams))
+        self.has_test = self.table.is_piecewise([part.trial for part in self.trials])
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
-        is_comparable = table.is_piecewise(every) and table.uses_segments(every)
+        is_comparable = self.table.is_piecewise(every) and self.table.uses_segments(every)
         self._is_comparable = is_comparable and len(self.healthy_trials) > 0
+
+    @property
+    def healthy_motions(self) -> list[TrialPart]:
+        """Healthy trials, and healthy parts of the trials to explain."""
+        return [*self.healthy_trials, *self.healthy_parts]
 
     def _told_apart(self, space: HypothesisSpace) -> HypothesisSpace:
         """Returns the hypotheses without gains of servos of which no prediction reaches a limit."""
@@ -107,7 +106,9 @@ class Problem:
         return space.without(SERVO_GAIN, alike)
 
     def within(
-        self, cut: Callable[[Sequence[Trial]], Parts], healthy_trials: Parts = ()
+        self,
+        cut: Callable[[Sequence[Trial]], Sequence[TrialPart]],
+        healthy_trials: Sequence[TrialPart] = (),
     ) -> "Problem | None":
         """Returns the problem of a part of the trials; None if the surrogate has too few pieces.
 
@@ -117,17 +118,12 @@ class Problem:
         table, coarse = self.surrogate[0], cut([whole(one).trial for one in self.surrogate[1]])
         if table.losses([INTACT], coarse).shape[1] < MIN_SURROGATE_PIECES:
             return None
-        return Problem(
-            self.table,
-            self.space,
-            cut([part.trial for part in self.trials]),
+        return replace(
+            self,
+            trials=cut([part.trial for part in self.trials]),
             surrogate=(table, coarse),
             healthy_trials=self.healthy_trials or healthy_trials,
-            names=self.names,
-            settings=self.settings,
-            calibrate=self.calibrate,
             healthy_parts=healthy_trials,
-            observer=self.observer,
         )
 
     def refitted(self, hypothesis: Hypothesis) -> "Problem | None":
@@ -143,18 +139,7 @@ class Problem:
             if self.calibrate is not None:
                 with suppress(InputError):
                     robot = self.calibrate(every, hypotheses=faults).robot
-                    refit = Problem(
-                        self.table.of_robot(robot),
-                        self.space,
-                        self.trials,
-                        surrogate=self.surrogate,
-                        healthy_trials=self.healthy_trials,
-                        names=self.names,
-                        settings=self.settings,
-                        calibrate=self.calibrate,
-                        healthy_parts=self.healthy_motions[len(self.healthy_trials) :],
-                        observer=self.observer,
-                    )
+                    refit = replace(self, table=self.table.of_robot(robot))
             self._refits[hypothesis] = refit
         return self._refits[hypothesis]
 

@@ -23,7 +23,6 @@ from selfmodel.diagnosis.adequacy import doubt_of, fit_of, is_too_high, supporte
 from selfmodel.diagnosis.alternatives import (
     best_severities,
     detectable_severities,
-    has_more,
     indistinguishable,
     leads_of,
     undetectable,
@@ -111,7 +110,7 @@ def diagnosis_of(
         alike, unsearched = indistinguishable(leads), unsearched_fault(best, by_refit)
     else:
         equal = [one for one in order if totals[one] == totals[best]]
-        alike, unsearched = [one for one in equal if not has_more(one, best)], None
+        alike, unsearched = [one for one in equal if best.lacking(one)], None
     fit = fit_of(best, by_refit)
     verdict = verdict_of(best, fit, alike, unsearched)
     explained = INTACT if verdict == "unexplained" else best

@@ -137,24 +137,11 @@ class HypothesisSpace:
     def encode(self, hypothesis: Hypothesis, genes: int) -> FloatArray:
         """Returns a genome that decodes to a hypothesis, ``(genes * GENE_VALUES,)``.
 
-        A severity between two levels is rounded to the nearest level, so a hypothesis with fitted
-        severities can seed a search.
-
-        Raises:
-            InputError: The hypothesis has more faults than genes, or a fault of another kind.
+        The faults are of ``kinds``, and at most as many as the genes. A severity between two levels
+        is rounded to the nearest level, so a hypothesis with fitted severities can seed a search.
         """
-        if len(hypothesis) > genes:
-            raise InputError(
-                f"a genome of {genes} genes has no room for the {len(hypothesis)} faults of "
-                f"{hypothesis}"
-            )
         genome = np.full((genes, GENE_VALUES), 0.25)
         for gene, fault in zip(genome, hypothesis.faults, strict=False):
-            if fault.kind not in self.kinds:
-                raise InputError(
-                    f"no diagnostic genome can express {fault}: the kinds searched are "
-                    f"{', '.join(kind.name for kind in self.kinds)}"
-                )
             parts, levels = self.parts(fault.kind), self.levels(fault)
             nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
             # The middle of an index's interval of [0, 1) is exact under int(value * count).

@@ -1,6 +1,8 @@
 """The contract of every registered comparator: add one, and it is tested."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from selfmodel.diagnosis.losses import simulate
 from selfmodel.diagnosis.significance import NEGLIGIBLE_LOSS
 from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
+from selfmodel.simulation.requests import ClosedLoop, Ensemble, Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.testing import check_comparator, shown
@@ -23,6 +25,7 @@ from selfmodel.trials.trajectory import Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.comparators import Prepared, PreparedPieces, distances_of
 from tests.helpers.drivers import random_controllers
+from tests.helpers.gaits import batch, changed, gait, logged
 
 Both = tuple[Trial, Trajectory]
 
@@ -119,23 +122,49 @@ def test_forward_displacement_is_the_difference_of_the_ways(logged_and_simulated
     )
 
 
-@dataclass(frozen=True)
-class Sections(Prepared):
-    """A prepared trial with sections that are none."""
+@pytest.mark.parametrize(
+    ("name", "least"),
+    # A lag compares neighbours of unobserved values.
+    [("sensor-series", 0.01), ("paper-sensors", 0.01), ("gait-pattern", 0), ("noisy-transfer", 0)],
+)
+def test_what_was_not_observed_is_not_compared(name: str, least: float):
+    walking = gait()
+    hidden = {signal: walking[signal].copy() for signal in ("sensors", "joint_positions")}
+    for values, column, rows in zip(hidden.values(), (2, 1), ((0, 120), (300, 350)), strict=True):
+        values[:, column] = values[slice(*rows)] = np.nan
+    trial = logged(changed(walking, **hidden))
+    prepared = COMPARATORS[name].prepare(trial)
+    strange, lost = (
+        changed(
+            walking,
+            **{each: np.where(np.isnan(hidden[each]), value, walking[each]) for each in hidden},
+        )
+        for value in (7.0, 5.0 if least else np.nan)
+    )
+    readings = walking["sensors"].copy()
+    readings[200:260, 0] = 1 - readings[200:260, 0]
+    runs = batch(walking, strange, lost, changed(walking, sensors=readings))
+    if isinstance(prepared.request, Ensemble):
+        each = {
+            signal: np.repeat(values[:, np.newaxis], prepared.request.members, axis=1)
+            for signal, values in runs.signals.items()
+        }
+        runs = Trajectory(runs.names, runs.time, each)
 
-    sections: tuple[object, ...]
+    check_comparator(COMPARATORS[name], trial, runs)
+    distances = distances_of(prepared, runs)
+    assert np.all(distances[:3] <= least * distances[3])
+    assert distances[3] > 0
 
 
 class Broken:
-    """A comparator that can break its contract in one way."""
+    """A comparator with distances or losses that can break its contract in one way."""
 
     name = "broken"
 
-    def __init__(self, way: str) -> None:
-        self.way = way
-        self.calls = 0
-
-        self.prepared = 0
+    def __init__(self, way: str, made: Callable[..., object]) -> None:
+        self.way, self.made = way, made
+        self.calls = self.prepared = 0
 
     def prepare(self, trial: Trial) -> object:
         """Prepares as forward displacement, spoilt."""
@@ -146,18 +175,21 @@ class Broken:
         if self.way == "trial":
             trial.trajectory["base_position"][0] = 0
 
-        def distances(simulated: Trajectory) -> FloatArray:
+        def compared(simulated: Trajectory) -> FloatArray:
             self.calls += 1
             right = sound.distances(simulated)
+            if self.made is PreparedPieces:
+                right = np.stack([right, right], axis=1)
             if self.way == "simulated":
                 simulated["base_position"][:, 1] = 0
             return {
-                "shape": right[:, np.newaxis],
+                "shape": right[..., np.newaxis],
+                "none": right[..., :0],
                 "sign": -right,
                 "nan": np.where(right > 0, np.nan, right),
                 "offset": right + 1,
-                "impure": right * self.calls,
-                "crowd": right * len(right),
+                "impure": right * (1 + 1e-15 * self.calls),
+                "crowd": right * (1 + 1e-15 * len(right)),
                 "again": right * time,
             }.get(self.way, right)
 
@@ -165,35 +197,45 @@ class Broken:
         if self.way == "unsteady" and time > 1:
             record = ("base_position", "sensors")
         if self.way == "sections":
-            return Sections(ClosedLoop(record), distances, ("a part without piece_steps",))
-        return Prepared(ClosedLoop(record), distances)
+            return SimpleNamespace(
+                request=ClosedLoop(record), distances=compared, sections=("without piece_steps",)
+            )
+        return self.made(ClosedLoop(record), compared)
 
 
 @pytest.mark.parametrize(
-    ("way", "message"),
+    ("way", "made", "message"),
     [
-        ("nothing", "prepare must return an object with request and losses or distances, got None"),
-        ("request", "a request of ClosedLoop must record some of"),
-        ("unsteady", "the same trial must be prepared with the same request"),
-        ("sections", "the sections of a trial must have its piece_steps"),
-        ("shape", "distances must have shape .* with n = 4"),
-        ("sign", "must be finite and at least 0"),
-        ("nan", "must be finite and at least 0"),
-        ("offset", "must be 0, got 1"),
-        ("impure", "must give the same distances"),
-        ("crowd", "must not depend on the other runs"),
-        ("again", "the same trial and arguments must give the same distances"),
-        ("simulated", "a comparator must not change its arguments"),
-        ("trial", "a comparator must not change the trial"),
+        (
+            *("nothing", Prepared),
+            "prepare must return an object with request and losses or distances, got None",
+        ),
+        ("request", Prepared, "a request of ClosedLoop must record some of"),
+        ("unsteady", Prepared, "the same trial must be prepared with the same request"),
+        ("sections", Prepared, "the sections of a trial must have its piece_steps"),
+        ("shape", Prepared, "distances must have shape .* with n = 4"),
+        ("shape", PreparedPieces, "losses must have shape"),
+        ("none", PreparedPieces, "losses must have shape"),
+        ("sign", Prepared, "distances must be finite and at least 0"),
+        ("sign", PreparedPieces, "losses must be finite and at least 0"),
+        ("nan", Prepared, "must be finite and at least 0"),
+        ("offset", Prepared, "must be 0, got 1"),
+        ("impure", Prepared, "must give the same distances"),
+        ("impure", PreparedPieces, "must give the same losses"),
+        ("crowd", Prepared, "must not depend on the other runs"),
+        ("crowd", PreparedPieces, "the losses of run 1 must not depend on the other runs"),
+        ("again", Prepared, "the same trial and arguments must give the same distances"),
+        ("simulated", Prepared, "a comparator must not change its arguments"),
+        ("trial", Prepared, "a comparator must not change the trial"),
     ],
 )
 def test_the_contract_kit_sees_each_way_to_break_it(
-    way: str, message: str, logged_and_simulated: Both
+    way: str, made: Callable[..., object], message: str, logged_and_simulated: Both
 ):
     trial, simulated = logged_and_simulated
     own = replace(trial, trajectory=copied(trial.trajectory))
     with pytest.raises(ValueError, match=message):
-        check_comparator(Broken(way), own, copied(simulated))
+        check_comparator(Broken(way, made), own, copied(simulated))
 
 
 def copied(trajectory: Trajectory) -> Trajectory:
@@ -201,47 +243,22 @@ def copied(trajectory: Trajectory) -> Trajectory:
     return Trajectory(trajectory.names, trajectory.time, signals)
 
 
-class Pieces:
-    """A comparator in pieces, of any request, that can break its contract in one way."""
+@dataclass(frozen=True)
+class Asking:
+    """A comparator of any request."""
 
-    name = "pieces"
-
-    def __init__(self, asks: Request, way: str = "") -> None:
-        self.asks = asks
-        self.way = way
-        self.calls = 0
+    asks: object
+    name: str = "asking"
 
     def prepare(self, _trial: Trial) -> PreparedPieces:
         """Requests what it was made with."""
-        return PreparedPieces(self.asks, self._losses)
-
-    def _losses(self, simulated: Trajectory) -> FloatArray:
-        """Returns how far each joint is from the first run's, spoilt."""
-        self.calls += 1
-        right = self._sound(simulated)
-        return {
-            "": right,
-            "shape": right[:, 0],
-            "none": right[:, :0],
-            "sign": right - right.max(),
-            "impure": right * (1 + 1e-15 * self.calls),
-            "crowd": right * (1 + 1e-15 * len(right)),
-        }[self.way]
-
-    def _sound(self, simulated: Trajectory) -> FloatArray:
-        values = simulated["joint_positions"]
-        return np.abs(values - TRUTH).reshape(len(values), -1, values.shape[-1]).mean(axis=1)
-
-
-TRUTH = 0.25
-"""Where all joints stand in the runs that the pieces of these tests are about."""
+        return PreparedPieces(self.asks, lambda simulated: simulated["joint_positions"])
 
 
 def runs_of_shape(trial: Trial, *lengths: int) -> Trajectory:
-    """Two runs of joints that stand still, the first where the trial has them."""
+    """Two runs of joints that stand still."""
     names = trial.trajectory.names
-    values = np.full((2, *lengths, len(names.hinges)), TRUTH)
-    values[1] += 0.5
+    values = np.zeros((2, *lengths, len(names.hinges)))
     return Trajectory(names, np.arange(lengths[-1]) * 0.01, {"joint_positions": values})
 
 
@@ -264,9 +281,9 @@ def test_the_contract_kit_wants_what_was_requested(logged_and_simulated: Both):
     trial, _ = logged_and_simulated
 
     with pytest.raises(ValueError, match=r"for a request of Segments, .* \(n, 3, 26, width\)"):
-        check_comparator(Pieces(segments(trial)), trial, runs_of_shape(trial, 300))
+        check_comparator(Asking(segments(trial)), trial, runs_of_shape(trial, 300))
     with pytest.raises(ValueError, match=r"a request of Ensemble, .* \(n, 4, 300, width\)"):
-        check_comparator(Pieces(ENSEMBLE), trial, runs_of_shape(trial, 300))
+        check_comparator(Asking(ENSEMBLE), trial, runs_of_shape(trial, 300))
 
 
 def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated: Both):
@@ -288,27 +305,7 @@ def test_the_contract_kit_sees_a_request_that_cannot_be_met(logged_and_simulated
     ]
     for asks, message in broken:
         with pytest.raises(ValueError, match=message):
-            check_comparator(Pieces(asks), trial, simulated)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("way", "message"),
-    [
-        ("shape", "losses must have shape"),
-        ("none", "losses must have shape"),
-        ("sign", "losses must be finite and at least 0"),
-        ("impure", "must give the same losses"),
-        ("crowd", "the losses of run 1 must not depend on the other runs"),
-    ],
-)
-def test_the_contract_kit_sees_each_way_to_break_it_in_pieces(
-    way: str, message: str, logged_and_simulated: Both
-):
-    trial, _ = logged_and_simulated
-    comparator = Pieces(ClosedLoop(("joint_positions",)), way)
-
-    with pytest.raises(ValueError, match=message):
-        check_comparator(comparator, trial, runs_of_shape(trial, 300))
+            check_comparator(Asking(asks), trial, simulated)
 
 
 def test_what_a_trial_shows_is_cut_where_its_segments_begin(logged_and_simulated: Both):

@@ -82,27 +82,6 @@ def test_a_robot_without_touch_is_compared_by_its_joints():
     assert same < trot / 10
 
 
-def test_what_was_not_observed_is_not_compared():
-    walking = gait()
-    joints = walking["joint_positions"].copy()
-    joints[:, 1] = np.nan
-    joints[300:350] = np.nan
-    trial = logged(changed(walking, joint_positions=joints))
-    strange = walking["joint_positions"].copy()
-    strange[:, 1] = 7
-    strange[300:350] = 7
-    seen = walking["joint_positions"] + 0.1
-
-    runs = batch(
-        walking, changed(walking, joint_positions=strange), changed(walking, joint_positions=seen)
-    )
-
-    check_comparator(GAIT_PATTERN, trial, runs)
-    distances = distances_of(GAIT_PATTERN.prepare(trial), runs)
-    assert distances[1] == 0
-    assert distances[2] > 0
-
-
 def test_a_window_that_was_not_observed_does_not_dilute_the_others():
     walking, trot = gait(), gait(TROT)
     half = {

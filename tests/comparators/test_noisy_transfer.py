@@ -81,22 +81,6 @@ def test_a_piece_is_a_window_of_the_trial():
     assert np.flatnonzero(losses[0]).tolist() == [60 // WINDOW]
 
 
-def test_what_was_not_observed_is_not_compared():
-    walking = gait()
-    known = walking["sensors"].copy()
-    known[:120] = np.nan
-    known[:, 2] = np.nan
-    trial = logged(changed(walking, sensors=known))
-    strange = changed(walking, sensors=np.where(np.isnan(known), 5.0, walking["sensors"]))
-    lost = changed(walking, sensors=np.where(np.isnan(known), np.nan, walking["sensors"]))
-    elsewhere = changed(walking, sensors=1 - walking["sensors"])
-
-    runs = ensembles(*([run] * MEMBERS for run in (walking, strange, lost, elsewhere)))
-    found = distances_of(NOISY_TRANSFER.prepare(trial), runs)
-    assert np.array_equal(found[:3], [0, 0, 0])
-    assert found[3] > 0
-
-
 @pytest.mark.parametrize("steps", [1, 24, 26, 130])
 def test_trials_of_any_length_keep_the_contract(steps: int):
     trial = logged(gait(steps=steps))

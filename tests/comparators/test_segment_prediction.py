@@ -18,18 +18,16 @@ from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPredic
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import TrialRefusedError
-from selfmodel.faults.notation import parse
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import shown
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import PREDICTION_ERROR_SCALES
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 TOUCH = 0
 """The column of a sensor of touch."""
@@ -133,10 +131,8 @@ def test_the_loss_without_an_encoder_is_that_of_the_other_columns(lost: int):
 STEPS = 60
 
 
-def trial(robot: Robot, truth: str = "intact", number: int = 0) -> Trial:
-    controller = random_controllers(robot, number + 1)[number]
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return in_memory(robot)(physical, TrialPlan("t", "after", controller, STEPS, 0))
+def trial(robot: Robot, truth: str = "intact") -> Trial:
+    return trial_of(robot, truth, *random_controllers(robot, 1), steps=STEPS)
 
 
 def with_signals(one: Trial, **signals: np.ndarray) -> Trial:

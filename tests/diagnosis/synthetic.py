@@ -1,18 +1,43 @@
-"""A problem with losses that are functions of the hypotheses, without trials and physics."""
+"""Problems: of trials, and with losses that are functions of the hypotheses, without physics."""
 
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
 import numpy as np
 
-from selfmodel.diagnosis.losses import LossFunction
-from selfmodel.diagnosis.problem import Problem
+from selfmodel.diagnosis.losses import LossFunction, LossTable
+from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.kind import FaultKind
 from selfmodel.progress import ignore
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.trials.trial import Trial, TrialPart, trial_names, whole
 
 HingeLosses = Callable[[Sequence[Hypothesis]], np.ndarray]
+
+
+def problem_of(
+    table: LossTable,
+    robot: Robot,
+    trials: Sequence[Trial],
+    healthy: Sequence[Trial | TrialPart],
+    kinds: Sequence[FaultKind],
+    *,
+    calibrate: Calibrate | None = None,
+) -> Problem:
+    """The problem of some trials of a robot."""
+    return Problem(
+        table,
+        HypothesisSpace.of(kinds, robot.anatomy),
+        [*map(TrialPart, trials)],
+        table.surrogate(trials),
+        [*map(whole, healthy)],
+        trial_names(trials),
+        Settings(),
+        calibrate=calibrate,
+    )
 
 
 class Synthetic(Problem):

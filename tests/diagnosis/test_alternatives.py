@@ -1,6 +1,5 @@
 """Promises of the alternatives to a best hypothesis: functions of the losses and the space."""
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -24,24 +23,15 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import JAMMED, WEAK_MOTOR
 from selfmodel.faults.kind import ENVIRONMENT, Fault
-from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, KINDS, PAPER_KINDS
 from selfmodel.faults.world import PAYLOAD
-from selfmodel.settings import Settings
-from selfmodel.tasks import ROBOTS
 from tests.diagnosis.synthetic import Synthetic
+from tests.diagnosis.test_search import ANATOMY, SPACE as PAPER, said
 from tests.helpers.robots.arms import arm
 
 PIECES = 60
-SMALL = dataclasses.replace(Settings().scaled(12), generations=2)
-ANATOMY = ROBOTS["quadruped"].robot().anatomy
-PAPER = HypothesisSpace(ANATOMY, PAPER_KINDS)
 KNEE = "front_left_knee"
 TOUCH, BREAK, JAM = "sensor:front_right_touch", "break:front_left_knee", "jam:back_left_knee"
-
-
-def said(text: str) -> Hypothesis:
-    return parse(text, ANATOMY)
 
 
 def of(means: Mapping[str, float], otherwise: float = 1.0, scatter: float = 0.01) -> LossFunction:

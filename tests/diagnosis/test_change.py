@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,16 +21,15 @@ from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z_OF_CHANGE
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation import requests
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 ANATOMY = ROBOTS["quadruped"].robot().anatomy
 JAM = parse("jam:front_left_knee", ANATOMY)
@@ -213,9 +213,7 @@ def gait(quadruped: Robot) -> Controller:
     return random_controllers(quadruped, 1)[0]
 
 
-def trial(robot: Robot, gait: Controller, truth: str, steps: int = STEPS) -> Trial:
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return in_memory(robot)(physical, TrialPlan(f"of-{truth}", "after", gait, steps, 0))
+trial = partial(trial_of, steps=STEPS)
 
 
 def glued(first: Trial, second: Trial, step: int) -> Trial:
@@ -238,8 +236,8 @@ def diagnosed(robot: Robot, *trials: Trial, intact: tuple[Trial, ...] = ()) -> D
 @pytest.mark.search
 def test_a_jam_in_the_middle_of_a_trial_is_found_and_dated(quadruped: Robot, gait: Controller):
     step = 120
-    healthy = trial(quadruped, gait, "intact")
-    damaged = glued(healthy, trial(quadruped, gait, STUCK), step)
+    healthy = trial(quadruped, "intact", gait)
+    damaged = glued(healthy, trial(quadruped, STUCK, gait), step)
     found = diagnosed(quadruped, damaged, intact=(healthy,))
     onset = step * quadruped.control_timestep
 
@@ -255,8 +253,8 @@ def test_a_jam_in_the_middle_of_a_trial_is_found_and_dated(quadruped: Robot, gai
 def test_a_jam_in_the_second_of_three_trials_is_dated_in_that_trial(
     quadruped: Robot, gait: Controller
 ):
-    healthy, jammed = (trial(quadruped, gait, truth) for truth in ("intact", STUCK))
-    first = trial(quadruped, gait, "intact", steps=200)
+    healthy, jammed = (trial(quadruped, truth, gait) for truth in ("intact", STUCK))
+    first = trial(quadruped, "intact", gait, steps=200)
     found = diagnosed(quadruped, first, glued(healthy, jammed, 180), jammed)
 
     assert str(found.best) == STUCK
@@ -271,8 +269,8 @@ def test_a_jam_of_a_robot_that_has_lost_a_limb_before_is_found_with_both_hypothe
     quadruped: Robot, gait: Controller
 ):
     lost = "break:back_right_knee"
-    healthy = trial(quadruped, gait, "intact")
-    before, after = (trial(quadruped, gait, truth) for truth in (lost, f"{lost}+{STUCK}"))
+    healthy = trial(quadruped, "intact", gait)
+    before, after = (trial(quadruped, truth, gait) for truth in (lost, f"{lost}+{STUCK}"))
     found = diagnosed(quadruped, glued(before, after, 150), intact=(healthy,))
 
     assert str(found.best) == f"{lost}+{STUCK}"
@@ -287,8 +285,8 @@ def test_a_clear_change_of_a_long_trial_is_found_without_a_refinement_of_the_who
 ):
     for module in (requests, segment_prediction):
         monkeypatch.setattr(module, "MAX_CHAIN", 1.5)
-    healthy = trial(quadruped, gait, "intact")
-    damaged = glued(healthy, trial(quadruped, gait, STUCK), 200)
+    healthy = trial(quadruped, "intact", gait)
+    damaged = glued(healthy, trial(quadruped, STUCK, gait), 200)
     found, simulators = [], [Simulator(quadruped, 1) for _ in range(2)]
     for simulator in simulators:
         search = DiagnosticSearch(

@@ -9,14 +9,13 @@ from selfmodel.comparators import COMPARATORS, PREFERENCE
 from selfmodel.diagnosis.choice import chosen_comparator, prepared_trial
 from selfmodel.diagnosis.comparator import PreparedTrial, TrialRefusedError
 from selfmodel.errors import InputError
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import Signal
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import lacking
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 SEGMENTS, ONBOARD, NOISY, SERIES = (comparator.name for comparator in PREFERENCE)
 BASE: tuple[Signal, ...] = ("base_position", "base_linear_velocity")
@@ -34,9 +33,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def trial(robot: Robot) -> Trial:
-    (controller,) = random_controllers(robot, 1)
-    plan = TrialPlan("trial", "single", controller, 100, 0)
-    return in_memory(robot)(SimulatedRobot(robot), plan)
+    return trial_of(robot, "intact", *random_controllers(robot, 1), steps=100)
 
 
 def without(trial: Trial, signals: Sequence[Signal], path: str = "a.mcap") -> Trial:

@@ -1,12 +1,12 @@
 """The diagnostic search: rank of the truth, of diverged models and of ties, and refusals."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
 
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
-from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis import verdict
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
@@ -18,26 +18,22 @@ from selfmodel.faults.joints import BROKEN
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import Trial
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import unstable, with_value
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 from tests.helpers.robots.arms import arm
 from tests.logs.conftest import MJCF
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=3, steps=200)
 
 
-def logged(robot: Robot, truth: str, controller: Controller, steps: int = 100) -> Trial:
-    """A trial of a damaged robot."""
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    return in_memory(robot)(physical, TrialPlan(truth, "after", controller, steps, 0))
+logged = partial(trial_of, steps=100)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +153,7 @@ def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_
     )
     (controller,) = random_cpgs(robot, 1, seed)
     faults = "+".join(filter(None, (beside, "delay=2.8")))
-    before, after = (logged(robot, one, controller, steps) for one in ("intact", faults))
+    before, after = (logged(robot, one, controller, steps=steps) for one in ("intact", faults))
     diagnose = DiagnosticSearch(
         Simulator(robot, 1),
         SEGMENT_PREDICTION,

@@ -11,7 +11,7 @@ import pytest
 from selfmodel.diagnosis.joints import excesses, lead_at_joints, with_joint_faults
 from selfmodel.diagnosis.losses import LossFunction as Losses
 from selfmodel.diagnosis.search import LocalSearch
-from selfmodel.diagnosis.significance import MIN_PIECES, MIN_Z, joint_is_better
+from selfmodel.diagnosis.significance import MIN_Z
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.registry import KINDS
@@ -236,15 +236,6 @@ def test_hypotheses_are_distinguished_at_the_joints_where_their_faults_differ():
     assert not is_worse(broken, WEAK, unknown)
 
 
-@pytest.mark.parametrize(("pieces", "better"), [(MIN_PIECES - 1, False), (MIN_PIECES, True)])
-def test_a_few_pieces_are_no_evidence(pieces: int, *, better: bool):
-    one = np.full(PIECES, np.nan)
-    one[:pieces] = np.linspace(0.1, 0.2, pieces)
-
-    assert joint_is_better(one, np.linspace(1, 2, PIECES)) == better
-    assert not joint_is_better(np.linspace(1, 2, PIECES), one)
-
-
 def test_the_loss_of_a_joint_of_several_hinges_is_their_mean():
     anatomy = ROBOTS["hexapod"].robot().anatomy
     joint = next(joint for joint in anatomy.joints if len(joint.hinges) > 1)
@@ -276,11 +267,3 @@ def test_the_second_joint_is_searched_where_no_fault_explains_the_first():
 
     assert next(iter(excesses(INTACT, problem))) == SHOULDER
     assert terms(found) == pytest.approx({f"damping {KNEE}": 8.0}, rel=0.05)
-
-
-def test_a_diverged_hypothesis_is_worse_and_never_better():
-    finite, diverged = np.ones(PIECES), np.full(PIECES, np.inf)
-
-    assert joint_is_better(finite, diverged)
-    assert not joint_is_better(diverged, finite)
-    assert not joint_is_better(diverged, diverged)

@@ -19,28 +19,26 @@ from selfmodel.comparators import (
 )
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
 from selfmodel.diagnosis.losses import LossTable, contradiction_losses, simulate
-from selfmodel.diagnosis.problem import Problem, observed_jams
+from selfmodel.diagnosis.problem import observed_jams
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import SERVO_GAIN
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import DEFAULT_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
 from selfmodel.simulation import requests, rollout
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import SimulationResult, hypothesis_bytes
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPart, TrialPlan
+from selfmodel.trials.trial import Trial, TrialPart
+from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared, PreparedPieces
 from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed
 from tests.helpers.hostile import exploding
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 from tests.helpers.robots.arms import arm_mjcf, robot_of
 
 STEPS = 60
@@ -89,10 +87,9 @@ def in_pieces(gives: Callable[[int], object]) -> Plain:
 
 def jammed(robot: Robot, *steps: int) -> list[Trial]:
     """Trials of a jammed robot, each with a controller of its own."""
-    damaged = SimulatedRobot(robot, parse(f"jam:{KNEE}", robot.anatomy))
     gaits = random_controllers(robot, 1 + len(steps))[1:]
     return [
-        in_memory(robot)(damaged, TrialPlan(f"{k}", "after", gait, count, 0))
+        trial_of(robot, f"jam:{KNEE}", gait, steps=count, name=f"{k}")
         for k, (gait, count) in enumerate(zip(gaits, steps, strict=True))
     ]
 
@@ -409,15 +406,7 @@ def test_the_gain_of_a_servo_is_asked_where_a_limit_tells_it_from_a_weak_motor(
     motion = 0.3 * np.sin(np.arange(200)[:, np.newaxis] / 9 + np.arange(7))
     trial = Trial.from_arrays(robot, motion[:, :6], motion[:, : len(robot.anatomy.motors)])
     table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
-    problem = Problem(
-        table,
-        HypothesisSpace.of(DEFAULT_KINDS, robot.anatomy),
-        [trial],
-        surrogate=table.surrogate([trial]),
-        healthy_trials=[],
-        names={trial.path: "arm"},
-        settings=Settings(),
-    )
+    problem = problem_of(table, robot, [trial], [], DEFAULT_KINDS)
 
     asked = {fault.part for fault in problem.space.coarse_candidates if fault.kind == SERVO_GAIN}
     assert asked == set(reached)

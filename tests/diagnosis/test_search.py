@@ -4,7 +4,7 @@ Each fault has an effect on every piece, and the effects of a hypothesis add up.
 squared difference from the effects of the truth, so the truth has a loss of 0.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -363,30 +363,17 @@ def test_degrees_are_found_between_those_that_are_proposed():
     assert not set(severities.values()) & {fault.severity for fault in DEGREES}
 
 
-def rugged(truth: float, noise: float, lucky: float) -> Losses:
-    """Losses of frictions: a bowl with noise per severity, and one lucky severity.
-
-    Args:
-        truth: Position of the minimum.
-        noise: Standard deviation of the noise per segment and severity.
-        lucky: A severity with a lower loss than the truth.
-    """
+def of_friction(mean: Callable[[float], float], noise: float) -> Losses:
+    """Losses of frictions: a mean per severity, with noise per segment and severity."""
 
     def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
         rows = []
-        for hypothesis in hypotheses:
-            severity = hypothesis.faults[0].severity if hypothesis.faults else 1.5
-            rng = np.random.default_rng(round(severity * 1e4))
-            ripple = rng.normal(size=PIECES)
-            ripple -= ripple.mean()
-            luck = 1.0 if severity == lucky else 0.0
-            rows.append(5 + (severity - truth) ** 2 - luck * LUCK + noise * ripple)
+        for severity in map(degree_of, hypotheses):
+            ripple = np.random.default_rng(round(severity * 1e4)).normal(size=PIECES)
+            rows.append(mean(severity) + noise * (ripple - ripple.mean()))
         return np.array(rows)
 
     return losses
-
-
-LUCK = 0.03
 
 
 def friction(severity: float) -> Hypothesis:
@@ -399,7 +386,7 @@ def degree_of(hypothesis: Hypothesis) -> float:
 
 
 def test_a_lucky_degree_does_not_win_where_its_neighbours_cannot_be_told_from_it():
-    losses = rugged(truth=0.4, noise=0.3, lucky=0.32)
+    losses = of_friction(lambda one: 5 + (one - 0.4) ** 2 - 0.03 * (one == 0.32), noise=0.3)
     fitted = with_fitted_severities(friction(0.6), losses, SPACE)
     mean = with_mean_severities(fitted, losses, SPACE)
 
@@ -438,22 +425,8 @@ def test_a_mean_that_no_longer_needs_the_fault_leaves_the_best_degree_as_it_is()
     assert LocalSearch(Synthetic(winds, losses, most=1)).refined([wind]) == wind
 
 
-def valleys(*bottoms: float, noise: float, pieces: int = PIECES) -> Losses:
-    """Losses of frictions with several minima and noise per severity."""
-
-    def losses(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-        rows = []
-        for hypothesis in hypotheses:
-            severity = degree_of(hypothesis)
-            ripple = np.random.default_rng(round(severity * 1e4)).normal(size=pieces)
-            depth = min(abs(severity - bottom) for bottom in bottoms)
-            rows.append(2 + depth + noise * (ripple - ripple.mean()))
-        return np.array(rows)
-
-    return losses
-
-
 def test_a_mean_is_not_taken_across_what_predicts_worse():
-    mean = with_mean_severities(friction(0.2), valleys(0.2, 1.2, noise=0.2), SPACE)
+    valleys = of_friction(lambda one: 2 + min(abs(one - 0.2), abs(one - 1.2)), noise=0.2)
+    mean = with_mean_severities(friction(0.2), valleys, SPACE)
 
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)

@@ -1,5 +1,7 @@
 """Tests of the significance tests: pairing, rounding errors, infinite losses."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -9,6 +11,7 @@ from scipy import stats
 from selfmodel.diagnosis.significance import (
     LOSS_FLOOR,
     LOSS_RATIO,
+    MIN_PIECES,
     MIN_Z,
     MIN_Z_ACROSS_TRIALS,
     NEGLIGIBLE_LOSS,
@@ -16,6 +19,7 @@ from selfmodel.diagnosis.significance import (
     gain_exceeds_healthy_gain,
     gain_is_model_error,
     is_better,
+    joint_is_better,
     paired_z,
 )
 
@@ -84,12 +88,22 @@ def test_an_excess_below_the_floor_is_none_however_exact_the_prediction():
     assert exceeds(np.array([1.01 * LOSS_FLOOR]), np.zeros(1))
 
 
-def test_whatever_predicts_at_all_is_better_than_what_diverged():
-    finite = np.full(5, 1e9)
+@pytest.mark.parametrize("better", [is_better, joint_is_better])
+def test_whatever_predicts_at_all_is_better_than_what_diverged(better: Callable[..., bool]):
+    finite, diverged = np.full(MIN_PIECES, 1e9), np.full(MIN_PIECES, np.inf)
 
-    assert is_better(finite, DIVERGED)
-    assert not is_better(DIVERGED, finite)
-    assert not is_better(DIVERGED, DIVERGED)
+    assert better(finite, diverged)
+    assert not better(diverged, finite)
+    assert not better(diverged, diverged)
+
+
+@pytest.mark.parametrize(("pieces", "better"), [(MIN_PIECES - 1, False), (MIN_PIECES, True)])
+def test_a_few_pieces_of_a_joint_are_no_evidence(pieces: int, *, better: bool):
+    few, large = np.full(80, np.nan), np.linspace(1, 2, 80)
+    few[:pieces] = np.linspace(0.1, 0.2, pieces)
+
+    assert joint_is_better(few, large) == better
+    assert not joint_is_better(large, few)
 
 
 def test_losses_of_other_trials_are_compared_as_welch_did():
@@ -144,13 +158,22 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
-def test_what_diverged_or_has_a_single_piece_has_not_become_better():
+@pytest.mark.parametrize("has_helped", [False, True])
+def test_what_diverged_or_has_a_single_piece_neither_became_better_nor_mends(*, has_helped: bool):
+    one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
+    before = other if has_helped else one
+    told = gain_is_model_error if has_helped else gain_exceeds_healthy_gain
+
+    assert told(one, other, one, before)
+    assert not told(one, DIVERGED, one, before)
+    assert not told(one, other, one, DIVERGED)
+    assert not told(one[:1], other[:1], one, before)
+    assert not told(one, other, one[:1], before[:1])
+
+
+def test_a_gain_of_rounding_errors_is_none():
     one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
 
-    assert gain_exceeds_healthy_gain(one, other, one, one)
-    assert not gain_exceeds_healthy_gain(one, DIVERGED, one, one)
-    assert not gain_exceeds_healthy_gain(one, other, one, DIVERGED)
-    assert not gain_exceeds_healthy_gain(one[:1], other[:1], one, one)
     assert not gain_exceeds_healthy_gain(one, other * NEGLIGIBLE_LOSS / 2, one, one)
 
 
@@ -178,12 +201,3 @@ def test_trials_that_would_not_have_shown_the_harm_say_nothing(error: float, tol
     assert (
         gain_is_model_error(one, one + 0.3, before, before + of_mean_and_error(0.01, error)) == told
     )
-
-
-def test_of_what_diverged_or_has_a_single_piece_nobody_knows_whether_it_mends():
-    one, other = np.zeros(5), np.linspace(1.0, 1.1, 5)
-
-    assert gain_is_model_error(one, other, one, other)
-    assert not gain_is_model_error(one, DIVERGED, one, other)
-    assert not gain_is_model_error(one, other, one, DIVERGED)
-    assert not gain_is_model_error(one, other, one[:1], other[:1])

@@ -31,6 +31,7 @@ from selfmodel.tasks import ROBOTS
 ANATOMY = ROBOTS["quadruped"].robot().anatomy
 JAM, OTHER = (parse(f"jam:{leg}_knee", ANATOMY) for leg in ("front_left", "back_left"))
 BOTH = parse(f"{JAM}+{OTHER}", ANATOMY)
+DOUBT = Doubt("WHY", "DO THIS")
 CHANGE = Change("02-recovery", 1, 4.92, 4.8, 5.04, INTACT, JAM)
 
 
@@ -42,26 +43,36 @@ def diagnosis(**fields: Any) -> Diagnosis:  # noqa: ANN401  # fields of a record
     )
 
 
-def test_an_intact_robot_has_a_sentence_of_its_own():
-    sentence = verdict_sentences(diagnosis(best=INTACT, verdict="intact"))
-
-    assert sentence.startswith("Intact: ")
-    assert "Changed" not in sentence
-
-
-def test_the_alternatives_are_named_with_the_test():
-    sentence = verdict_sentences(diagnosis(verdict="ambiguous", indistinguishable=(OTHER,)))
-
-    assert sentence == (
-        "Ambiguous: the trials do not distinguish jam:front_left_knee from jam:back_left_knee "
-        "(by hand)."
-    )
-
-
-def test_an_unexplained_diagnosis_of_0_1_says_so_without_the_numbers_that_it_lacks():
-    sentence = verdict_sentences(diagnosis(verdict="unexplained"))
-
-    assert sentence.startswith("Unexplained: even jam:front_left_knee predicts the trials")
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        (
+            {"best": INTACT, "verdict": "intact"},
+            "Intact: the healthy robot predicts the trials, and no other hypothesis does so.",
+        ),
+        (
+            {"verdict": "ambiguous", "indistinguishable": (OTHER,)},
+            (
+                "Ambiguous: the trials do not distinguish jam:front_left_knee from "
+                "jam:back_left_knee (by hand)."
+            ),
+        ),
+        (
+            {"verdict": "unexplained"},  # of 0.1, without numbers
+            (
+                "Unexplained: even jam:front_left_knee predicts the trials significantly worse "
+                "than the self-model predicts the healthy robot; there is another fault, or one "
+                "of a kind that was not searched (--kinds)."
+            ),
+        ),
+        (
+            {"verdict": "not judged", "doubt": DOUBT},
+            "Not judged: WHY, so that a fault and an error of the self-model cannot be told apart.",
+        ),
+    ],
+)
+def test_each_verdict_has_a_sentence_of_its_own(fields: dict[str, Any], sentence: str):
+    assert verdict_sentences(diagnosis(**fields)) == sentence
 
 
 def test_the_change_and_the_undetectable_faults_follow_the_verdict():
@@ -172,7 +183,6 @@ def test_direct_evidence_is_a_sentence_for_each_trial_with_a_fact():
     ]
 
 
-DOUBT = Doubt("WHY", "DO THIS")
 MISSED = UnsearchedFault(parse("grip:front_left_knee=0.2", ANATOMY), "grip")
 JOINT = Fit(0.1, 0.1, 0.1, 0.0, 3.5, has_faults=False, joints={"knee": 7.0})
 HEALTHY = Fit(0.1, 0.5, 0.1, 0.0, 3.5, has_faults=True)
@@ -199,12 +209,6 @@ def test_a_fault_before_a_change_is_not_forgotten():
     assert "check whether the joint front_left_knee is stuck, then (2)" in action
     unknown, _ = summary(diagnosis(verdict="not judged", change=CHANGE))
     assert "'02-recovery': nothing is wrong. After that: it is not known" in unknown
-
-
-def test_trials_that_are_not_judged_have_a_reason():
-    sentence = verdict_sentences(diagnosis(verdict="not judged", doubt=DOUBT))
-
-    assert sentence.startswith("Not judged: WHY, so that")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ There is no reality gap, so an unexplained trial is due to the searched hypothes
 """
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -27,23 +26,21 @@ from selfmodel.diagnosis.verdict import (
     diagnosis_of,
     verdict_of,
 )
-from selfmodel.faults import BROKEN, JAMMED
-from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
-from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
-from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
+from selfmodel.simulation.requests import ClosedLoop
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.trajectory import forward_displacement
-from selfmodel.trials.trial import Stage, Trial, TrialPlan, trial_names
+from selfmodel.trials.trial import Trial
+from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers
-from tests.helpers.memory import in_memory
+from tests.helpers.memory import trial_of
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
 CASES = ROBOTS["quadruped"].cases
@@ -51,17 +48,7 @@ GAIT = 4
 """Index of a random controller under which every failure below is detectable."""
 
 
-def trial(
-    robot: Robot,
-    truth: str,
-    controller: Controller,
-    stage: Stage = "after",
-    steps: int = SMALL.steps,
-) -> Trial:
-    """A trial of a damaged robot."""
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    plan = TrialPlan(f"{stage}-{truth}-{hash(controller)}", stage, controller, steps, 0)
-    return in_memory(robot)(physical, plan)
+trial = partial(trial_of, steps=SMALL.steps)
 
 
 def diagnosed(
@@ -84,7 +71,7 @@ def gait(quadruped: Robot) -> Controller:
 
 @pytest.fixture(scope="module")
 def before(quadruped: Robot, gait: Controller) -> list[Trial]:
-    return [trial(quadruped, "intact", gait, "before")]
+    return [trial(quadruped, "intact", gait, stage="before")]
 
 
 @pytest.mark.parametrize(
@@ -143,42 +130,25 @@ def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, befo
     assert found.verdict == "unexplained"
 
 
-@dataclasses.dataclass(frozen=True)
-class Coarse:
-    """The paper's comparator with a coarse ruler, m."""
+class OfJams:
+    """A comparator of which any joint that stands explains the trial."""
 
-    ruler: float
-    name: str = "coarse"
+    name = "of-jams"
 
-    def prepare(self, trial: Trial) -> Prepared:
-        """Prepares the displacement, in rulers."""
-        sound = FORWARD_DISPLACEMENT.prepare(trial)
+    def prepare(self, _trial: Trial) -> Prepared:
+        """Prepares nothing of the trial."""
         return Prepared(
-            sound.request, lambda simulated: np.floor(sound.distances(simulated) / self.ruler)
+            ClosedLoop(record=("joint_positions",)),
+            lambda run: 1.0 * (np.ptp(run["joint_positions"], axis=1).min(axis=1) > 1e-6),
         )
 
 
 def test_hypotheses_that_no_trial_tells_apart_are_rivals(quadruped: Robot, gait: Controller):
-    anatomy = quadruped.anatomy
-    singles = [
-        canonical([fault], anatomy)
-        for kind in (BROKEN, JAMMED)
-        for fault in kind.candidates(anatomy)
-    ]
-    runs = [(one, gait) for one in (INTACT, *singles)]
-    outcome = Simulator(quadruped, 1).run(runs, SMALL.steps, ["base_position"])
-    intact, *ways = forward_displacement(outcome.trajectory)
-    apart, one, other = min(
-        (abs(ways[i] - ways[k]), singles[i], singles[k])
-        for i, k in itertools.combinations(range(len(singles)), 2)
-        if min(abs(ways[i] - intact), abs(ways[k] - intact)) > 3 * abs(ways[i] - ways[k])
+    one, other = (
+        parse(f"jam:{leg}_knee", quadruped.anatomy) for leg in ("back_left", "back_right")
     )
-    found = diagnosed(
-        quadruped,
-        [trial(quadruped, str(one), gait)],
-        comparator=Coarse(1.01 * apart),
-        seeds=[one, other],
-    )
+    truth = trial(quadruped, str(one), gait, steps=20)
+    found = diagnosed(quadruped, [truth], comparator=OfJams(), seeds=[other, one])
     distances = {candidate.hypothesis: candidate.distance for candidate in found.ranked}
 
     assert found.verdict == "ambiguous"
@@ -253,30 +223,21 @@ OF_ONE_SET = (
 def logged(robot: Robot, truth: str, path: str) -> Trial:
     """A trial of a damaged robot with the plan of an import, and a log of its own."""
     (gait,) = random_controllers(robot, 1)
-    physical = SimulatedRobot(robot, parse(truth, robot.anatomy))
-    run = in_memory(robot)(physical, TrialPlan("imported", "after", gait, 200, 0))
+    run = trial_of(robot, truth, gait, steps=200, name="imported")
     return dataclasses.replace(run, path=path)
 
 
-def problem_of(robot: Robot, *trials: Trial) -> Problem:
+def with_healthy(robot: Robot, *trials: Trial) -> Problem:
     """The problem of some trials, with a trial of the healthy robot."""
     healthy = logged(robot, "intact", "healthy.mcap")
     table = LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
-    return Problem(
-        table,
-        HypothesisSpace.of(PAPER_KINDS, robot.anatomy),
-        trials,
-        surrogate=table.surrogate(trials),
-        healthy_trials=[healthy],
-        names=trial_names(trials),
-        settings=Settings(),
-    )
+    return problem_of(table, robot, trials, [healthy], PAPER_KINDS)
 
 
 @pytest.fixture(scope="module")
 def lame(quadruped: Robot) -> Problem:
     """The problem of one trial with a weak motor; its losses are kept from test to test."""
-    return problem_of(quadruped, logged(quadruped, LAME, "lame.mcap"))
+    return with_healthy(quadruped, logged(quadruped, LAME, "lame.mcap"))
 
 
 def parsed(robot: Robot) -> list[list[Hypothesis]]:
@@ -328,15 +289,7 @@ def test_each_hypothesis_that_is_said_to_be_alike_has_a_probability(
 
     assert found.indistinguishable == (one,)
     assert set(found.probability) == {LAME, str(one), "intact"}
-    alone = Problem(
-        lame.table,
-        lame.space,
-        lame.trials,
-        surrogate=lame.surrogate,
-        healthy_trials=(),
-        names=lame.names,
-        settings=lame.settings,
-    )
+    alone = dataclasses.replace(lame, healthy_trials=())
     assert diagnosis_of(alone, [best], best).probability == {}, "nothing tells what is right"
 
 
@@ -349,7 +302,7 @@ def test_the_worst_time_of_an_unexplained_diagnosis_names_the_file_of_its_trial(
         monkeypatch.setattr(f"selfmodel.diagnosis.verdict.{alternatives}", lambda *_: [])
     names = {"monday.mcap": "intact", "tuesday.mcap": LAME}
     trials = [logged(quadruped, truth, path) for path, truth in names.items()]
-    found = diagnosis_of(problem_of(quadruped, *trials), [INTACT], INTACT)
+    found = diagnosis_of(with_healthy(quadruped, *trials), [INTACT], INTACT)
 
     assert found.verdict == "unexplained"
     assert found.residual is not None

@@ -6,19 +6,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.controllers.playback import Playback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import ENCODER_OFFSET, ENCODER_SLIP
 from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.requests import cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
-from tests.faults.test_build import built, follow
+from tests.faults.test_build import assert_same_paths, built, follow
 from tests.faults.test_registry import BARE
+from tests.faults.test_world import STATES, STEPS, playback, segments_of
 from tests.helpers.drivers import random_motion
 
 
@@ -200,18 +199,13 @@ def test_the_contact_parameters_are_those_of_the_mixed_geoms():
     np.testing.assert_array_equal(friction[2:], nominal_friction[2:])
 
 
-STEPS = 60
 OFFSET = 0.1
 JOINT = "front_left_shoulder"
-STATES = tuple(
-    signal for signal in SIGNALS if signal not in ("sensors", "commands", "joint_efforts")
-)
 
 
 def simulated(robot: Robot, texts: list[str]) -> Trajectory:
     """The trajectories of hypotheses under given commands."""
-    driver = Playback(robot.anatomy.motors, random_motion(robot, STEPS))
-    runs = [(parse(text, robot.anatomy), driver) for text in texts]
+    runs = [(parse(text, robot.anatomy), playback(robot)) for text in texts]
     return Simulator(robot, 1).run(runs, STEPS, SIGNALS).trajectory
 
 
@@ -240,7 +234,7 @@ def test_a_prediction_begins_at_the_true_angle(quadruped: Robot, prefix: str):
     run = simulated(quadruped, [text])
     logged = run.run(0)
     starts = np.array([0, 20, 40])
-    segments = cut_segments(logged, {s: logged[s] for s in STATES}, starts, 10, STATES)
+    segments = segments_of(logged, starts)
     hypotheses = [INTACT, parse(text, quadruped.anatomy)]
     predicted = Simulator(quadruped, 1).predict(hypotheses, segments).trajectory
 
@@ -256,40 +250,26 @@ def test_a_prediction_begins_at_the_true_angle(quadruped: Robot, prefix: str):
 def test_a_physical_robot_logs_what_a_simulation_logs(quadruped: Robot, other: str, prefix: str):
     text = f"encoder-offset:{JOINT}={prefix}{OFFSET}{other}"
     run = simulated(quadruped, [text])
-    driver = Playback(quadruped.anatomy.motors, random_motion(quadruped, STEPS))
-    physical = SimulatedRobot(quadruped, parse(text, quadruped.anatomy)).run(driver, STEPS)
-    logged = collect(quadruped.anatomy.names, physical)
+    physical = SimulatedRobot(quadruped, parse(text, quadruped.anatomy))
+    logged = collect(quadruped.anatomy.names, physical.run(playback(quadruped), STEPS))
 
     for signal in SIGNALS:
         np.testing.assert_array_equal(logged[signal], run[signal][0])
 
 
-def motion(robot: Robot, model: mujoco.MjModel, targets: np.ndarray) -> np.ndarray:
-    """The generalized positions under motor targets, by MuJoCo alone, ``(steps + 1, nq)``."""
-    data = mujoco.MjData(model)
-    rows = [data.qpos.copy()]
-    for target in targets:
-        data.ctrl[:] = target
-        mujoco.mj_step(model, data, round(robot.control_timestep / model.opt.timestep))
-        rows.append(data.qpos.copy())
-    return np.array(rows)
-
-
-def lowered(robot: Robot, targets: np.ndarray) -> np.ndarray:
+def lowered(robot: Robot, steps: int) -> np.ndarray:
     """Motor targets of which that of the joint is lower by the offset."""
     (motor,) = robot.anatomy.joint(JOINT).motors
-    return targets - OFFSET * (np.array(robot.anatomy.motors) == motor)
+    return random_motion(robot, steps) - OFFSET * (np.array(robot.anatomy.motors) == motor)
 
 
 def test_a_robot_with_a_slip_moves_as_under_commands_that_are_lower_by_it(quadruped: Robot):
-    slip = build(quadruped, parse(f"encoder-offset:{JOINT}=slip{OFFSET}", quadruped.anatomy))
-    targets = random_motion(quadruped, STEPS)
+    slip = built(quadruped, f"encoder-offset:{JOINT}=slip{OFFSET}")
+    expected = follow(quadruped, quadruped.model, STEPS, lowered)
 
-    moved = motion(quadruped, slip.model, targets)
-
-    expected = motion(quadruped, quadruped.model, lowered(quadruped, targets))
-    np.testing.assert_allclose(moved, expected, atol=1e-9, rtol=0)
-    assert np.abs(expected - motion(quadruped, quadruped.model, targets)).max() > 0.05
+    assert_same_paths(follow(quadruped, slip, STEPS), expected, 1e-9)
+    nominal = follow(quadruped, quadruped.model, STEPS)
+    assert np.abs(expected[JOINT] - nominal[JOINT]).max() > 0.05
 
 
 @pytest.mark.parametrize("other", [f"motor:{JOINT}=0.4", f"motor:{JOINT}=0", f"jam:{JOINT}=0.2"])

@@ -12,9 +12,10 @@ from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_factors import nominal, with_parameters
-from selfmodel.simulation.requests import cut_segments
+from selfmodel.simulation.requests import Segments, cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
+from selfmodel.trials.trajectory import Trajectory
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.helpers.drivers import random_motion
 from tests.helpers.robots.arms import arm
@@ -31,6 +32,12 @@ def late(robot: Robot, delay: float) -> Robot:
 
 def playback(robot: Robot) -> Playback:
     return Playback(robot.anatomy.motors, random_motion(robot, STEPS))
+
+
+def segments_of(logged: Trajectory, starts: np.ndarray) -> Segments:
+    """Segments of ten steps of a log, which predict all of the state."""
+    states = {signal: logged[signal] for signal in STATES}
+    return cut_segments(logged, states, starts, 10, STATES)
 
 
 @pytest.mark.parametrize(("own", "added"), [(0, 1), (0, 3), (2, 2), (0.5, 2), (1.5, 1)])
@@ -50,8 +57,7 @@ def test_a_grown_delay_is_the_robot_with_that_delay_beside_robots_without_it(
     assert not np.array_equal(expected["base_position"], prompt["base_position"])
 
     logged = expected.run(0)
-    states = {signal: logged[signal] for signal in STATES}
-    segments = cut_segments(logged, states, np.array([0, 10, 30]), 10, STATES)
+    segments = segments_of(logged, np.array([0, 10, 30]))
     predicted = Simulator(robot, 1).predict(hypotheses, segments).trajectory
     alone = Simulator(truth, 1).predict([INTACT], segments).trajectory
     for signal in STATES:
