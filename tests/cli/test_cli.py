@@ -144,23 +144,6 @@ def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (
-            ["recover", "quadrupd", "--case", "1"],
-            "unknown robot 'quadrupd': did you mean quadruped?",
-        ),
-        (["recover", "quadruped", "--case", "11"], "unknown case of Table I '11'"),
-        (["recover", "quadruped"], "expected either --case N or --damage NOTATION, got neither"),
-        (["recover", "quadruped", "--case", "1", "--damage", "intact"], "got both"),
-        (["recover", "hexapod", "--damage", "break:front_left_hp"], "did you mean front_left_hip"),
-        (["recover", "hexapod", "--damage", "break"], "cannot read the term 'break'"),
-        (
-            ["recover", "hexapod", "--case", "1", "--comparator", "forward-displacment"],
-            "did you mean forward-displacement?",
-        ),
-        (["recover", "hexapod", "--case", "1", "--comparator", "no.such:thing"], "cannot find"),
-        (["recover", "hexapod", "--case", "1", "--comparator", "math:pi"], "is no comparator"),
-        (["recover", "hexapod", "--case", "1", "--population", "1"], "population"),
-        (["recover", "hexapod", "--case", "x"], "case"),
         (["trial", "quadruped", "--out", "no/such/folder/a.mcap"], "there is no folder"),
         (["trial", "quadruped", "--out", "a.bag"], "ends in .mcap"),
         (["trial", "quadruped", "--out", "a.mcap", "--controller", "no.npz"], "no.npz"),

@@ -68,26 +68,6 @@ def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Pat
     assert log.trial.plan.controller.design.hidden == 5
 
 
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (("--controller", "cpq"), "unknown kind of controller 'cpq': did you mean cpg?"),
-        (
-            ("--controller", "cpg", "--neurons", "4"),
-            "a CPG has no hidden neurons, got --neurons 4: leave --neurons out",
-        ),
-        (("--controller", "cpg", "--case", "10"), "neuron:0 does not apply to a CPG"),
-        (("--neurons", "101"), "less than or equal to 100"),
-    ],
-)
-def test_what_cannot_be_evolved_is_said_before_anything_runs(
-    asked: tuple[str, ...], said: str, tmp_path: Path
-):
-    case = () if "--case" in asked else ("--case", "1")
-    refused("recover", "quadruped", *asked, *case, "--out", "run", said=said, cwd=tmp_path)
-    assert not (tmp_path / "run").exists()
-
-
 def test_a_controller_of_another_size_is_refused_by_what_differs(tmp_path: Path):
     few = ("--steps", "9", "--out", "6.mcap")
     first = selfmodel("trial", "quadruped", "--neurons", "6", *few, cwd=tmp_path)

@@ -53,10 +53,3 @@ def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
     assert logged.returncode == drawn.returncode == 0, logged.stderr + drawn.stderr
     assert json.loads(again.stdout)["identical"]
     refused("replay", "a.mcap", "--hypothesis", "gravity=3.7", said="gravity", cwd=tmp_path)
-
-
-@pytest.mark.parametrize("command", [["recover", "quadruped", "--case", "1"], ["diagnose", "a"]])
-def test_an_unknown_kind_is_one_sentence_and_status_2(command: list[str], tmp_path: Path):
-    said = "unknown kind 'frction': did you mean friction, joint-friction?"
-    refused(*command, "--kinds", "break,frction", said=said, cwd=tmp_path)
-    assert list(tmp_path.iterdir()) == []

@@ -252,6 +252,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
             ["diagnose", "a.mcap", "--robot", "hexapod"],
             "hexapod is another robot than that of a.mcap: it has 12 sensors, the log 8",
         ),
+        (["diagnose", "a.mcap", "--kinds", "frction"], "'frction': did you mean friction, joint-f"),
         (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
         (["replay", "pipe"], "pipe: expected a log file, got a pipe or a device"),
         (["logs", "salvage", "pipe", "-o", "n.mcap"], "expected a log file, got a pipe"),

@@ -9,35 +9,74 @@ from selfmodel.logs.repertoires import save_repertoire
 from selfmodel.robot.robot import Robot
 from tests.helpers.command import SMALL, printed, refused, selfmodel
 from tests.helpers.drivers import random_repertoire
+from tests.helpers.policies import save_policy
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
+    """A folder with a small repertoire and a policy of the quadruped."""
+    folder = tmp_path_factory.mktemp("given")
+    save_repertoire(folder / "gaits.npz", random_repertoire(quadruped))
+    save_policy(folder, quadruped)
+    return folder
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("arguments", "said"),
     [
-        (("--repair", "papers"), "unknown repair 'papers': did you mean paper"),
-        (("--search", "cma"), "unknown search 'cma': did you mean cma-es"),
-        (("--repair", "paper", "--search", "cma-es"), "leave --search and --repertoire out"),
-        (("--search", "repertoire"), "got the search repertoire without a repertoire"),
-        (("--repertoire", "none.npz"), "none.npz"),
-        (("--score", "energy", "--max-joint-speed", "9"), "limits of --score upright, got energy"),
-        (("--max-joint-torque", "3", "--reference", "none.csv"), "--reference is a trajectory"),
-        (("--max-joint-torque", "0"), "expected --max-joint-torque above 0 N m, got 0: give the"),
-        (("--max-joint-speed", "-1"), "expected --max-joint-speed above 0 rad/s, got -1: give the"),
-        (
-            ("--max-self-collision", "-0.01"),
-            "--max-self-collision of 0 m or above, got -0.01: give",
+        ("quadrupd --case 1", "unknown robot 'quadrupd': did you mean quadruped?"),
+        ("quadruped", "expected either --case N or --damage NOTATION, got neither"),
+        ("quadruped --case 11", "unknown case of Table I '11'"),
+        ("quadruped --case x", "case"),
+        ("quadruped --case 1 --damage intact", "got both"),
+        ("hexapod --damage break:front_left_hp", "did you mean front_left_hip"),
+        ("hexapod --damage break", "cannot read the term 'break'"),
+        ("hexapod --case 1 --repertoire gaits.npz", "expected a repertoire of hexapod"),
+        ("quadruped --controller cpg --case 10", "neuron:0 does not apply to a CPG"),
+        *(
+            (f"quadruped --case 1 {options}", said)
+            for options, said in [
+                ("--kinds break,frction", "unknown kind 'frction': did you mean friction, joint-f"),
+                ("--comparator forward-displacment", "did you mean forward-displacement?"),
+                ("--comparator no.such:thing", "cannot find"),
+                ("--comparator math:pi", "is no comparator"),
+                ("--population 1", "population"),
+                ("--repair papers", "unknown repair 'papers': did you mean paper"),
+                ("--search cma", "unknown search 'cma': did you mean cma-es"),
+                ("--repair paper --search cma-es", "leave --search and --repertoire out"),
+                ("--search repertoire", "got the search repertoire without a repertoire"),
+                ("--repertoire none.npz", "none.npz"),
+                ("--repertoire gaits.npz --controller cpg", "the controllers to evolve, a cpg"),
+                ("--repertoire gaits.npz --search ea", "got the search ea with a repertoire"),
+                ("--repertoire gaits.npz --repair paper", "leave --search and --repertoire out"),
+                ("--score energy --max-joint-speed 9", "limits of --score upright, got energy"),
+                ("--score energy --max-self-collision 0", "limits of --score upright"),
+                ("--score speed", "score 'speed'"),
+                ("--score math:pi", "'math:pi' is no score"),
+                ("--max-joint-torque 3 --reference none.csv", "--reference is a trajectory"),
+                ("--max-joint-torque 0", "--max-joint-torque above 0 N m, got 0: give the"),
+                ("--max-joint-speed -1", "--max-joint-speed above 0 rad/s, got -1: give the"),
+                ("--max-self-collision -0.01", "collision of 0 m or above, got -0.01: give"),
+                ("--controller cpq", "unknown kind of controller 'cpq': did you mean cpg?"),
+                ("--controller cpg --neurons 4", "has no hidden neurons, got --neurons 4: leave"),
+                ("--neurons 101", "less than or equal to 100"),
+                ("--controller policy.toml --repair robust", "the weights of a controller"),
+                ("--controller policy.toml --repair paper", "the weights of a controller"),
+                ("--controller policy.toml --search ea", "the repair compensate has CMA-ES"),
+                ("--controller policy.toml --neurons 5", "got --neurons 5: leave --neurons out"),
+                ("--controller gait.toml", "gait.toml: expected a policy file that can be read"),
+                ("--controller network --repair compensate", "give --controller FILE, a policy"),
+                ("--repair compensate", "a controller that walks, got the design network"),
+            ]
         ),
-        (("--score", "energy", "--max-self-collision", "0"), "limits of --score upright"),
-        (("--score", "speed"), "score 'speed'"),
-        (("--score", "math:pi"), "'math:pi' is no score"),
     ],
 )
-def test_a_name_that_is_unknown_is_refused_before_any_work(
-    tmp_path: Path, options: tuple[str, ...], message: str
+def test_what_no_recovery_can_do_is_refused_in_a_sentence_before_any_work(
+    folder: Path, arguments: str, said: str
 ):
-    run = ("recover", "quadruped", "--case", "1", *options, "--out", "run")
-    refused(*run, said=message, cwd=tmp_path)
-    assert not (tmp_path / "run").exists()
+    before = sorted(folder.iterdir())
+    refused("recover", *arguments.split(), "--out", "run", said=said, cwd=folder)
+    assert sorted(folder.iterdir()) == before
 
 
 @pytest.mark.parametrize(
@@ -96,22 +135,17 @@ HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
     assert json.loads((tmp_path / "run" / "searches.json").read_text())
 
 
-@pytest.fixture(scope="module")
-def gaits(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
-    """A small repertoire of the quadruped."""
-    path = tmp_path_factory.mktemp("repertoire") / "gaits.npz"
-    save_repertoire(path, random_repertoire(quadruped))
-    return path
-
-
-def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
+def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, folder: Path):
     run = (
         *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
         *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate", "--json"),
     )
     found = [
         printed(*run, *options, "--out", name, cwd=tmp_path)
-        for name, options in {"given": ("--repertoire", str(gaits)), "without": ()}.items()
+        for name, options in {
+            "given": ("--repertoire", str(folder / "gaits.npz")),
+            "without": (),
+        }.items()
     ]
     recovered = [one["trials"][2]["displacement"] for one in found]
     assert [one["search"] for one in found] == ["repertoire", "cma-es"]
@@ -119,24 +153,3 @@ def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, gaits: Path):
     assert found[0]["repertoire"]["robot"] == "quadruped"
 
     assert recovered[0] != recovered[1]
-
-
-@pytest.mark.parametrize(
-    ("robot", "options", "message"),
-    [
-        ("hexapod", (), "expected a repertoire of hexapod"),
-        (
-            "quadruped",
-            ("--controller", "cpg"),
-            "expected gaits of the controllers to evolve, a cpg",
-        ),
-        ("quadruped", ("--search", "ea"), "got the search ea with a repertoire"),
-        ("quadruped", ("--repair", "paper"), "leave --search and --repertoire out"),
-    ],
-)
-def test_a_repertoire_that_the_recovery_cannot_use_is_refused(
-    tmp_path: Path, gaits: Path, robot: str, options: tuple[str, ...], message: str
-):
-    run = ("recover", robot, "--case", "1", "--repertoire", str(gaits), *options, "--out", "run")
-    refused(*run, said=message, cwd=tmp_path)
-    assert not (tmp_path / "run").exists()
