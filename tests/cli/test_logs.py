@@ -26,6 +26,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cut.mcap.part").write_bytes(data[: len(data) // 2])
     (folder / "copy.mcap").write_bytes(data)
     os.mkfifo(folder / "pipe")
+    (folder / "empty").mkdir()
+    for name in ("taken.png", "taken.html"):
+        (folder / name).write_text("{}")
     (folder / "flipped.mcap").write_bytes(data[:60_000] + b"\x00" + data[60_001:])
     return folder
 
@@ -273,11 +276,30 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
         (["logs", "salvage", "cut.mcap.part", "-o", "a.mcap"], "a.mcap exists"),
         (["logs", "salvage", "cut.mcap.part", "-o", "new.bag"], "ends in .mcap"),
         (["logs", "salvage", "a.mcap", "-o", "new.mcap"], "there is nothing to salvage"),
+        (["render", "a.mcap", "-o", "a.txt"], "--out needs a name that ends in .gif, .mp4, .png"),
+        (["render", "a.mcap", "-o", "a.mcap"], "--out needs a name that ends in"),
+        (["render", "a.mcap", "-o", "no/a.png"], "there is no folder no"),
+        (["render", "a.mcap", "-o", "taken.png"], "taken.png exists, and is not overwritten"),
+        (["render", "a.mcap", "-o", "f.png", "--stick"], "--stick is for films"),
+        (["render", "a.mcap", "-o", "f.png", "--hypothesis", "break:nose"], "'nose'"),
+        (["render", "a.mcap", "-o", "f.png", "--diagnosis", "taken.png"], "expected a diagnosis"),
+        (
+            ["render", "a.mcap", "-o", "f.png", "--diagnosis", "x", "--hypothesis", "intact"],
+            "got both: leave one out",
+        ),
+        (["report", "empty"], "expected the folder of a run with its trials"),
+        (["report", "empty", "a.mcap"], "expected one folder, or logs"),
+        (["report", "a.mcap", "-o", "a.pdf"], "--out needs a name that ends in .html"),
+        (["report", "a.mcap", "-o", "taken.html"], "taken.html exists, and is not overwritten"),
+        (["report", "no.mcap"], "no.mcap"),
+        (["report", "empty", "--diagnosis", "a.json"], "--diagnosis is for logs, and empty"),
+        (["report", "a.mcap", "--diagnosis", "a.json"], "a.json: expected the output of"),
     ],
 )
 def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
     folder: Path, arguments: list[str], said: str
 ):
     before = sorted(path.name for path in folder.iterdir())
-    refused(*arguments, said=said, cwd=folder)
+    done = refused(*arguments, said=said, cwd=folder)
+    assert done.stderr.startswith("Usage: ") or done.stderr.count("\n") == 1
     assert sorted(path.name for path in folder.iterdir()) == before

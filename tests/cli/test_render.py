@@ -31,7 +31,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPlan
-from tests.helpers.command import refused, selfmodel_process
+from tests.helpers.command import selfmodel_process
 from tests.helpers.drivers import random_controllers
 
 STEPS = 31
@@ -118,29 +118,6 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
     else:
         with pytest.raises(WorkError, match=r"neither EGL nor OSMesa.*libosmesa6.*-o NAME\.png"):
             render.choose_gl()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (("-o", "a.txt"), "--out needs a name that ends in .gif, .mp4, .png"),
-        (("-o", "a.mcap"), "--out needs a name that ends in"),
-        (("-o", "nowhere/a.png"), "there is no folder nowhere"),
-        (("-o", "taken.png"), "taken.png exists, and is not overwritten"),
-        (("-o", "a.png", "--stick"), "--stick is for films"),
-        (("-o", "a.png", "--hypothesis", "break:nose"), "'nose'"),
-        (("-o", "a.png", "--diagnosis", "taken.png"), "expected a diagnosis"),
-        (("-o", "a.png", "--diagnosis", "x", "--hypothesis", "intact"), "got both: leave one out"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused_in_a_sentence(
-    folder: Path, arguments: tuple[str, ...], sentence: str
-):
-    (folder / "taken.png").write_text("{}")
-    done = refused("render", "a.mcap", *arguments, said=sentence, cwd=folder)
-
-    assert done.stderr.startswith("error: ")
-    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(
