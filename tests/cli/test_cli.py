@@ -11,10 +11,8 @@ import pytest
 from selfmodel import cli
 from selfmodel.diagnosis.diagnosis import Verdict
 from selfmodel.errors import TrialError
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
-from selfmodel.logs.journal import FolderJournal
 from selfmodel.logs.results import read_result, versions
 from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
@@ -77,17 +75,6 @@ def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(short: tuple[Pa
         assert log.trial.plan.stage == trial["stage"]
         assert log.trial.trajectory.steps == 60
     assert not list(folder.rglob("*.part"))
-
-
-def test_the_database_is_read_back_from_the_folder(short: tuple[Path, dict], quadruped: Robot):
-    folder, told = short
-    trials, diagnoses = FolderJournal(folder / "run", HypothesisSpace(quadruped.anatomy, ())).read()
-
-    assert [t.displacement for t in trials] == [t["displacement"] for t in told["trials"]]
-    assert [t.plan.stage for t in trials] == ["before", "after", "recovery"]
-    assert [str(each.hypothesis) for each in diagnoses[-1].ranked] == [
-        d["hypothesis"] for d in told["diagnosis"]
-    ]
 
 
 def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(short: tuple[Path, dict]):
@@ -171,19 +158,14 @@ def test_a_narrow_terminal_loses_no_name(tmp_path: Path):
 def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, quadruped: Robot):
     (controller,) = random_controllers(quadruped, 1, seed=9)
     save_controller(tmp_path / "gait.npz", controller)
-    few = ("--steps", "200", "--json")
-    first = selfmodel(
-        *("trial", "quadruped", "--controller", "gait.npz", *few, "--out", "a.mcap"), cwd=tmp_path
+    few, damage = ("--steps", "200", "--json"), ("--damage", "break:front_left_knee")
+    a, b, c = (
+        printed("trial", "quadruped", *few, "--controller", *given, "--out", out, cwd=tmp_path)
+        for out, *given in (
+            *(("a.mcap", "gait.npz"), ("b.mcap", "a.mcap")),
+            ("c.mcap", "a.mcap", *damage),
+        )
     )
-    second = selfmodel(
-        *("trial", "quadruped", "--controller", "a.mcap", *few, "--out", "b.mcap"), cwd=tmp_path
-    )
-    damage = ("--damage", "break:front_left_knee")
-    third = selfmodel(
-        *("trial", "quadruped", "--controller", "a.mcap", *damage, *few, "--out", "c.mcap"),
-        cwd=tmp_path,
-    )
-    a, b, c = (json.loads(done.stdout) for done in (first, second, third))
 
     assert read_log(tmp_path / "b.mcap").trial.plan.controller == controller
     assert a["displacement"] == b["displacement"] != c["displacement"]

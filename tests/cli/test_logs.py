@@ -34,10 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_info_tells_what_is_in_a_log_but_not_what_is_hidden(folder: Path):
-    done = selfmodel("logs", "info", "a.mcap", cwd=folder)
+    done = succeeds("logs", "info", "a.mcap", cwd=folder)
     told = printed("logs", "info", "a.mcap", "--json", cwd=folder)
 
-    assert done.returncode == 0
     for word in ("quadruped", "finished", "/joint_states", "Foxglove", "rerun", "observed"):
         assert word in done.stdout
     assert "front_left_knee" not in done.stdout
@@ -75,12 +74,10 @@ def test_damage_is_told_with_what_can_be_saved_and_how(
     assert f"`{command}`" in damaged["error"]
     out = tmp_path / "new.mcap"
     arguments = command.replace("NEW.mcap", str(out)).split()[1:]
-    salvaged = selfmodel(*arguments, "--json", cwd=folder)
-    assert json.loads(salvaged.stdout)["steps"] == steps
+    assert printed(*arguments, "--json", cwd=folder)["steps"] == steps
     assert selfmodel("logs", "verify", str(out), cwd=folder).returncode == 0
-    told = printed(
-        *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
-    )
+    truth = ("--hypothesis", "break:front_left_knee", "--json")
+    told = printed("replay", str(out), *truth, cwd=folder)
     assert (told["identical"], told["steps"]) == (True, steps)
 
 
@@ -89,8 +86,8 @@ def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
 ):
     name = tmp_path / "cut half é.mcap"
     name.write_bytes((folder / "cut.mcap.part").read_bytes())
-    told = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"][0]
-    command = told["error"].partition("`")[2].partition("`")[0]
+    told = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)
+    command = told["files"][0]["error"].partition("`")[2].partition("`")[0]
     arguments = shlex.split(command.replace("NEW.mcap", str(tmp_path / "new.mcap")))[1:]
 
     assert selfmodel(*arguments, cwd=folder).returncode == 0
@@ -220,9 +217,9 @@ def test_a_log_given_as_healthy_is_so_whatever_its_stage(
 ):
     folder, told = recovered_as_the_paper_did
     before, failed, later = (trial["log"] for trial in told["trials"][:3])
-    done = selfmodel("diagnose", before, failed, "--healthy", later, *PAPERS, "--json", cwd=folder)
+    given = ("diagnose", before, failed, "--healthy", later)
+    found = printed(*given, *PAPERS, "--json", cwd=folder)
 
-    found = json.loads(done.stdout)
     assert (found["logs"], found["intact"]) == ([failed], [later, before])
     assert found["files"].keys() == {before, failed, later}
 
@@ -235,12 +232,10 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     model = tmp_path / "mine.xml"
     model.write_text(read_log(log).mjcf, encoding="utf-8")
     diagnose = ("diagnose", str(log), *PAPERS)
-    named = selfmodel(*diagnose, "--robot", "quadruped", cwd=tmp_path)
-    own = selfmodel(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
+    named = succeeds(*diagnose, "--robot", "quadruped", cwd=tmp_path)
+    own = printed(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
 
-    assert named.returncode == 0, named.stderr
-    best = json.loads(own.stdout)["diagnosis"][0]["hypothesis"]
-    assert best in named.stdout
+    assert own["diagnosis"][0]["hypothesis"] in named.stdout
     assert "1 log, forward-displacement" in named.stdout
     assert "diagnosis from 1 trial" in named.stderr
 

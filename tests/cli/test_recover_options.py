@@ -1,15 +1,21 @@
-"""Promises of `selfmodel recover` about repairs, searches, scores and falls."""
+"""What a recovery, and the trials and diagnoses around it, make of their options."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 
+from selfmodel.logs import read_log
+from selfmodel.logs.journal import is_calibrated
 from selfmodel.logs.repertoires import save_repertoire
 from selfmodel.robot.robot import Robot
-from tests.helpers.command import SMALL, printed, refused, selfmodel
+from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.drivers import random_repertoire
 from tests.helpers.policies import save_policy
+
+FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--no-calibrate", "--json")
+QUICK = ("recover", "quadruped", "--case", "1", *FEW, "--comparator", "forward-displacement")
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +97,8 @@ def test_what_no_recovery_can_do_is_refused_in_a_sentence_before_any_work(
 def test_the_score_is_that_of_the_repair_unless_another_is_given(
     tmp_path: Path, options: tuple[str, ...], score: str
 ):
-    found = printed(
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "30", "--trials", "1"),
-        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
-        *("--gap", "0.05", *options, "--out", "run", "--json"),
-        cwd=tmp_path,
-    )
+    given = ("--steps", "30", "--gap", "0.05", *options, "--out", "run")
+    found = printed(*QUICK, *given, cwd=tmp_path)
 
     assert found["score"]["name"] == score
     assert found["repair"] == ("paper" if "paper" in options else "robust")
@@ -120,12 +122,8 @@ def of(robot, hypothesis, trajectory):
 HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
 """
     (tmp_path / "my_scores.py").write_text(text)
-    done = selfmodel(
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
-        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
-        *("--repair", "paper", "--score", "my_scores:HEALTHY_ONLY", "--out", "run"),
-        cwd=tmp_path,
-    )
+    given = ("--repair", "paper", "--score", "my_scores:HEALTHY_ONLY", "--out", "run")
+    done = selfmodel(*QUICK, *given, cwd=tmp_path)
     told = " ".join(done.stderr.split())
 
     assert done.returncode == 2, told
@@ -136,20 +134,120 @@ HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
 
 
 def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, folder: Path):
-    run = (
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", "--trials", "1"),
-        *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate", "--json"),
-    )
     found = [
-        printed(*run, *options, "--out", name, cwd=tmp_path)
-        for name, options in {
-            "given": ("--repertoire", str(folder / "gaits.npz")),
-            "without": (),
-        }.items()
+        printed(*QUICK, *given, "--out", name, cwd=tmp_path)
+        for name, given in {"with": ("--repertoire", folder / "gaits.npz"), "without": ()}.items()
     ]
     recovered = [one["trials"][2]["displacement"] for one in found]
     assert [one["search"] for one in found] == ["repertoire", "cma-es"]
     assert [one["repertoire"] is None for one in found] == [False, True]
     assert found[0]["repertoire"]["robot"] == "quadruped"
-
     assert recovered[0] != recovered[1]
+
+
+@pytest.fixture(scope="module")
+def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder in which a robot was recovered with oscillators, and what it said."""
+    folder = tmp_path_factory.mktemp("rhythmic")
+    asked = ("--case", "3", "--controller", "cpg", "--out", "run")
+    return folder, printed("recover", "quadruped", *asked, *FEW, cwd=folder)
+
+
+@pytest.mark.search
+def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple[Path, dict]):
+    folder, told = rhythmic
+    drivers = [read_log(folder / one["log"]).trial.plan.controller for one in told["trials"]]
+
+    assert told["controller"] == "cpg"
+    assert len(drivers) == 3
+    assert all(driver.design.name == "cpg" for driver in drivers)
+    assert drivers[0] == drivers[1] != drivers[2]
+
+
+@pytest.mark.search
+def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[Path, dict]):
+    folder, told = rhythmic
+    given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
+    succeeds("trial", "quadruped", *given, "--out", "broken.mcap", "--json", cwd=folder)
+    truth = ("--hypothesis", "break:back_left_knee", "--json")
+
+    assert printed("replay", "broken.mcap", *truth, cwd=folder)["identical"] is True
+    assert "a CPG of" in selfmodel("logs", "info", "broken.mcap", cwd=folder).stdout
+
+
+def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Path):
+    for number, asked in enumerate((["--controller", "cpg"], ["--neurons", "6"])):
+        out = f"{number}.mcap"
+        succeeds("trial", "quadruped", *asked, "--steps", "9", "--out", out, cwd=tmp_path)
+    rhythmic, large = (read_log(tmp_path / f"{k}.mcap").trial.plan.controller for k in (0, 1))
+
+    assert rhythmic.design.name == "cpg"
+    assert large.design.hidden == 6
+
+
+@pytest.mark.search
+def test_a_recovery_s_network_has_as_many_neurons_as_are_asked_for(tmp_path: Path):
+    asked = ("--neurons", "5", "--damage", "neuron:4", "--out", "run")
+    told = printed("recover", "quadruped", *asked, *FEW, cwd=tmp_path)
+    log = read_log(tmp_path / told["trials"][-1]["log"])
+
+    assert told["neurons"] == 5
+    assert told["controller"] == "network"
+    assert told["calibration"] is None
+    assert not is_calibrated(tmp_path / Path(told["trials"][-1]["log"]).parents[1])
+    assert log.trial.plan.controller.design.hidden == 5
+
+
+def test_a_controller_of_another_size_is_refused_by_what_differs(tmp_path: Path):
+    few = ("--steps", "9", "--out", "6.mcap")
+    succeeds("trial", "quadruped", "--neurons", "6", *few, cwd=tmp_path)
+    done = refused(
+        *("trial", "quadruped", "--controller", "6.mcap", "--neurons", "3", "--out", "3.mcap"),
+        said="6 hidden neurons and 8 motors; this robot needs one for",
+        cwd=tmp_path,
+    )
+
+    assert "3 hidden neurons" in done.stderr
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PATH = os.pathsep.join(filter(None, (str(EXAMPLES), os.environ.get("PYTHONPATH"))))
+"""Where the examples can be imported from."""
+
+
+def words(diagnosis: list[dict]) -> set[str]:
+    """The words of all terms of a ranking."""
+    terms = "+".join(one["hypothesis"] for one in diagnosis).split("+")
+    return {term.partition("=")[0].partition(":")[0] for term in terms}
+
+
+@pytest.mark.search
+def test_a_recovery_and_a_diagnosis_of_its_logs_consider_the_kinds_that_are_chosen(tmp_path: Path):
+    kinds = ("--kinds", "gravity:GRAVITY,friction,jam", "--json")
+    asked = ("--damage", "gravity=3.7+friction=0.4", *SMALL, "--steps", "60", "--trials", "1")
+    given = (*asked, *kinds, "--out", "run")
+    told = printed("recover", "quadruped", *given, cwd=tmp_path, PYTHONPATH=PATH)
+    logs = [trial["log"] for trial in told["trials"]]
+    found = printed("diagnose", *logs, *kinds, cwd=tmp_path, PYTHONPATH=PATH)
+
+    assert told["truth"] == "friction=0.4+gravity=3.7"
+    assert found["kinds"] == told["kinds"] == ["gravity", "friction", "jam"]
+    assert {"gravity", "friction"} & words(told["diagnosis"])
+    assert words(told["diagnosis"]) <= {*told["kinds"], "intact"}
+    assert found["diagnosis"] == told["diagnosis"]
+
+
+def test_a_trial_and_its_replay_name_a_kind_of_ones_own(tmp_path: Path):
+    own = ("--kinds", "gravity:GRAVITY")
+    fault = ("--hypothesis", "gravity=3.7", *own)
+    _, again, _ = (
+        succeeds(*command, cwd=tmp_path, PYTHONPATH=PATH)
+        for command in (
+            ("trial", "quadruped", "--damage", fault[1], *own, "--steps", "60", "--out", "a.mcap"),
+            ("replay", "a.mcap", *fault, "--json"),
+            ("render", "a.mcap", *fault, "--out", "a.png"),
+        )
+    )
+
+    assert json.loads(again.stdout)["identical"]
+    refused("replay", "a.mcap", "--hypothesis", "gravity=3.7", said="gravity", cwd=tmp_path)

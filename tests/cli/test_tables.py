@@ -1,6 +1,5 @@
 """The commands of tables: logs export, and logs import of a CSV, NPZ or Parquet file."""
 
-import json
 from pathlib import Path
 
 import gymnasium
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.logs import read_log
-from tests.helpers.command import selfmodel, succeeds
+from tests.helpers.command import printed, selfmodel, succeeds
 from tests.helpers.go2 import STAND, recorded
 
 pytestmark = pytest.mark.process
@@ -31,12 +30,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_exported_trial_is_imported_as_the_same_trial(folder: Path):
     table = "after.csv"
-    done = selfmodel("logs", "export", "after.mcap", "-o", table, "--json", cwd=folder)
-    assert json.loads(done.stdout)["rows"] == 200
+    given = ("logs", "export", "after.mcap", "-o", table, "--json")
+    assert printed(*given, cwd=folder)["rows"] == 200
     done = succeeds("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=folder)
     (folder / "map.toml").write_text(done.stdout)
     imported = ("logs", "import", table, "--mapping", "map.toml", "--out", "again.mcap")
-    done = succeeds(*imported, cwd=folder)
+    succeeds(*imported, cwd=folder)
 
     original, again = (
         read_log(folder / name).trial.trajectory for name in ("after.mcap", "again.mcap")
@@ -53,7 +52,7 @@ def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path)
     (tmp_path / "map.toml").write_text(
         done.stdout.replace("control_timestep = 0.01 ", "control_timestep = 0.02 ")
     )
-    done = succeeds("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
+    succeeds("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
 
     trajectory = read_log(tmp_path / "g.mcap").trial.trajectory
     with np.load(table) as recorded:
