@@ -193,31 +193,15 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(
 
 
 def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
-    (tmp_path / "mine.py").write_text(
-        "from selfmodel.trials.trajectory import forward_displacement\n"
-        "from selfmodel.simulation.requests import ClosedLoop\n"
-        "class Prepared:\n"
-        "    request = ClosedLoop(record=('base_position',))\n"
-        "    def __init__(self, trial):\n"
-        "        self.displacement = trial.displacement\n"
-        "    def distances(self, simulated):\n"
-        "        return (forward_displacement(simulated) - self.displacement) ** 2\n"
-        "class Squared:\n"
-        "    name = 'squared'\n"
-        "    def prepare(self, trial):\n"
-        "        return Prepared(trial)\n"
-        "squared = Squared()\n",
-        encoding="utf-8",
-    )
-    intact = ("recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1")
+    options = ("--kinds", "break", "--trials", "1", "--steps", "20", "--no-calibrate")
     done = succeeds(
-        *(*intact, "--kinds", "break"),
-        *("--comparator", "mine:squared", "--steps", "20", "--no-calibrate"),
+        *("recover", "quadruped", "--damage", "intact", *SMALL, *options),
+        *("--comparator", "heading_comparator:HEADING"),
         cwd=tmp_path,
-        PYTHONPATH=".",
+        PYTHONPATH=str(ROOT / "examples"),
     )
 
-    assert "comparator squared: " in done.stderr
+    assert "comparator heading: " in done.stderr
     assert "truth: intact; the diagnosis is" in done.stdout
     assert any(
         line.startswith(("Intact: ", "Explained: ", "Ambiguous: ", "Unexplained: "))

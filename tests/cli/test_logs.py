@@ -1,16 +1,19 @@
-"""The commands that work on logs: logs, replay, diagnose."""
+"""The commands that work on logs: logs, replay, diagnose, render, report."""
 
 import json
 import os
 import shlex
 from pathlib import Path
 
+import gymnasium
 import mujoco
+import numpy as np
 import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
 from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
+from tests.helpers.go2 import STAND, recorded
 
 PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
@@ -298,3 +301,55 @@ def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
     done = refused(*arguments, said=said, cwd=folder)
     assert done.stderr.startswith("Usage: ") or done.stderr.count("\n") == 1
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
+
+
+@pytest.fixture(scope="module")
+def ant(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the model of an ant, and a log of it with a broken ankle."""
+    folder = tmp_path_factory.mktemp("ant")
+    (folder / "ant.xml").write_bytes(ANT.read_bytes())
+    succeeds(
+        *("trial", "ant.xml", "--damage", "break:ankle_1", "--steps", "200", "--seed", "3"),
+        *("--stage", "after", "--out", "after.mcap"),
+        cwd=folder,
+    )
+    return folder
+
+
+@pytest.mark.process
+def test_an_exported_trial_is_imported_as_the_same_trial(ant: Path):
+    table = "after.csv"
+    given = ("logs", "export", "after.mcap", "-o", table, "--json")
+    assert printed(*given, cwd=ant)["rows"] == 200
+    done = succeeds("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=ant)
+    (ant / "map.toml").write_text(done.stdout)
+    imported = ("logs", "import", table, "--mapping", "map.toml", "--out", "again.mcap")
+    succeeds(*imported, cwd=ant)
+
+    original, again = (
+        read_log(ant / name).trial.trajectory for name in ("after.mcap", "again.mcap")
+    )
+    for signal, values in original.signals.items():
+        assert values.tobytes() == again[signal].tobytes(), signal
+
+
+@pytest.mark.process
+@recorded
+def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path):
+    (tmp_path / "go2.xml").write_bytes((STAND / "go2.xml").read_bytes())
+    table = STAND / "go2-stand.npz"
+    done = selfmodel("logs", "import", table, "--suggest", "--robot", "go2.xml", cwd=tmp_path)
+    (tmp_path / "map.toml").write_text(
+        done.stdout.replace("control_timestep = 0.01 ", "control_timestep = 0.02 ")
+    )
+    succeeds("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
+
+    trajectory = read_log(tmp_path / "g.mcap").trial.trajectory
+    with np.load(table) as recorded:
+        position = recorded["position"][::4]
+    assert trajectory.steps == 750
+    assert np.abs(trajectory["joint_positions"] - position).max() < 0.01
+    assert np.isnan(trajectory["base_position"]).all()

@@ -145,34 +145,21 @@ def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, folder: Path):
     assert recovered[0] != recovered[1]
 
 
-@pytest.fixture(scope="module")
-def rhythmic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder in which a robot was recovered with oscillators, and what it said."""
-    folder = tmp_path_factory.mktemp("rhythmic")
-    asked = ("--case", "3", "--controller", "cpg", "--out", "run")
-    return folder, printed("recover", "quadruped", *asked, *FEW, cwd=folder)
-
-
 @pytest.mark.search
-def test_a_recovery_evolves_oscillators_where_they_are_asked_for(rhythmic: tuple[Path, dict]):
-    folder, told = rhythmic
-    drivers = [read_log(folder / one["log"]).trial.plan.controller for one in told["trials"]]
+def test_a_recovery_evolves_oscillators_that_drive_other_trials_too(tmp_path: Path):
+    asked = ("--case", "3", "--controller", "cpg", "--out", "run")
+    told = printed("recover", "quadruped", *asked, *FEW, cwd=tmp_path)
+    drivers = [read_log(tmp_path / one["log"]).trial.plan.controller for one in told["trials"]]
+    given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
+    succeeds("trial", "quadruped", *given, "--out", "broken.mcap", cwd=tmp_path)
+    truth = ("--hypothesis", "break:back_left_knee", "--json")
 
     assert told["controller"] == "cpg"
     assert len(drivers) == 3
     assert all(driver.design.name == "cpg" for driver in drivers)
     assert drivers[0] == drivers[1] != drivers[2]
-
-
-@pytest.mark.search
-def test_oscillators_of_a_log_drive_another_trial_which_replays(rhythmic: tuple[Path, dict]):
-    folder, told = rhythmic
-    given = ("--controller", told["trials"][0]["log"], "--damage", "break:back_left_knee")
-    succeeds("trial", "quadruped", *given, "--out", "broken.mcap", "--json", cwd=folder)
-    truth = ("--hypothesis", "break:back_left_knee", "--json")
-
-    assert printed("replay", "broken.mcap", *truth, cwd=folder)["identical"] is True
-    assert "a CPG of" in selfmodel("logs", "info", "broken.mcap", cwd=folder).stdout
+    assert printed("replay", "broken.mcap", *truth, cwd=tmp_path)["identical"] is True
+    assert "a CPG of" in selfmodel("logs", "info", "broken.mcap", cwd=tmp_path).stdout
 
 
 def test_a_trial_takes_random_cpgs_or_a_random_network_of_any_size(tmp_path: Path):
