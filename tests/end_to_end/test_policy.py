@@ -141,17 +141,6 @@ def test_without_a_gap_a_physical_robot_with_a_policy_is_the_simulator_s_to_the_
         assert found[signal].tobytes() == simulated[signal][1].tobytes(), signal
 
 
-def test_a_layer_of_zeros_around_a_policy_moves_the_robot_to_the_same_bits(
-    quadruped: Robot, policy: Controller
-):
-    design = Compensated.around(policy, feedback=True)
-    bare, layered = (
-        physical(quadruped, driver, 0.0, 60)
-        for driver in (policy, Controller(design, np.zeros(design.weights)))
-    )
-    assert all(bare[signal].tobytes() == layered[signal].tobytes() for signal in SIGNALS)
-
-
 def test_a_policy_observes_the_signals_that_the_log_has(tmp_path: Path, quadruped: Robot):
     driver = echo(tmp_path, quadruped)
     trajectory = physical(quadruped, driver, 0.0, 60)
