@@ -142,7 +142,7 @@ class RunTrial(Robot, Notation):
     PANELS: ClassVar = ("Arguments", "Failure", "Controllers and trials", "Physical robot")
     out: Path
     damage: str | None = None
-    controller: str | None = None
+    controller: str = "network"
     neurons: int | None = None
     gap: float = 0.0
     steps: int = Settings.steps

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -28,30 +27,29 @@ from selfmodel.trials.trial import by_stage, trial_names
 def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
-    found = diagnose_logs(options.files, options)
-    inputs, diagnosis, search = found.inputs, found.diagnosis, found.inputs.search
+    explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)
     evidence = direct_evidence(
-        diagnosis.explained(inputs.damaged), found.robot.anatomy, trial_names(inputs.damaged)
+        diagnosis.explained(inputs.damaged), robot.anatomy, trial_names(inputs.damaged)
     )
-    paths = [log.trial.path for log in found.explained]
+    paths = [log.trial.path for log in explained]
     result = LogsResult(
-        robot=found.robot.name,
-        model=self_model_digest(found.robot),
+        robot=robot.name,
+        model=self_model_digest(robot),
         comparator=inputs.comparator.comparator.name,
         comparator_reason=inputs.comparator.reason,
         kinds=tuple(kind.name for kind in plugins.kinds(options.kinds)),
         seed=inputs.seed,
         settings_from=paths[0],
         logs=tuple(paths),
-        played_back=tuple(log.trial.path for log in found.explained if _is_played_back(log)),
+        played_back=tuple(log.trial.path for log in explained if _is_played_back(log)),
         intact=tuple(trial.path for trial in inputs.healthy),
         files={str(path): file_digest(path) for path in [*(options.healthy or ()), *options.files]},
         calibration=inputs.calibration.to_dict() if inputs.calibration else None,
         **output_of(diagnosis),
         summary=" ".join(text.summary(diagnosis)),
         evidence=to_json(evidence),
-        evaluations=search.evaluations,
-        distinct_hypotheses=search.distinct_hypotheses,
+        evaluations=inputs.search.evaluations,
+        distinct_hypotheses=inputs.search.distinct_hypotheses,
         seconds=perf_counter() - start,
     )
     if options.as_json:
@@ -72,18 +70,13 @@ def diagnose(options: Diagnose) -> None:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class DiagnosedLogs:
-    """A diagnosis of the logs to explain, in order, with the nominal robot."""
+def diagnose_logs(
+    files: Sequence[Path], options: FromLogs
+) -> tuple[list[TrialLog], Robot, LogDiagnosis, Diagnosis]:
+    """Returns the logs to explain, in order, the nominal robot, and the diagnosis with its inputs.
 
-    explained: tuple[TrialLog, ...]
-    robot: Robot
-    inputs: LogDiagnosis
-    diagnosis: Diagnosis
-
-
-def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
-    """Returns the diagnosis of logs; prints notes and progress on standard error."""
+    Prints notes and progress on standard error.
+    """
     kinds = plugins.kinds(options.kinds)
     comparator = arguments.comparator_choice(options.comparator)
     logs = arguments.read_logs([*(options.healthy or ()), *files])
@@ -113,7 +106,7 @@ def diagnose_logs(files: Sequence[Path], options: FromLogs) -> DiagnosedLogs:
             on_event=on_event,
         )
         diagnosis = inputs.run(on_event)
-    return DiagnosedLogs(tuple(explained), robot, inputs, diagnosis)
+    return explained, robot, inputs, diagnosis
 
 
 def _is_played_back(log: TrialLog) -> bool:

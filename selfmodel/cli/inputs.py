@@ -1,13 +1,10 @@
 """Option values as objects: cases, lists, shares of a study, names of files."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TypeVar
 
 from selfmodel.errors import InputError, unknown_name
-from selfmodel.logs.files import refuse_existing
-
-Number = TypeVar("Number", int, float)
+from selfmodel.logs.files import no_folder, refuse_existing
 
 
 def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None) -> str:
@@ -51,23 +48,21 @@ def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[
 
 def whole_numbers(option: str, given: str, every: Iterable[int]) -> tuple[int, ...]:
     """Returns the distinct whole numbers of a list with commas, or all; see ``texts``."""
-    expected = "whole numbers with commas between them, or 'all'"
-    return _numbers(option, given, texts(option, given, map(str, every)), int, expected)
+    items = texts(option, given, map(str, every))
+    try:
+        return tuple(dict.fromkeys(map(int, items)))
+    except ValueError:
+        expected = "whole numbers with commas between them, or 'all'"
+        raise InputError(f"{option} needs {expected}, got {given!r}") from None
 
 
 def numbers(option: str, given: str) -> tuple[float, ...]:
     """Returns the distinct numbers of a list with commas; see ``texts``."""
-    expected = "numbers with commas between them, such as 0,0.05"
-    found = _numbers(option, given, texts(option, given), float, expected)
-    return tuple(number + 0.0 for number in found)  # -0 is 0
-
-
-def _numbers(
-    option: str, given: str, items: Iterable[str], kind: Callable[[str], Number], expected: str
-) -> tuple[Number, ...]:
+    items = texts(option, given)
     try:
-        return tuple(dict.fromkeys(map(kind, items)))
+        return tuple(number + 0.0 for number in dict.fromkeys(map(float, items)))  # -0 is 0
     except ValueError:
+        expected = "numbers with commas between them, such as 0,0.05"
         raise InputError(f"{option} needs {expected}, got {given!r}") from None
 
 
@@ -93,7 +88,7 @@ def check_new_file(path: Path, *endings: str) -> None:
         expected = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
         raise InputError(f"--out needs a name that ends in {expected}, got {str(path)!r}")
     if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+        raise no_folder(path)
     refuse_existing(path)
 
 

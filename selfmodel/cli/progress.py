@@ -39,9 +39,10 @@ class Display:
         self.bar = bar
         self._console = bar.console if bar else text_console(stderr=True)
 
-    def print_line(self, line: str) -> None:
-        """Prints a line."""
-        self._console.print(plain(line), soft_wrap=True)
+    def print_lines(self, *lines: str) -> None:
+        """Prints lines."""
+        for line in lines:
+            self._console.print(plain(line), soft_wrap=True)
 
 
 @contextmanager
@@ -87,32 +88,24 @@ class _Events(Display):
                 best = f"best {event.best:.3f}, {_rate(event)}/s"
                 self._show(Progress(self._kind, event.number, event.total), best)
                 if event.number == event.total:
-                    self.print_line(f"{self._search}: {_end(event)}")
+                    self.print_lines(f"{self._search}: {_end(event)}")
             case Progress():
                 self._show(event)
-            case _:
-                for line in self._lines(event):
-                    self.print_line(line)
-
-    def _lines(self, event: Event) -> list[str]:
-        """Returns the lines of an event other than the progress of a stage."""
-        match event:
             case ChosenComparator():
-                return [f"comparator {event.comparator.name}: {event.reason}"]
+                self.print_lines(f"comparator {event.comparator.name}: {event.reason}")
             case Calibration():
-                return _fit_lines(event)
+                self.print_lines(*_fit_lines(event))
             case DiscriminatingTrial():
                 apart = ", ".join(map(str, event.hypotheses))
-                return [f"the next trial discriminates between: {apart}"]
+                self.print_lines(f"the next trial discriminates between: {apart}")
             case Trial():
-                return [f"trial {event.plan.name}: {self._describe(event)}"]
+                self.print_lines(f"trial {event.plan.name}: {self._describe(event)}")
             case Diagnosis():
-                best = event.ranked[0]
-                finite = math.isfinite(best.distance)
-                distance = f"distance {best.distance:.4f}" if finite else "diverged"
-                trials = counted(event.trials, "trial")
-                return [f"diagnosis from {trials}: {best.hypothesis} ({distance}), {event.verdict}"]
-        return []
+                first, trials = event.ranked[0], counted(event.trials, "trial")
+                finite = math.isfinite(first.distance)
+                distance = f"distance {first.distance:.4f}" if finite else "diverged"
+                found = f"{first.hypothesis} ({distance}), {event.verdict}"
+                self.print_lines(f"diagnosis from {trials}: {found}")
 
     def _show(self, now: Progress, detail: str = "") -> None:
         """Shows a stage, on one bar for all, or by a line now and then."""
@@ -128,7 +121,7 @@ class _Events(Display):
                 self.bar.add_task(now.stage, total=100, completed=round(100 * share), detail=words)
         elif left and time - self._told >= QUIET:
             self._told = time
-            self.print_line(f"{now.stage}: {share:.0%}, {left}")
+            self.print_lines(f"{now.stage}: {share:.0%}, {left}")
 
 
 def time_left(share: float, seconds: float) -> str:
@@ -198,7 +191,7 @@ class GridDisplay(Display):
             if self.bar:
                 self.bar.add_task("", total=event.total, completed=event.finished)
             elif event.finished:
-                self.print_line(f"{event.finished} of {event.total} were done before")
+                self.print_lines(f"{event.finished} of {event.total} were done before")
             return
         self.done = event.number
         seconds = monotonic() - self._start
@@ -208,7 +201,7 @@ class GridDisplay(Display):
         if event.error is not None or not self.bar:
             end = f"failed: {event.error}" if event.error else f"done in {event.seconds:.1f} s"
             line = f"[{event.number}/{event.total}] {event.name}: {end}"
-            self.print_line("; ".join(filter(None, (line, speed))))
+            self.print_lines("; ".join(filter(None, (line, speed))))
 
 
 def pace(done: int, left: int, seconds: float) -> str:

@@ -18,7 +18,7 @@ from selfmodel.cli.commands import Recover, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import displacement_text, display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
-from selfmodel.controllers.controller import Controller, Design, check_silent_neurons
+from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.errors import counted
@@ -80,7 +80,10 @@ def experiment_of(options: Recover) -> Experiment:
     kinds = plugins.kinds(options.kinds)
     damage = inputs.case_notation(entry.cases, options.case, options.damage)
     robot = entry.robot()
-    design, gait = _controllers(options, robot)
+    gait, neurons = None, options.neurons
+    if Path(options.controller).suffix:
+        gait = arguments.read_controller(Path(options.controller), robot, neurons)
+    design = gait.design if gait else plugins.design(options.controller, robot, neurons)
     repair, design, gait = plugins.repaired_around(options.repair, design, gait)
     truth = HypothesisSpace(robot.anatomy, kinds).parse(damage)
     check_silent_neurons(design, silent_neurons(truth))
@@ -128,14 +131,6 @@ def experiment_of(options: Recover) -> Experiment:
         search=options.search,
         repertoire=gaits,
     )
-
-
-def _controllers(options: Recover, robot: Robot) -> tuple[Design, Controller | None]:
-    """Returns the design of the controllers to evolve, and a known controller in a file."""
-    if not Path(options.controller).suffix:
-        return plugins.design(options.controller, robot, options.neurons), None
-    gait = arguments.read_controller(Path(options.controller), robot, options.neurons)
-    return gait.design, gait
 
 
 def _described(robot: Robot, score: Score, trial: Trial) -> str:

@@ -65,16 +65,16 @@ def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
             kinds=kinds,
         )
         return report_of(given)
-    found = diagnose_logs(options.sources, options)
+    explained, robot, inputs, diagnosis = diagnose_logs(options.sources, options)
     made = subjects.Subject(
-        name=", ".join(trial_names(found.inputs.damaged).values()),
-        robot=found.robot,
-        healthy=found.inputs.healthy,
-        damaged=found.inputs.damaged,
-        diagnoses=(found.diagnosis,),
-        comparator=found.inputs.comparator.comparator,
-        calibration=found.inputs.calibration,
-        made_with=found.explained[0].software,
+        name=", ".join(trial_names(inputs.damaged).values()),
+        robot=robot,
+        healthy=inputs.healthy,
+        damaged=inputs.damaged,
+        diagnoses=(diagnosis,),
+        comparator=inputs.comparator.comparator,
+        calibration=inputs.calibration,
+        made_with=explained[0].software,
         threads=thread_count(options.threads),
     )
     return report_of(made)

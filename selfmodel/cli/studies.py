@@ -97,7 +97,7 @@ def paper(options: RepeatPaper) -> None:
 
 def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Results]) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
-    failed = run_shown(study, options)
+    failed = _compute(study, options)
     found = results_of(study.folder)
     files = dict(found.files)
     if options.table is not None:
@@ -122,14 +122,10 @@ def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Re
         raise typer.Exit(1)
 
 
-def run_shown(study: Study, options: Options) -> Sequence[CellEnds]:
+def _compute(study: Study, options: Options) -> Sequence[CellEnds]:
     """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.
-
-    Raises:
-        InputError: The executor is unknown, the scheduler is missing or does not answer, or the
-            folder contains another study.
     """
     executor, scheduler = options.executor, options.scheduler
     if executor not in EXECUTORS:

@@ -28,16 +28,18 @@ def folding(
     *,
     title: str = "",
     texts: int | None = None,
-    **look: Any,  # noqa: ANN401  # as of rich's columns
+    no_wrap: bool = False,
 ) -> Table:
-    """Returns a table whose cells are wrapped where they are too wide, a text per cell.
+    """Returns a table whose cells are wrapped where they are too wide, but for ``no_wrap``.
 
     The first ``texts`` columns, or all, are left-justified texts, the others numbers.
     """
     table = Table(title=plain(title) or None)
     for place, name in enumerate(columns):
         is_text = texts is None or place < texts
-        table.add_column(name, justify="left" if is_text else "right", overflow="fold", **look)
+        table.add_column(
+            name, justify="left" if is_text else "right", overflow="fold", no_wrap=no_wrap
+        )
     for row in rows:
         table.add_row(*map(plain, row))
     return table

@@ -29,13 +29,12 @@ def trial(options: RunTrial) -> None:
     space = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds))
     hidden = space.parse("intact" if options.damage is None else options.damage)
     gap = draw_reality(robot, options.seed, options.gap)
-    kind = "network" if options.controller is None else options.controller
-    if kind in DESIGNS:
-        design = plugins.design(kind, robot, options.neurons)
+    if options.controller in DESIGNS:
+        design = plugins.design(options.controller, robot, options.neurons)
         weights = draw_genomes(np.random.default_rng(options.seed), (design.weights,))
         driver = Controller(design, weights)
     else:
-        driver = arguments.read_controller(Path(kind), robot, options.neurons)
+        driver = arguments.read_controller(Path(options.controller), robot, options.neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
     plan = TrialPlan("trial", stage_of(options.stage), driver, settings.steps, options.seed)

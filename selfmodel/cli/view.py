@@ -26,8 +26,8 @@ from selfmodel.robot import motion
 from selfmodel.rotation import rotated
 from selfmodel.simulation.trial_replay import Replay
 
-HOST, PORT = "127.0.0.1", View.port
-"""Address of the viewer: Rerun's own port, on this computer alone."""
+HOST = "127.0.0.1"
+"""Address of the viewer: this computer alone."""
 
 SECONDS = 60.0
 """Longest wait until the viewer listens, some 10 s from a slow disk, and until it has all: a viewer
@@ -97,7 +97,7 @@ def write_recording(out: Path, given: ReplayedLog, found: Replay) -> int:
     return len(data)
 
 
-def open_viewer(given: ReplayedLog, found: Replay, port: int = PORT) -> None:
+def open_viewer(given: ReplayedLog, found: Replay, port: int) -> None:
     """Shows a trial and its simulation in the viewer that has the port, or in a new one.
 
     Raises:

@@ -11,10 +11,8 @@ import pytest
 from selfmodel import cli
 from selfmodel.diagnosis.diagnosis import Verdict
 from selfmodel.errors import TrialError
-from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
-from selfmodel.logs.journal import FolderJournal
 from selfmodel.logs.results import read_result, versions
 from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
@@ -79,17 +77,6 @@ def test_every_trial_of_a_recovery_is_a_log_with_the_same_values(short: tuple[Pa
     assert not list(folder.rglob("*.part"))
 
 
-def test_the_database_is_read_back_from_the_folder(short: tuple[Path, dict], quadruped: Robot):
-    folder, told = short
-    trials, diagnoses = FolderJournal(folder / "run", HypothesisSpace(quadruped.anatomy, ())).read()
-
-    assert [t.displacement for t in trials] == [t["displacement"] for t in told["trials"]]
-    assert [t.plan.stage for t in trials] == ["before", "after", "recovery"]
-    assert [str(each.hypothesis) for each in diagnoses[-1].ranked] == [
-        d["hypothesis"] for d in told["diagnosis"]
-    ]
-
-
 def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(short: tuple[Path, dict]):
     folder, told = short
     found = read_result(folder / "run" / "result.json", "a result", "")
@@ -144,23 +131,6 @@ def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (
-            ["recover", "quadrupd", "--case", "1"],
-            "unknown robot 'quadrupd': did you mean quadruped?",
-        ),
-        (["recover", "quadruped", "--case", "11"], "unknown case of Table I '11'"),
-        (["recover", "quadruped"], "expected either --case N or --damage NOTATION, got neither"),
-        (["recover", "quadruped", "--case", "1", "--damage", "intact"], "got both"),
-        (["recover", "hexapod", "--damage", "break:front_left_hp"], "did you mean front_left_hip"),
-        (["recover", "hexapod", "--damage", "break"], "cannot read the term 'break'"),
-        (
-            ["recover", "hexapod", "--case", "1", "--comparator", "forward-displacment"],
-            "did you mean forward-displacement?",
-        ),
-        (["recover", "hexapod", "--case", "1", "--comparator", "no.such:thing"], "cannot find"),
-        (["recover", "hexapod", "--case", "1", "--comparator", "math:pi"], "is no comparator"),
-        (["recover", "hexapod", "--case", "1", "--population", "1"], "population"),
-        (["recover", "hexapod", "--case", "x"], "case"),
         (["trial", "quadruped", "--out", "no/such/folder/a.mcap"], "there is no folder"),
         (["trial", "quadruped", "--out", "a.bag"], "ends in .mcap"),
         (["trial", "quadruped", "--out", "a.mcap", "--controller", "no.npz"], "no.npz"),
@@ -188,19 +158,14 @@ def test_a_narrow_terminal_loses_no_name(tmp_path: Path):
 def test_a_trial_takes_a_controller_from_a_file_or_from_a_log(tmp_path: Path, quadruped: Robot):
     (controller,) = random_controllers(quadruped, 1, seed=9)
     save_controller(tmp_path / "gait.npz", controller)
-    few = ("--steps", "200", "--json")
-    first = selfmodel(
-        *("trial", "quadruped", "--controller", "gait.npz", *few, "--out", "a.mcap"), cwd=tmp_path
+    few, damage = ("--steps", "200", "--json"), ("--damage", "break:front_left_knee")
+    a, b, c = (
+        printed("trial", "quadruped", *few, "--controller", *given, "--out", out, cwd=tmp_path)
+        for out, *given in (
+            *(("a.mcap", "gait.npz"), ("b.mcap", "a.mcap")),
+            ("c.mcap", "a.mcap", *damage),
+        )
     )
-    second = selfmodel(
-        *("trial", "quadruped", "--controller", "a.mcap", *few, "--out", "b.mcap"), cwd=tmp_path
-    )
-    damage = ("--damage", "break:front_left_knee")
-    third = selfmodel(
-        *("trial", "quadruped", "--controller", "a.mcap", *damage, *few, "--out", "c.mcap"),
-        cwd=tmp_path,
-    )
-    a, b, c = (json.loads(done.stdout) for done in (first, second, third))
 
     assert read_log(tmp_path / "b.mcap").trial.plan.controller == controller
     assert a["displacement"] == b["displacement"] != c["displacement"]
@@ -228,31 +193,15 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(
 
 
 def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):
-    (tmp_path / "mine.py").write_text(
-        "from selfmodel.trials.trajectory import forward_displacement\n"
-        "from selfmodel.simulation.requests import ClosedLoop\n"
-        "class Prepared:\n"
-        "    request = ClosedLoop(record=('base_position',))\n"
-        "    def __init__(self, trial):\n"
-        "        self.displacement = trial.displacement\n"
-        "    def distances(self, simulated):\n"
-        "        return (forward_displacement(simulated) - self.displacement) ** 2\n"
-        "class Squared:\n"
-        "    name = 'squared'\n"
-        "    def prepare(self, trial):\n"
-        "        return Prepared(trial)\n"
-        "squared = Squared()\n",
-        encoding="utf-8",
-    )
-    intact = ("recover", "quadruped", "--damage", "intact", *SMALL, "--trials", "1")
+    options = ("--kinds", "break", "--trials", "1", "--steps", "20", "--no-calibrate")
     done = succeeds(
-        *(*intact, "--kinds", "break"),
-        *("--comparator", "mine:squared", "--steps", "20", "--no-calibrate"),
+        *("recover", "quadruped", "--damage", "intact", *SMALL, *options),
+        *("--comparator", "heading_comparator:HEADING"),
         cwd=tmp_path,
-        PYTHONPATH=".",
+        PYTHONPATH=str(ROOT / "examples"),
     )
 
-    assert "comparator squared: " in done.stderr
+    assert "comparator heading: " in done.stderr
     assert "truth: intact; the diagnosis is" in done.stdout
     assert any(
         line.startswith(("Intact: ", "Explained: ", "Ambiguous: ", "Unexplained: "))

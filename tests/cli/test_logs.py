@@ -1,16 +1,19 @@
-"""The commands that work on logs: logs, replay, diagnose."""
+"""The commands that work on logs: logs, replay, diagnose, render, report."""
 
 import json
 import os
 import shlex
 from pathlib import Path
 
+import gymnasium
 import mujoco
+import numpy as np
 import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
 from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
+from tests.helpers.go2 import STAND, recorded
 
 PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
@@ -26,15 +29,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cut.mcap.part").write_bytes(data[: len(data) // 2])
     (folder / "copy.mcap").write_bytes(data)
     os.mkfifo(folder / "pipe")
+    (folder / "empty").mkdir()
+    for name in ("taken.png", "taken.html"):
+        (folder / name).write_text("{}")
     (folder / "flipped.mcap").write_bytes(data[:60_000] + b"\x00" + data[60_001:])
     return folder
 
 
 def test_info_tells_what_is_in_a_log_but_not_what_is_hidden(folder: Path):
-    done = selfmodel("logs", "info", "a.mcap", cwd=folder)
+    done = succeeds("logs", "info", "a.mcap", cwd=folder)
     told = printed("logs", "info", "a.mcap", "--json", cwd=folder)
 
-    assert done.returncode == 0
     for word in ("quadruped", "finished", "/joint_states", "Foxglove", "rerun", "observed"):
         assert word in done.stdout
     assert "front_left_knee" not in done.stdout
@@ -72,12 +77,10 @@ def test_damage_is_told_with_what_can_be_saved_and_how(
     assert f"`{command}`" in damaged["error"]
     out = tmp_path / "new.mcap"
     arguments = command.replace("NEW.mcap", str(out)).split()[1:]
-    salvaged = selfmodel(*arguments, "--json", cwd=folder)
-    assert json.loads(salvaged.stdout)["steps"] == steps
+    assert printed(*arguments, "--json", cwd=folder)["steps"] == steps
     assert selfmodel("logs", "verify", str(out), cwd=folder).returncode == 0
-    told = printed(
-        *("replay", str(out), "--hypothesis", "break:front_left_knee", "--json"), cwd=folder
-    )
+    truth = ("--hypothesis", "break:front_left_knee", "--json")
+    told = printed("replay", str(out), *truth, cwd=folder)
     assert (told["identical"], told["steps"]) == (True, steps)
 
 
@@ -86,8 +89,8 @@ def test_the_command_that_helps_can_be_pasted_whatever_the_file_is_called(
 ):
     name = tmp_path / "cut half é.mcap"
     name.write_bytes((folder / "cut.mcap.part").read_bytes())
-    told = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)["files"][0]
-    command = told["error"].partition("`")[2].partition("`")[0]
+    told = json.loads(selfmodel("logs", "info", str(name), "--json", cwd=folder).stdout)
+    command = told["files"][0]["error"].partition("`")[2].partition("`")[0]
     arguments = shlex.split(command.replace("NEW.mcap", str(tmp_path / "new.mcap")))[1:]
 
     assert selfmodel(*arguments, cwd=folder).returncode == 0
@@ -217,9 +220,9 @@ def test_a_log_given_as_healthy_is_so_whatever_its_stage(
 ):
     folder, told = recovered_as_the_paper_did
     before, failed, later = (trial["log"] for trial in told["trials"][:3])
-    done = selfmodel("diagnose", before, failed, "--healthy", later, *PAPERS, "--json", cwd=folder)
+    given = ("diagnose", before, failed, "--healthy", later)
+    found = printed(*given, *PAPERS, "--json", cwd=folder)
 
-    found = json.loads(done.stdout)
     assert (found["logs"], found["intact"]) == ([failed], [later, before])
     assert found["files"].keys() == {before, failed, later}
 
@@ -232,12 +235,10 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     model = tmp_path / "mine.xml"
     model.write_text(read_log(log).mjcf, encoding="utf-8")
     diagnose = ("diagnose", str(log), *PAPERS)
-    named = selfmodel(*diagnose, "--robot", "quadruped", cwd=tmp_path)
-    own = selfmodel(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
+    named = succeeds(*diagnose, "--robot", "quadruped", cwd=tmp_path)
+    own = printed(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
 
-    assert named.returncode == 0, named.stderr
-    best = json.loads(own.stdout)["diagnosis"][0]["hypothesis"]
-    assert best in named.stdout
+    assert own["diagnosis"][0]["hypothesis"] in named.stdout
     assert "1 log, forward-displacement" in named.stdout
     assert "diagnosis from 1 trial" in named.stderr
 
@@ -252,6 +253,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
             ["diagnose", "a.mcap", "--robot", "hexapod"],
             "hexapod is another robot than that of a.mcap: it has 12 sensors, the log 8",
         ),
+        (["diagnose", "a.mcap", "--kinds", "frction"], "'frction': did you mean friction, joint-f"),
         (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
         (["replay", "pipe"], "pipe: expected a log file, got a pipe or a device"),
         (["logs", "salvage", "pipe", "-o", "n.mcap"], "expected a log file, got a pipe"),
@@ -272,11 +274,82 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
         (["logs", "salvage", "cut.mcap.part", "-o", "a.mcap"], "a.mcap exists"),
         (["logs", "salvage", "cut.mcap.part", "-o", "new.bag"], "ends in .mcap"),
         (["logs", "salvage", "a.mcap", "-o", "new.mcap"], "there is nothing to salvage"),
+        (["render", "a.mcap", "-o", "a.txt"], "--out needs a name that ends in .gif, .mp4, .png"),
+        (["render", "a.mcap", "-o", "a.mcap"], "--out needs a name that ends in"),
+        (["render", "a.mcap", "-o", "no/a.png"], "there is no folder no"),
+        (["render", "a.mcap", "-o", "taken.png"], "taken.png exists, and is not overwritten"),
+        (["render", "a.mcap", "-o", "f.png", "--stick"], "--stick is for films"),
+        (["render", "a.mcap", "-o", "f.png", "--hypothesis", "break:nose"], "'nose'"),
+        (["render", "a.mcap", "-o", "f.png", "--diagnosis", "taken.png"], "expected a diagnosis"),
+        (
+            ["render", "a.mcap", "-o", "f.png", "--diagnosis", "x", "--hypothesis", "intact"],
+            "got both: leave one out",
+        ),
+        (["report", "empty"], "expected the folder of a run with its trials"),
+        (["report", "empty", "a.mcap"], "expected one folder, or logs"),
+        (["report", "a.mcap", "-o", "a.pdf"], "--out needs a name that ends in .html"),
+        (["report", "a.mcap", "-o", "taken.html"], "taken.html exists, and is not overwritten"),
+        (["report", "no.mcap"], "no.mcap"),
+        (["report", "empty", "--diagnosis", "a.json"], "--diagnosis is for logs, and empty"),
+        (["report", "a.mcap", "--diagnosis", "a.json"], "a.json: expected the output of"),
     ],
 )
 def test_bad_input_to_a_command_on_logs_is_one_sentence_and_status_2(
     folder: Path, arguments: list[str], said: str
 ):
     before = sorted(path.name for path in folder.iterdir())
-    refused(*arguments, said=said, cwd=folder)
+    done = refused(*arguments, said=said, cwd=folder)
+    assert done.stderr.startswith("Usage: ") or done.stderr.count("\n") == 1
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+ANT = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "ant.xml"
+
+
+@pytest.fixture(scope="module")
+def ant(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the model of an ant, and a log of it with a broken ankle."""
+    folder = tmp_path_factory.mktemp("ant")
+    (folder / "ant.xml").write_bytes(ANT.read_bytes())
+    succeeds(
+        *("trial", "ant.xml", "--damage", "break:ankle_1", "--steps", "200", "--seed", "3"),
+        *("--stage", "after", "--out", "after.mcap"),
+        cwd=folder,
+    )
+    return folder
+
+
+@pytest.mark.process
+def test_an_exported_trial_is_imported_as_the_same_trial(ant: Path):
+    table = "after.csv"
+    given = ("logs", "export", "after.mcap", "-o", table, "--json")
+    assert printed(*given, cwd=ant)["rows"] == 200
+    done = succeeds("logs", "import", table, "--suggest", "--robot", "ant.xml", cwd=ant)
+    (ant / "map.toml").write_text(done.stdout)
+    imported = ("logs", "import", table, "--mapping", "map.toml", "--out", "again.mcap")
+    succeeds(*imported, cwd=ant)
+
+    original, again = (
+        read_log(ant / name).trial.trajectory for name in ("after.mcap", "again.mcap")
+    )
+    for signal, values in original.signals.items():
+        assert values.tobytes() == again[signal].tobytes(), signal
+
+
+@pytest.mark.process
+@recorded
+def test_a_recording_of_a_real_robot_is_imported_without_an_edit(tmp_path: Path):
+    (tmp_path / "go2.xml").write_bytes((STAND / "go2.xml").read_bytes())
+    table = STAND / "go2-stand.npz"
+    done = selfmodel("logs", "import", table, "--suggest", "--robot", "go2.xml", cwd=tmp_path)
+    (tmp_path / "map.toml").write_text(
+        done.stdout.replace("control_timestep = 0.01 ", "control_timestep = 0.02 ")
+    )
+    succeeds("logs", "import", table, "--mapping", "map.toml", "-o", "g.mcap", cwd=tmp_path)
+
+    trajectory = read_log(tmp_path / "g.mcap").trial.trajectory
+    with np.load(table) as recorded:
+        position = recorded["position"][::4]
+    assert trajectory.steps == 750
+    assert np.abs(trajectory["joint_positions"] - position).max() < 0.01
+    assert np.isnan(trajectory["base_position"]).all()

@@ -28,10 +28,9 @@ from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPlan
-from tests.helpers.command import refused, selfmodel_process
+from tests.helpers.command import selfmodel_process
 from tests.helpers.drivers import random_controllers
 
 STEPS = 31
@@ -118,29 +117,6 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
     else:
         with pytest.raises(WorkError, match=r"neither EGL nor OSMesa.*libosmesa6.*-o NAME\.png"):
             render.choose_gl()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (("-o", "a.txt"), "--out needs a name that ends in .gif, .mp4, .png"),
-        (("-o", "a.mcap"), "--out needs a name that ends in"),
-        (("-o", "nowhere/a.png"), "there is no folder nowhere"),
-        (("-o", "taken.png"), "taken.png exists, and is not overwritten"),
-        (("-o", "a.png", "--stick"), "--stick is for films"),
-        (("-o", "a.png", "--hypothesis", "break:nose"), "'nose'"),
-        (("-o", "a.png", "--diagnosis", "taken.png"), "expected a diagnosis"),
-        (("-o", "a.png", "--diagnosis", "x", "--hypothesis", "intact"), "got both: leave one out"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused_in_a_sentence(
-    folder: Path, arguments: tuple[str, ...], sentence: str
-):
-    (folder / "taken.png").write_text("{}")
-    done = refused("render", "a.mcap", *arguments, said=sentence, cwd=folder)
-
-    assert done.stderr.startswith("error: ")
-    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -252,29 +228,18 @@ def test_a_failing_ffmpeg_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_a_film_takes_as_long_as_the_trial_however_long_a_control_step_is(quadruped: Robot):
-    slow = replace(quadruped, control_timestep=0.1)
-    run = Simulator(slow, 1).run([(INTACT, random_controllers(slow, 1)[0])], 21, SIGNALS).trajectory
-    seen = Trajectory(run.names, run.time, {name: run[name][0] for name in SIGNALS})
-    film = film_of(slow, INTACT, [("seen", seen)], np.arange(51) / 25)
+    drawn = film(replace(quadruped, control_timestep=0.1), "intact", frames=76)  # of 3 s
 
-    assert len(film.time) == 51
-    np.testing.assert_allclose(film.time, np.floor(np.arange(51) / 2.5 + 1e-9) * 0.1)
+    np.testing.assert_allclose(drawn.time, np.floor(np.arange(76) / 2.5 + 1e-9) * 0.1)
 
 
 def test_the_ground_of_a_stick_figure_slopes_as_the_world_does(quadruped: Robot):
-    slope = parse("slope=0.2", quadruped.anatomy)
-    run = (
-        Simulator(quadruped, 1)
-        .run([(slope, random_controllers(quadruped, 1)[0])], 2, SIGNALS)
-        .trajectory
-    )
-    seen = Trajectory(run.names, run.time, {name: run[name][0] for name in SIGNALS})
-    film = film_of(quadruped, slope, [("seen", seen)], run.time)
+    normal = film(quadruped, "slope=0.2").normal
 
-    np.testing.assert_allclose(film.normal, [-np.sin(0.2), 0, np.cos(0.2)])
+    np.testing.assert_allclose(normal, [-np.sin(0.2), 0, np.cos(0.2)])
     axes = Figure().subplots()
     side = np.array([[1.0, 0], [0, 0], [0, 1.0]])  # x to the right, z up
-    draw_ground(axes, film.normal, np.zeros(3), side, 1.0)
+    draw_ground(axes, normal, np.zeros(3), side, 1.0)
     (lines,) = axes.collections
     for line in lines.get_segments():
         np.testing.assert_allclose(line[:, 1], np.tan(0.2) * line[:, 0], atol=1e-12)

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from tests.helpers.command import refused, selfmodel, succeeds
+from tests.helpers.command import printed, refused, succeeds
 
 SMALL = ("--evaluations", "40", "--steps", "40", "--seed", "2")
 
@@ -13,12 +13,12 @@ def test_a_repertoire_is_made_and_shown(tmp_path: Path):
         "repertoire", "make", "quadruped", "--out", "gaits.npz", *SMALL, "--json", cwd=tmp_path
     )
     made = json.loads(done.stdout)
-    shown = selfmodel("repertoire", "info", "gaits.npz", "--json", cwd=tmp_path)
+    shown = printed("repertoire", "info", "gaits.npz", "--json", cwd=tmp_path)
 
     # Batches are whole.
     assert (made["robot"], made["evaluations"], made["cells"]) == ("quadruped", 200, 160_000)
     assert made.pop("simulated_steps") == 200 * 40
-    assert json.loads(shown.stdout) == made
+    assert shown == made
     assert "200 of 40 gaits evaluated" in done.stderr
 
 

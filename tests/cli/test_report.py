@@ -88,22 +88,3 @@ def _meanwhile(folder: Path, report: Report) -> bytes:
     """The page of a report, while another program writes a file of that name."""
     (folder / "a.html").write_text("of another")
     return html_of(report)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("empty",), "expected the folder of a run with its trials"),
-        (("empty", "after.mcap"), "expected one folder, or logs"),
-        (("after.mcap", "-o", "a.pdf"), "--out needs a name that ends in .html"),
-        (("after.mcap", "-o", "taken.html"), "taken.html exists, and is not overwritten"),
-        (("missing.mcap", "-o", "b.html"), "missing.mcap"),
-        (("empty", "--diagnosis", "a.json", "-o", "b.html"), "--diagnosis is for logs, and empty"),
-        (("after.mcap", "--diagnosis", "a.json", "-o", "b.html"), "a.json: expected the output of"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_status_2(logs: Path, arguments: tuple[str, ...], said: str):
-    (logs / "empty").mkdir(exist_ok=True)
-    (logs / "taken.html").touch()
-
-    refused("report", *arguments, said=said, cwd=logs)

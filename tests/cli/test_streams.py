@@ -19,14 +19,9 @@ ROOT = Path(__file__).parents[2]
 
 def shell(line: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Runs a shell's line, in which ``selfmodel`` is the command."""
+    command = f'selfmodel() {{ "{sys.executable}" -m selfmodel "$@"; }}; {line}'
     return subprocess.run(
-        [
-            "bash",
-            "-o",
-            "pipefail",
-            "-c",
-            f'selfmodel() {{ "{sys.executable}" -m selfmodel "$@"; }}; {line}',
-        ],
+        ["bash", "-o", "pipefail", "-c", command],
         cwd=cwd,
         env={**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"},
         capture_output=True,

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.studies import figures
+from selfmodel.studies.study import Study
 from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 
 ROOT = Path(__file__).parents[2]
@@ -142,7 +143,7 @@ def test_wrong_input_is_refused_before_anything_is_written(
 
 def test_a_planted_link_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(figures, "of_ablation", lambda *_: {})
-    monkeypatch.setattr("selfmodel.cli.studies.run_shown", lambda *_, **__: ())
+    monkeypatch.setattr(Study, "run", lambda *_, **__: ())
     (tmp_path / "precious").write_text("mine")
     (tmp_path / "out").mkdir()
     for name in ("results.csv", "results.csv.part", "results.json.part"):

@@ -1,6 +1,5 @@
 """``selfmodel view``: a log in Rerun, with its simulation, and how to open it in Foxglove."""
 
-import json
 import os
 import signal
 import socket
@@ -22,7 +21,7 @@ from selfmodel.errors import InputError, WorkError
 from selfmodel.robot.motion import shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Trajectory
-from tests.helpers.command import refused, selfmodel, succeeds
+from tests.helpers.command import printed, refused, succeeds
 
 pytest.importorskip("rerun", reason="the extra rerun is not installed")
 
@@ -46,10 +45,8 @@ def shown(folder: Path) -> Shown:
     from rerun.chunk import RrdReader  # noqa: PLC0415  # an extra
 
     log, hypothesis = folder / "a.mcap", "jam:back_left_knee"
-    told = selfmodel(
-        *("view", "a.mcap", "--hypothesis", hypothesis, "-o", "b.rrd", "--json"), cwd=folder
-    )
-    found = json.loads(told.stdout)
+    given = ("view", "a.mcap", "--hypothesis", hypothesis, "-o", "b.rrd", "--json")
+    found = printed(*given, cwd=folder)
     assert (found["hypothesis"], found["out"]) == (hypothesis, "b.rrd")
     assert found["bytes"] == (folder / "b.rrd").stat().st_size
     assert Path(found["foxglove_layout"]).is_file()

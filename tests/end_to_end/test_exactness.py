@@ -20,9 +20,10 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import collect
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_motion
 from tests.helpers.exactness import exactness, prediction_error, with_options
+from tests.helpers.memory import in_memory
 from tests.helpers.robots.arms import arm_mjcf, robot_of
 from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import mjcf
@@ -96,9 +97,8 @@ def test_prediction_is_exact_for_every_body_with_every_combination_of_options(na
 def test_calibration_leaves_an_exact_go1_as_it_is_to_the_bit():
     robot = loaded("go1", 1)  # as MJX's models have
     driver = trot(robot, STEPS)
-    log = collect(robot.anatomy.names, SimulatedRobot(robot).run(driver, STEPS))
     plan = TrialPlan("before", "before", driver, STEPS, 0)
-    found = calibrate(robot, [Trial(plan, robot.name, log, "before.mcap")], threads=1)
+    found = calibrate(robot, [in_memory(robot)(SimulatedRobot(robot), plan)], threads=1)
 
     assert found.error_before == found.error == 0.0
     assert found.robot is robot

@@ -45,18 +45,6 @@ def topics(record: dict[str, Any]) -> dict[str, str]:
         (lambda new: topics(new).clear(), 1, "missing"),
         (lambda new: new.clear(), 1, "only in"),
     ],
-    ids=[
-        "same",
-        "new key",
-        "verdict",
-        "sign",
-        "last digits",
-        "lost kind",
-        "key",
-        "topic",
-        "topics",
-        "row",
-    ],
 )
 def test_a_difference_is_named_and_ends_with_status_one(
     tmp_path: Path,

@@ -28,10 +28,9 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.estimation import estimated_states
-from selfmodel.trials.signals import SIGNALS
-from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_motion
+from tests.helpers.hostile import with_value, without_encoders
 from tests.helpers.memory import in_memory
 
 QUADRUPED = ROBOTS["quadruped"].robot()
@@ -39,51 +38,38 @@ NAMES = QUADRUPED.anatomy.names
 STEPS, LATE = 250, (70, 71, 160)
 
 
-class Stuttering(dm_env.Environment):
-    """A robot whose targets stand three times as long before some steps.
+def stuttering(silent: Collection[int] = ()) -> EnvironmentRobot:
+    """A quadruped whose targets stand three times as long before some steps.
 
-    Args:
-        env: The robot as it should be.
-        silent: Steps after which nothing is observed.
+    After the steps of ``silent``, nothing is observed.
     """
+    env, taken = load("quadruped", "walk"), 0
+    reset, step = env.reset, env.step
 
-    def __init__(self, env: dm_env.Environment, silent: Collection[int] = ()) -> None:
-        self._env, self._steps, self._silent = env, 0, silent
+    def restarted() -> dm_env.TimeStep:
+        nonlocal taken
+        taken = 0
+        return reset()
 
-    def reset(self) -> dm_env.TimeStep:
-        """Starts again."""
-        self._steps = 0
-        return self._env.reset()
-
-    def step(self, action: np.ndarray) -> dm_env.TimeStep:
-        """Takes one step, or three."""
-        self._steps += 1
-        for _ in range(2 if self._steps in LATE else 0):
-            self._env.step(action)
-        told = self._env.step(action)
-        if self._steps in self._silent:
+    def stepped(action: np.ndarray) -> dm_env.TimeStep:
+        nonlocal taken
+        taken += 1
+        for _ in range(2 if taken in LATE else 0):
+            step(action)
+        told = step(action)
+        if taken in silent:
             raise TimeoutError
         return told
 
-    def action_spec(self) -> dm_env.specs.Array:
-        """Returns the robot's."""
-        return self._env.action_spec()
-
-    def observation_spec(self) -> dict[str, dm_env.specs.Array]:
-        """Returns the robot's."""
-        return self._env.observation_spec()
+    env.reset, env.step = restarted, stepped
+    return EnvironmentRobot(env, QUADRUPED, observe=motion_capture(env))
 
 
 @pytest.fixture(scope="module")
 def trial() -> Trial:
     """A trial of a quadruped that stutters."""
-    env = load("quadruped", "walk")
-    physical = EnvironmentRobot(Stuttering(env), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
-    trajectory = collect(NAMES, physical.run(driver, STEPS))
-    return Trial(
-        TrialPlan("00", "after", driver, STEPS, 0), "quadruped", trajectory, "nowhere.mcap"
-    )
+    return in_memory(QUADRUPED)(stuttering(), TrialPlan("00", "after", driver, STEPS, 0))
 
 
 def without_marks(trial: Trial) -> Trial:
@@ -128,11 +114,9 @@ def test_what_moves_as_the_model_says_is_predicted_although_steps_were_late(
 
 
 def test_a_log_with_late_and_lost_steps_fits_the_robot_as_it_was_and_no_fault(tmp_path: Path):
-    env = load("quadruped", "walk")
-    physical = EnvironmentRobot(Stuttering(env, {90}), QUADRUPED, observe=motion_capture(env))
     driver = played_back(NAMES.motors, random_motion(QUADRUPED, STEPS))
     plan, header = TrialPlan("00", "after", driver, STEPS, 0), TrialHeader(Settings(), timed=True)
-    samples = physical.run(driver, STEPS)
+    samples = stuttering({90}).run(driver, STEPS)
     log = read_log(write_trial(tmp_path / "trial.mcap", QUADRUPED, plan, samples, header))
     texts = ("intact", "break:front_left_knee", "jam:back_right_shoulder")
 
@@ -180,14 +164,12 @@ def lost(
     physical = selfmodel.simulated_robot(robot, truth, gap=0.05, seed=3)
     gait = random_controllers(robot, 1, seed=5)[0]
     trial = in_memory(robot)(physical, TrialPlan("after", "after", gait, length, seed=0))
-    signals = {signal: trial.trajectory[signal].copy() for signal in SIGNALS}
     columns = [robot.anatomy.hinges.index(hinge) for hinge in hinges]
-    for signal in ("joint_positions", "joint_velocities", "joint_efforts"):
-        signals[signal][steps, columns] = np.nan
-    for column, sensor in enumerate(robot.anatomy.sensors):
-        if sensor.kind == "angle" and sensor.hinge in hinges:
-            signals["sensors"][steps, column] = np.nan
-    return replace(trial, trajectory=replace(trial.trajectory, signals=signals))
+    trial = without_encoders(trial, columns, steps)
+    trial = with_value(trial, "joint_efforts", steps, columns, np.nan)
+    sensors = enumerate(robot.anatomy.sensors)
+    angles = [k for k, one in sensors if one.kind == "angle" and one.hinge in hinges]
+    return with_value(trial, "sensors", steps, angles, np.nan)
 
 
 def diagnosis(trial: Trial, robot: Robot, comparator: str, kinds: str) -> selfmodel.Diagnosis:

@@ -34,7 +34,7 @@ from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.bench import NAMES, STEPS, Bench, bench_robot, observation
 from tests.helpers.command import SMALL, printed, refused, succeeds
 from tests.helpers.hostile import unstable
-from tests.helpers.policies import POLICY, policy_of, save_layers, save_policy
+from tests.helpers.policies import policy_of, save_layers, save_policy
 from tests.helpers.robots.arms import arm
 
 DAMAGE = "break:back_left_knee"
@@ -139,17 +139,6 @@ def test_without_a_gap_a_physical_robot_with_a_policy_is_the_simulator_s_to_the_
     assert np.ptp(found["commands"], axis=0).min() > 0.01
     for signal in SIGNALS:
         assert found[signal].tobytes() == simulated[signal][1].tobytes(), signal
-
-
-def test_a_layer_of_zeros_around_a_policy_moves_the_robot_to_the_same_bits(
-    quadruped: Robot, policy: Controller
-):
-    design = Compensated.around(policy, feedback=True)
-    bare, layered = (
-        physical(quadruped, driver, 0.0, 60)
-        for driver in (policy, Controller(design, np.zeros(design.weights)))
-    )
-    assert all(bare[signal].tobytes() == layered[signal].tobytes() for signal in SIGNALS)
 
 
 def test_a_policy_observes_the_signals_that_the_log_has(tmp_path: Path, quadruped: Robot):
@@ -339,29 +328,3 @@ def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
     (again, *_) = printed(*RECOVER, *repaired, cwd=tmp_path)["trials"]
     assert read_log(tmp_path / again["log"]).trial.plan.controller == drivers[2]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (
-            ("--controller", "policy.toml", "--repair", "robust"),
-            "evolves the weights of a controll",
-        ),
-        (
-            ("--controller", "policy.toml", "--repair", "paper"),
-            "evolves the weights of a controller",
-        ),
-        (("--controller", "network", "--repair", "compensate"), "give --controller FILE, a policy"),
-        (("--repair", "compensate"), "needs a controller that walks, got the design network"),
-        (("--controller", "policy.toml", "--search", "ea"), "the repair compensate has CMA-ES"),
-        (("--controller", "policy.toml", "--neurons", "5"), "got --neurons 5: leave --neurons out"),
-        (("--controller", "gait.toml"), "gait.toml: expected a policy file that can be read"),
-    ],
-)
-def test_a_repair_that_does_not_go_with_the_controller_is_refused(
-    tmp_path: Path, quadruped: Robot, options: tuple[str, ...], said: str
-):
-    save_policy(tmp_path, quadruped, POLICY)
-    refused(*RECOVER, *options, said=said, cwd=tmp_path)
-    assert not (tmp_path / "run").exists()

@@ -28,14 +28,7 @@ class Exactness(NamedTuple):
 
 
 def exactness(robot: Robot, hypothesis: Hypothesis, driver: CommandSource, steps: int) -> Exactness:
-    """Returns the errors of a robot's predictions and simulations under the truth.
-
-    Args:
-        robot: The robot.
-        hypothesis: Its faults, which the self-model has too.
-        driver: The source of its commands.
-        steps: Control steps.
-    """
+    """Returns the errors of a robot's predictions and simulations under its true hypothesis."""
     log = collect(robot.anatomy.names, SimulatedRobot(robot, hypothesis).run(driver, steps))
     simulator = Simulator(robot, 1)
     run = simulator.run([(hypothesis, driver)], steps, ("base_position",)).trajectory

@@ -7,24 +7,21 @@ from selfmodel.studies.rows import KINDS
 
 Row = dict[str, Any]
 
+RUN: Row = {"robot": "quadruped", "case": 1, "truth": "break:front_left_knee", "seed": 0}
+FOUND: Row = {"correct": True, "verdict": "explained", "repair": "paper", "search": "ea"}
+
 
 def diagnosis(comparator: str = "a", **changes: object) -> Row:
     """A right diagnosis of case 1 of the quadruped."""
     usual = {
-        "robot": "quadruped",
-        "case": 1,
-        "truth": "break:front_left_knee",
+        **RUN,
+        **FOUND,
         "gap": 0.05,
-        "seed": 0,
         "next_trial": "bank",
         "trials": 1,
         "best": "intact",
-        "correct": True,
-        "verdict": "explained",
         "rivals": 0,
         "seconds": 1.0,
-        "repair": "paper",
-        "search": "ea",
     }
     row = dict.fromkeys(KINDS["ablate"].columns) | usual | {"comparator": comparator}
     return row | changes
@@ -33,13 +30,12 @@ def diagnosis(comparator: str = "a", **changes: object) -> Row:
 def body(seed: int = 0, **changes: object) -> Row:
     """A right recovery of a study of bodies."""
     usual = {
+        **FOUND,
         "robot": "a",
         "case": 1,
         "truth": "break:x",
-        "seed": seed,
         "best": "break:x",
-        "correct": True,
-        "verdict": "explained",
+        "seed": seed,
         "trials": 2,
         "before": 2.0,
         "after": 0.0,
@@ -47,8 +43,6 @@ def body(seed: int = 0, **changes: object) -> Row:
         "diverged": 0,
         "seconds": 3.0,
         "upright": True,
-        "repair": "paper",
-        "search": "ea",
     }
     return usual | changes
 
@@ -56,10 +50,7 @@ def body(seed: int = 0, **changes: object) -> Row:
 def recovery(**changes: object) -> Row:
     """A recovery of the paper's experiment; wrong ones are diagnosed as intact."""
     usual = {
-        "robot": "quadruped",
-        "case": 1,
-        "truth": "break:front_left_knee",
-        "seed": 0,
+        **RUN,
         "comparator": "a",
         "compared_by": "a",
         "correct": True,
@@ -97,12 +88,9 @@ def rival(method: str, upright: Sequence[float], **changes: object) -> Row:
     """A method on a damaged physical robot."""
     best = [max(upright[: count + 1]) for count in range(len(upright))]
     usual = {
+        **RUN,
         "method": method,
-        "robot": "quadruped",
-        "case": 1,
-        "truth": "x",
         "gap": 0.1,
-        "seed": 0,
         "best": best,
         "upright": list(upright),
         "displacement": list(upright),

@@ -30,16 +30,18 @@ from selfmodel.rotation import rotation_between
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.model_factors import nominal, with_parameters
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.requests import Segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import walking
 from selfmodel.trials.estimation import BASE, STATE
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
-from selfmodel.trials.trial import Trial, TrialPlan
+from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.exactness import exactness
 from tests.helpers.hostile import lacking
+from tests.helpers.memory import in_memory
 from tests.helpers.robots.bodies import BODIES, EVERY_BODY, swinging, swung
 from tests.logs.conftest import plan_of
 
@@ -66,10 +68,9 @@ def damages(robot: Robot) -> list[Hypothesis]:
     ]
 
 
-def happened(robot: Robot, hypothesis: Hypothesis) -> Trajectory:
-    return collect(
-        robot.anatomy.names, SimulatedRobot(robot, hypothesis).run(swung(robot, STEPS), STEPS)
-    )
+def happened(robot: Robot, hypothesis: Hypothesis, gap: RealityGap | None = None) -> Trajectory:
+    physical = SimulatedRobot(robot, hypothesis, gap)
+    return collect(robot.anatomy.names, physical.run(swung(robot, STEPS), STEPS))
 
 
 def test_the_physical_robot_moves_like_the_simulator_to_the_bit(body: Robot):
@@ -119,12 +120,8 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
         made = Simulator(body, 1).predict([hypothesis], segments).trajectory
         for signal in STATE:
             logged = np.stack([run[signal][k : k + HORIZON + 1] for k in starts])
-            of_orientation = signal == "base_orientation"
-            apart = (
-                rotation_between(made[signal][0], logged)
-                if of_orientation
-                else (made[signal][0] - logged)
-            )
+            between = rotation_between if signal == "base_orientation" else np.subtract
+            apart = between(made[signal][0], logged)
             scale = np.maximum(1, np.abs(logged).max())
             limit = OF_DOG if "dog" in body.name else EXACT
             assert np.abs(apart).max() / scale < limit, f"{hypothesis}: {signal}"
@@ -132,12 +129,8 @@ def test_each_segment_of_a_trial_is_predicted_from_its_first_state(body: Robot):
 
 def test_a_trial_speaks_for_what_is_true_of_the_body(body: Robot):
     intact, *others = damages(body)
-    trial = Trial(
-        TrialPlan("trial", "before", swung(body, STEPS), STEPS, 0),
-        body.name,
-        happened(body, intact),
-        "",
-    )
+    plan = TrialPlan("trial", "before", swung(body, STEPS), STEPS, 0)
+    trial = in_memory(body)(SimulatedRobot(body, intact), plan)
     evidence = LossTable(Simulator(body, 1), SEGMENT_PREDICTION)
     losses = evidence.losses([intact, *others], [trial]).mean(axis=1)
 
@@ -174,9 +167,7 @@ def test_the_frames_of_a_log_are_where_the_bodies_are(body: Robot):
 def test_across_a_gap_a_damaged_body_still_moves(body: Robot):
     hidden = parse(f"break:{body.anatomy.joints[-1].name}", body.anatomy)
     gap = draw_gap(body, 0.05, np.random.default_rng(0))
-    run = collect(
-        body.anatomy.names, SimulatedRobot(body, hidden, gap).run(swung(body, STEPS), STEPS)
-    )
+    run = happened(body, hidden, gap)
 
     assert all(np.isfinite(run[signal]).all() for signal in SIGNALS)
     assert np.ptp(run["base_position"], axis=0).max() > 1e-3
