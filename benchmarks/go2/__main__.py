@@ -3,7 +3,7 @@
 import argparse
 import json
 import time
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -20,12 +20,9 @@ def main() -> None:
     parser.add_argument("--servos", choices=SERVOS, nargs="*", default=list(SERVOS))
     for name in parser.parse_args().servos:
         robot = recording.robot_on_stand(servos=SERVOS[name])
-        logged = recording.positions_and_commands(robot)
         for count in (2, 3):
-            edges = np.linspace(0, len(logged[0]), count + 1).round().astype(int).tolist()
-            parts = [
-                recording.trial_of(robot, *logged, *edges[part : part + 2]) for part in range(count)
-            ]
+            edges = np.linspace(0, recording.ALL, count + 1).round().astype(int).tolist()
+            parts = [recording.trial_of(robot, *ends) for ends in pairwise(edges)]
             for healthy, trial in permutations(range(count), 2):
                 start = time.process_time()
                 found = diagnose(
