@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.go2.recording import ALL, FITTED, robot_on_stand, trial_of
+from benchmarks.go2.__main__ import ALL, FITTED, robot_on_stand, trial_of
 from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
