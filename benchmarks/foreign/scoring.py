@@ -1,6 +1,5 @@
 """Diagnoses of recordings by the command line of selfmodel, and the rates of right answers."""
 
-import csv
 import dataclasses
 import hashlib
 import itertools
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.generate import MATTERS
@@ -423,11 +423,8 @@ def _median(values: Sequence[float]) -> str:
 
 def write_csv(rows: Iterable[Row], path: Path) -> None:
     """Writes the judged answers, a line per recording."""
-    lines = sorted(map(_line, rows), key=lambda line: str(line["recording"]))
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(lines)
+    lines = pd.DataFrame(map(_line, rows)).sort_values("recording", kind="stable")
+    lines.to_csv(path, index=False, lineterminator="\n")
 
 
 def _line(row: Row) -> Row:
