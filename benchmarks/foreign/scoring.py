@@ -200,7 +200,7 @@ def judged(row: Row) -> Judgement:
     elif verdict == "unexplained":
         verdict_right = not expressible
     else:
-        named = [best, *(terms(rival.split("+")) for rival in _rivals(answer))]
+        named = [best, *(terms(other.split("+")) for other in answer.get("indistinguishable", ()))]
         among = any(agrees(one, real) for one in named)
         verdict_right = right if verdict == "explained" else verdict == "ambiguous" and among
     return Judgement(
@@ -282,13 +282,6 @@ def _severity_error(best: Terms, real: Terms) -> float | None:
         if severity is not None and (guess := best[key]) is not None
     ]
     return max(errors, default=None)
-
-
-def _rivals(answer: Row) -> list[str]:
-    return [
-        rival["hypothesis"] if isinstance(rival, dict) else rival
-        for rival in answer.get("indistinguishable", [])
-    ]
 
 
 def _matters(truth: Row) -> bool:

@@ -81,7 +81,7 @@ def draw_reality(robot: Robot, seed: int) -> Reality:
     return dataclasses.replace(ideal, seed=seed, masses=masses, torques=torques, **drawn)
 
 
-def ideal_reality(robot: Robot, seed: int = 0) -> Reality:
+def ideal_reality(robot: Robot) -> Reality:
     """Returns a robot without noise, delay or deviations of its masses and motors.
 
     Bullet's contacts and the gears of the servos remain.
@@ -89,7 +89,7 @@ def ideal_reality(robot: Robot, seed: int = 0) -> Reality:
     model = robot.model
     # The largest coefficient of two geoms is that of their contact in MuJoCo.
     friction = float(model.geom_friction[:, 0].max())
-    return Reality(seed, (1.0,) * model.nbody, (1.0,) * model.nu, friction=friction)
+    return Reality(0, (1.0,) * model.nbody, (1.0,) * model.nu, friction=friction)
 
 
 @dataclass(frozen=True)
