@@ -2,7 +2,6 @@
 
 import dataclasses
 import hashlib
-import itertools
 import json
 import math
 import os
@@ -370,13 +369,12 @@ def reliability(rows: Sequence[Row]) -> str:
     so = np.array([one.is_so for one in found], dtype=float)
     place = row_of(said)
     lines = ["| probability | recordings | mean probability | so |", "|---|---|---|---|"]
-    for k, (low, high) in enumerate(itertools.pairwise(BINS)):
-        inside = place == k
-        if inside.any():
-            lines.append(
-                f"| {low:.0%} to {high:.0%} | {inside.sum()} | {said[inside].mean():.1%} | "
-                f"{rate(so[inside].astype(bool).tolist())} |"
-            )
+    for row in np.unique(place):
+        inside = place == row
+        lines.append(
+            f"| {BINS[row]:.0%} to {BINS[row + 1]:.0%} | {inside.sum()} "
+            f"| {said[inside].mean():.1%} | {rate(so[inside].astype(bool).tolist())} |"
+        )
     rng = np.random.default_rng(0)
     drawn = rng.integers(len(said), size=(RESAMPLES, len(said)))
     errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
