@@ -37,7 +37,6 @@ from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter
-from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.designs import network_for
@@ -221,18 +220,15 @@ def _in_turns(*works: Callable[[], object], rounds: int = ROUNDS) -> list[float]
     return [median(taken) for taken in seconds]
 
 
-class TimedRobot:
+class TimedRobot(SimulatedRobot):
     """A physical robot that measures the seconds of its simulation."""
 
     seconds = 0.0
     """Of all robots together."""
 
-    def __init__(self, robot: PhysicalRobot) -> None:
-        self._robot = robot
-
     def run(self, controller: CommandSource, steps: int) -> Iterator[Sample]:
         """Runs a controller."""
-        samples = self._robot.run(controller, steps)
+        samples = super().run(controller, steps)
         while True:
             start = perf_counter()
             sample = next(samples, None)
@@ -287,7 +283,7 @@ def one_recovery() -> dict[str, float]:
             calibrated=False,
             score=DISPLACEMENT,
             repair=plugins.PAPER,
-            physical=lambda model, hidden: TimedRobot(SimulatedRobot(model, hidden)),
+            physical=TimedRobot,
         )
         outcome = run(experiment, lambda _event: None)
     seconds, stats = outcome.seconds, outcome.stats

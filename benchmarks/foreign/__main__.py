@@ -66,7 +66,7 @@ def _generate(options: argparse.Namespace) -> None:
             seed,
             gap,
             options.duration,
-            1 if options.own_gait else options.trials or _question(case).trials,
+            1 if options.own_gait else options.trials or QUESTIONS[CASES[case].group].trials,
             options.own_gait,
         )
         for gap, seed, case, robot in itertools.product(
@@ -79,10 +79,6 @@ def _generate(options: argparse.Namespace) -> None:
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
         for folder in pool.imap_unordered(partial(generate, options.out), plans):
             print(folder, flush=True)
-
-
-def _question(case: str) -> Question:
-    return QUESTIONS[CASES[case].group]
 
 
 def _seeds(text: str) -> range:

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.foreign.cases import CASES, Case, Faults, faults_of, notation, onset_of, stream
 from benchmarks.foreign.model import LEVELS, Gap, compiled, draw_gap
 from benchmarks.foreign.motion import Gait, Motion, Phase, draw_gait, simulate
-from benchmarks.foreign.recorder import Noise, encoders_of, mapping, recorded, write_bag
+from benchmarks.foreign.recorder import Encoders, Noise, encoders_of, mapping, recorded, write_bag
 from benchmarks.foreign.robots import SERVO_GAINS, Robot, robot
 
 CANDIDATES, GAITS = 16, 3
@@ -85,18 +85,25 @@ def generate(out: Path, plan: Plan) -> Path:
         stiffness, damping = SERVO_GAINS
         settings = f"kp = {stiffness}\nkd = {damping}\n"
         (folder / machine.mapped_as).with_suffix(".toml").write_text(settings)
-    stated = _stated(machine, faults, moved)
-    truth = {
-        **asked,
-        "group": case.group,
-        "truth": notation(stated),
-        "faults": [dataclasses.asdict(fault) for fault in stated],
-        "onset": onset,
-        "displacement_healthy": before.displacement(plan.duration).tolist(),
-        "displacement_after": moved[0].displacement(plan.duration).tolist(),
-    }
-    written.write_text(json.dumps(truth, indent=1) + "\n")
+    write_truth(written, plan, _stated(machine, faults, moved), onset, [before, moved[0]])
     return folder
+
+
+def write_truth(
+    path: Path, plan: Plan, faults: Faults, onset: float | None, motions: Sequence[Motion]
+) -> None:
+    """Writes what was asked and what is true, and how far the robot went before and after."""
+    healthy, after = (motion.displacement(plan.duration).tolist() for motion in motions)
+    truth = {
+        **dataclasses.asdict(plan),
+        "group": CASES[plan.case].group,
+        "truth": notation(faults),
+        "faults": [dataclasses.asdict(fault) for fault in faults],
+        "onset": onset,
+        "displacement_healthy": healthy,
+        "displacement_after": after,
+    }
+    path.write_text(json.dumps(truth, indent=1) + "\n")
 
 
 def _stated(machine: Robot, faults: Faults, motions: list[Motion]) -> Faults:
@@ -205,9 +212,22 @@ def _record(
     turned = plan.stream("signs").choice((-1, 1), len(machine.hinges))
     signs = {hinge: int(sign) for hinge, sign in zip(machine.hinges, turned, strict=True)}
     encoders = encoders_of(machine, faults, onset or -1.0, signs)
-    noise = Noise().scaled(gap.size)
-    items = recorded(machine, motion, encoders, noise, rng)
-    write_bag(folder / name, items, noise.lost, rng, mcap=plan.seed % 2 == 0)
-    text = mapping(machine, encoders, plan.duration, healthy=name.startswith("before"))
-    (folder / f"{name}.toml").write_text(text)
+    write_trial(folder / name, plan, machine, motion, encoders=encoders, rng=rng)
     return motion
+
+
+def write_trial(
+    path: Path,
+    plan: Plan,
+    machine: Robot,
+    motion: Motion,
+    *,
+    encoders: Encoders,
+    rng: np.random.Generator,
+) -> None:
+    """Writes the bag of a trial, and its mapping beside it."""
+    noise = Noise().scaled(LEVELS[plan.gap])
+    items = recorded(machine, motion, encoders, noise, rng)
+    write_bag(path, items, noise.lost, rng, mcap=plan.seed % 2 == 0)
+    text = mapping(machine, encoders, plan.duration, healthy=path.name.startswith("before"))
+    path.with_suffix(".toml").write_text(text)

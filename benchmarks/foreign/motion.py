@@ -128,6 +128,17 @@ class Motion:
     touch: np.ndarray
     """Force at each foot as the sensor reports it, N."""
 
+    @classmethod
+    def of(
+        cls, robot: Robot, rows: list[np.ndarray], commands: list[np.ndarray], touch: np.ndarray
+    ) -> "Motion":
+        """Returns a motion of rows of time, pose, twist, angles and speeds."""
+        time, pose, twist, angles, speeds = np.split(
+            np.array(rows), [1, 8, 14, 14 + len(robot.hinges)], axis=1
+        )
+        clock = robot.control_timestep * np.arange(len(commands))
+        return cls(time[:, 0], angles, speeds, pose, twist, clock, np.array(commands), touch)
+
     def displacement(self, duration: float) -> np.ndarray:
         """Returns the horizontal displacement of the root body from time 0, ``(2,)`` m."""
         last = int(np.searchsorted(self.time, duration - 1e-9))
@@ -151,15 +162,10 @@ class _Plant:
         self.there = hinges >= 0
         self.qpos = model.jnt_qposadr[hinges[self.there]]
         self.qvel = model.jnt_dofadr[hinges[self.there]]
-        motors, touches = (
-            ids(model, ACTUATOR, list(robot.motors)),
-            ids(model, SENSOR, list(robot.touches)),
-        )
+        motors = ids(model, ACTUATOR, list(robot.motors))
+        touches = ids(model, SENSOR, list(robot.touches))
         self.driven, self.motors = np.flatnonzero(motors >= 0), motors[motors >= 0]
-        self.felt, self.touches = (
-            np.flatnonzero(touches >= 0),
-            model.sensor_adr[touches[touches >= 0]],
-        )
+        self.felt, self.touches = touches >= 0, model.sensor_adr[touches[touches >= 0]]
         mujoco.mj_forward(model, self.data)
 
     @property
@@ -235,10 +241,4 @@ def simulate(
                 plant.data.ctrl[plant.motors] = sent[plant.driven]
             rows.append(plant.row())
             mujoco.mj_step(plant.model, plant.data)
-    time, pose, twist, angles, speeds = np.split(
-        np.array(rows), [1, 8, 14, 14 + len(robot.hinges)], axis=1
-    )
-    clock = robot.control_timestep * np.arange(count)
-    return Motion(
-        time[:, 0], angles, speeds, pose, twist, clock, np.array(commands), np.array(touches)
-    )
+    return Motion.of(robot, rows, commands, np.array(touches))

@@ -8,6 +8,22 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.stores.ros2_humble import (
+    builtin_interfaces__msg__Time as Time,
+    geometry_msgs__msg__Point as Point,
+    geometry_msgs__msg__Pose as Pose,
+    geometry_msgs__msg__PoseWithCovariance as PoseWithCovariance,
+    geometry_msgs__msg__Quaternion as Quaternion,
+    geometry_msgs__msg__Twist as Twist,
+    geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance,
+    geometry_msgs__msg__Vector3 as Vector3,
+    geometry_msgs__msg__Wrench as Wrench,
+    geometry_msgs__msg__WrenchStamped as WrenchStamped,
+    nav_msgs__msg__Odometry as Odometry,
+    sensor_msgs__msg__Imu as Imu,
+    sensor_msgs__msg__JointState as JointState,
+    std_msgs__msg__Header as Header,
+)
 
 from benchmarks.foreign.cases import Faults
 from benchmarks.foreign.motion import Motion
@@ -79,7 +95,7 @@ def recorded(
     """Returns the messages of a motion: joint states and commands, odometry or IMU, and feet."""
     return [
         *_joints(robot, motion, encoders, noise, rng),
-        *(_odometry if robot.has_odometry else _imu)(motion, noise, rng),
+        *_base(motion, noise, rng, odometry=robot.has_odometry),
         *_commands(robot, motion),
     ]
 
@@ -191,40 +207,31 @@ def _at(times: np.ndarray, rows: np.ndarray, when: float | np.ndarray) -> np.nda
     return np.asarray(rows[low] + part * (rows[low + 1] - rows[low]))
 
 
-def _odometry(motion: Motion, noise: Noise, rng: np.random.Generator) -> Iterator[Item]:
+def _base(
+    motion: Motion, noise: Noise, rng: np.random.Generator, *, odometry: bool
+) -> Iterator[Item]:
+    """Yields the odometry of the root body, or its IMU, whose accelerations are 0."""
+    unknown, wide = np.zeros(9), np.zeros(36)
     for time in np.arange(-STANDING, motion.time[-1], ODOMETRY_PERIOD):
         true = _jittered(time, noise, rng)
         pose, twist = _at(motion.time, motion.pose, true), _at(motion.time, motion.twist, true)
         twist = twist * (true >= 0)
-        turn = pose[3:] / np.linalg.norm(pose[3:])
-        turn = turn + rng.normal(0, noise.orientation / 2, 4)
-        turn /= np.linalg.norm(turn)
-        position = pose[:3] + rng.normal(0, noise.position, 3)
-        linear = _rotation(turn).T @ twist[:3] + rng.normal(0, noise.linear, 3)
-        angular = twist[3:] + rng.normal(0, noise.angular, 3)
-        yield "/odom", _stamp(time), _odom(time, position, turn, linear, angular)
-
-
-def _imu(motion: Motion, noise: Noise, rng: np.random.Generator) -> Iterator[Item]:
-    """Yields orientation and angular velocity of the root body; accelerations are 0."""
-    for time in np.arange(-STANDING, motion.time[-1], ODOMETRY_PERIOD):
-        true = _jittered(time, noise, rng)
-        pose, twist = _at(motion.time, motion.pose, true), _at(motion.time, motion.twist, true)
         turn = pose[3:] / np.linalg.norm(pose[3:]) + rng.normal(0, noise.orientation / 2, 4)
-        w, x, y, z = map(float, turn / np.linalg.norm(turn))
-        angular = twist[3:] * (true >= 0) + rng.normal(0, noise.angular, 3)
-        unknown = np.zeros(9)
-        message = _message(
-            "sensor_msgs/msg/Imu",
-            header=_header(time, "base"),
-            orientation=_message("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-            orientation_covariance=unknown,
-            angular_velocity=_vector(angular),
-            angular_velocity_covariance=unknown,
-            linear_acceleration=_vector(np.zeros(3)),
-            linear_acceleration_covariance=unknown,
-        )
-        yield "/imu", _stamp(time), message
+        turn /= np.linalg.norm(turn)
+        w, x, y, z = map(float, turn)
+        orientation = Quaternion(x, y, z, w)
+        if odometry:
+            position = Point(*map(float, pose[:3] + rng.normal(0, noise.position, 3)))
+            linear = _vector(_rotation(turn).T @ twist[:3] + rng.normal(0, noise.linear, 3))
+        angular = _vector(twist[3:] + rng.normal(0, noise.angular, 3))
+        if odometry:
+            place = PoseWithCovariance(Pose(position, orientation), wide)
+            moved = TwistWithCovariance(Twist(linear, angular), wide)
+            yield "/odom", _stamp(time), Odometry(_header(time, "odom"), "base", place, moved)
+        else:
+            header, still = _header(time, "base"), _vector(np.zeros(3))
+            message = Imu(header, orientation, unknown, angular, unknown, still, unknown)
+            yield "/imu", _stamp(time), message
 
 
 def _rotation(turn: np.ndarray) -> np.ndarray:
@@ -246,13 +253,8 @@ def _commands(robot: Robot, motion: Motion) -> Iterator[Item]:
         stamp = _stamp(time)
         yield "/joint_commands", stamp, _joint_state(time, names, command, np.zeros(0))
         for name, force in zip(robot.touches, forces, strict=True):
-            wrench = _message(
-                "geometry_msgs/msg/Wrench",
-                force=_vector(np.array([0, 0, float(force)])),
-                torque=_vector(np.zeros(3)),
-            )
-            header = _header(time, "")
-            message = _message("geometry_msgs/msg/WrenchStamped", header=header, wrench=wrench)
+            wrench = Wrench(_vector(np.array([0, 0, float(force)])), _vector(np.zeros(3)))
+            message = WrenchStamped(_header(time, ""), wrench)
             yield f"/foot/{name}", stamp, message
 
 
@@ -264,47 +266,15 @@ def _stamp(time: float) -> int:
     return EPOCH + round(time * 1e9)
 
 
-def _message(kind: str, **fields: Any) -> Any:  # noqa: ANN401  # rosbags makes the types at run time
-    return ROS.types[kind](**fields)
+def _header(time: float, frame: str) -> Header:
+    return Header(Time(*divmod(_stamp(time), 10**9)), frame)
 
 
-def _header(time: float, frame: str) -> Any:  # noqa: ANN401  # see above
-    seconds, nanoseconds = divmod(_stamp(time), 10**9)
-    stamp = _message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
-    return _message("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
+def _vector(values: np.ndarray) -> Vector3:
+    return Vector3(*map(float, values))
 
 
-def _vector(values: np.ndarray, kind: str = "Vector3") -> Any:  # noqa: ANN401  # see above
-    x, y, z = map(float, values)
-    return _message(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
-
-
-def _joint_state(time: float, names: list[str], position: np.ndarray, speed: np.ndarray) -> Any:  # noqa: ANN401  # see above
-    return _message(
-        "sensor_msgs/msg/JointState",
-        header=_header(time, ""),
-        name=names,
-        position=np.asarray(position, dtype=np.float64),
-        velocity=np.asarray(speed, dtype=np.float64),
-        effort=np.zeros(0),
-    )
-
-
-def _odom(
-    time: float, position: np.ndarray, turn: np.ndarray, linear: np.ndarray, angular: np.ndarray
-) -> Any:  # noqa: ANN401  # see above
-    w, x, y, z = map(float, turn)
-    pose = _message(
-        "geometry_msgs/msg/Pose",
-        position=_vector(position, "Point"),
-        orientation=_message("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-    )
-    twist = _message("geometry_msgs/msg/Twist", linear=_vector(linear), angular=_vector(angular))
-    unknown = np.zeros(36)
-    return _message(
-        "nav_msgs/msg/Odometry",
-        header=_header(time, "odom"),
-        child_frame_id="base",
-        pose=_message("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=unknown),
-        twist=_message("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
-    )
+def _joint_state(
+    time: float, names: list[str], position: np.ndarray, speed: np.ndarray
+) -> JointState:
+    return JointState(_header(time, ""), names, position, speed, np.zeros(0))

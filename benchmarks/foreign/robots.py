@@ -1,12 +1,12 @@
 """The robots of the generator: MJCF files, read as data, with their parts by name."""
 
 import importlib.util
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 SERVO_GAINS = (150.0, 15.0)
 """Stiffness, N m/rad, and damping, N m s/rad, of the position servos of the ant."""
@@ -119,7 +119,7 @@ def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         stiffness, damping = SERVO_GAINS
         motor.gear = [1, 0, 0, 0, 0, 0]
         motor.set_to_position(kp=stiffness, kv=damping)
-        motor.ctrlrange = radians(spec, spec.joint(motor.target).range)
+        motor.ctrlrange = np.radians(spec.joint(motor.target).range)
         motor.forcerange, motor.forcelimited = [-150, 150], 1
     for joint in spec.joints:
         body = joint.parent
@@ -141,11 +141,6 @@ def _ant(spec: mujoco.MjSpec) -> mujoco.MjSpec:
                 objname=site.name,
             )
     return spec
-
-
-def radians(spec: mujoco.MjSpec, angles: Sequence[float]) -> list[float]:
-    """Returns angles of a specification, which may be in degrees, in radians."""
-    return [float(math.radians(angle) if spec.compiler.degree else angle) for angle in angles]
 
 
 def _parts(

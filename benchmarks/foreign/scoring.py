@@ -1,9 +1,7 @@
 """Diagnoses of recordings by the command line of selfmodel, and the rates of right answers."""
 
-import csv
 import dataclasses
 import hashlib
-import itertools
 import json
 import math
 import os
@@ -19,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.generate import MATTERS
@@ -200,7 +199,7 @@ def judged(row: Row) -> Judgement:
     elif verdict == "unexplained":
         verdict_right = not expressible
     else:
-        named = [best, *(terms(rival.split("+")) for rival in _rivals(answer))]
+        named = [best, *(terms(other.split("+")) for other in answer.get("indistinguishable", ()))]
         among = any(agrees(one, real) for one in named)
         verdict_right = right if verdict == "explained" else verdict == "ambiguous" and among
     return Judgement(
@@ -282,13 +281,6 @@ def _severity_error(best: Terms, real: Terms) -> float | None:
         if severity is not None and (guess := best[key]) is not None
     ]
     return max(errors, default=None)
-
-
-def _rivals(answer: Row) -> list[str]:
-    return [
-        rival["hypothesis"] if isinstance(rival, dict) else rival
-        for rival in answer.get("indistinguishable", [])
-    ]
 
 
 def _matters(truth: Row) -> bool:
@@ -377,13 +369,12 @@ def reliability(rows: Sequence[Row]) -> str:
     so = np.array([one.is_so for one in found], dtype=float)
     place = row_of(said)
     lines = ["| probability | recordings | mean probability | so |", "|---|---|---|---|"]
-    for k, (low, high) in enumerate(itertools.pairwise(BINS)):
-        inside = place == k
-        if inside.any():
-            lines.append(
-                f"| {low:.0%} to {high:.0%} | {inside.sum()} | {said[inside].mean():.1%} | "
-                f"{rate(so[inside].astype(bool).tolist())} |"
-            )
+    for row in np.unique(place):
+        inside = place == row
+        lines.append(
+            f"| {BINS[row]:.0%} to {BINS[row + 1]:.0%} | {inside.sum()} "
+            f"| {said[inside].mean():.1%} | {rate(so[inside].astype(bool).tolist())} |"
+        )
     rng = np.random.default_rng(0)
     drawn = rng.integers(len(said), size=(RESAMPLES, len(said)))
     errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
@@ -423,11 +414,8 @@ def _median(values: Sequence[float]) -> str:
 
 def write_csv(rows: Iterable[Row], path: Path) -> None:
     """Writes the judged answers, a line per recording."""
-    lines = sorted(map(_line, rows), key=lambda line: str(line["recording"]))
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(lines)
+    lines = pd.DataFrame(map(_line, rows)).sort_values("recording", kind="stable")
+    lines.to_csv(path, index=False, lineterminator="\n")
 
 
 def _line(row: Row) -> Row:

@@ -78,8 +78,8 @@ def _run(options: argparse.Namespace) -> None:
         case "record":
             for seed in options.seeds:
                 for case in options.cases or recordings.RECORDED:
-                    plan = recordings.Plan(case, seed, options.own_gait)
-                    print(recordings.record(options.out, plan), flush=True)
+                    own = options.own_gait
+                    print(recordings.record(options.out, case, seed, own_gait=own), flush=True)
 
 
 if __name__ == "__main__":

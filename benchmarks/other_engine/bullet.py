@@ -1,8 +1,5 @@
 """A damaged robot on the ground in a client of PyBullet, and its URDF."""
 
-import tempfile
-from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -11,8 +8,8 @@ import numpy as np
 import pybullet
 from scipy.spatial.transform import Rotation
 
-from benchmarks.other_engine.reality import SUBSTEP, Damage, Reality
-from benchmarks.other_engine.urdf import fix, part, root_motion, scale
+from benchmarks.other_engine.client import SUBSTEP, Client, scale, with_faults
+from benchmarks.other_engine.reality import Damage, Reality
 from selfmodel.errors import InputError
 from selfmodel.logs.viewers import urdf as exported_urdf
 from selfmodel.robot.robot import Robot
@@ -34,10 +31,11 @@ class Contact(NamedTuple):
     force: float
 
 
-class Bullet:
-    """A damaged robot in a client of PyBullet, by the names of its model; ``close`` ends it."""
+class Bullet(Client):
+    """A damaged robot in a client of PyBullet, by the names of its model."""
 
     def __init__(self, robot: Robot, reality: Reality, damage: Damage) -> None:
+        super().__init__()
         self._robot, self._reality, self._damage = robot, reality, damage
         self._urdf = damaged_urdf(robot, reality, damage)
         model = robot.model
@@ -46,18 +44,7 @@ class Bullet:
             for sensor in robot.anatomy.sensors
             if sensor.kind == "touch"
         }
-        self.client = pybullet.connect(pybullet.DIRECT)
         self.reset()
-
-    def close(self) -> None:
-        """Ends the client; further calls do nothing."""
-        if self.client >= 0:
-            pybullet.disconnect(physicsClientId=self.client)
-            self.client = -1
-
-    def _call(self, function: str, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401  # PyBullet's
-        """Calls a function of PyBullet for this client."""
-        return getattr(pybullet, function)(*arguments, physicsClientId=self.client, **options)
 
     def reset(self) -> None:
         """Loads ground and robot anew, in the initial pose at rest: no contact is remembered."""
@@ -69,46 +56,20 @@ class Bullet:
             deterministicOverlappingPairs=1,
             enableFileCaching=0,
         )
-        self._call("setGravity", *self._robot.model.opt.gravity)
-        plane = self._call("createCollisionShape", pybullet.GEOM_PLANE)
-        self._ground = self._call("createMultiBody", 0, plane)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "robot.urdf")
-            path.write_text(self._urdf, encoding="utf-8")
-            flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-            self._body = self._call("loadURDF", str(path), flags=flags)
-        of_joint = partial(self._call, "getJointInfo", self._body)
-        infos = [of_joint(k) for k in range(self._call("getNumJoints", self._body))]
-        self._links = {info[12].decode(): info[0] for info in infos}
-        hinges = {i[1].decode(): i[0] for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
-        names = self._robot.anatomy.hinges
-        self._present = np.array([name in hinges for name in names])
-        self._hinges = [hinges[name] for name in names if name in hinges]
-        self._set_dynamics()
+        undamped = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
+        self._load(
+            self._urdf,
+            self._robot.anatomy.hinges,
+            **undamped,
+            lateralFriction=self._reality.friction,
+            restitution=self._reality.restitution,
+        )
         root = self._robot.model.body(self._robot.root)
-        self.place(root.pos, root.quat, np.zeros(len(names)))
-
-    def _set_dynamics(self) -> None:
-        # Bullet multiplies the coefficients of the two bodies.
-        change = partial(self._call, "changeDynamics")
-        change(self._ground, -1, lateralFriction=1.0, restitution=1.0)
-        contact = {
-            "lateralFriction": self._reality.friction,
-            "restitution": self._reality.restitution,
-        }
-        for link in (-1, *self._links.values()):
-            change(self._body, link, linearDamping=0, angularDamping=0, jointDamping=0, **contact)
-        # Each joint of PyBullet begins with a motor that holds it.
-        self._control(pybullet.VELOCITY_CONTROL, [0.0] * len(self._hinges))
-        found = self._call("getDynamicsInfo", self._body, -1)
-        self._base_inertial = found[3], found[4]
-
-    def _control(self, mode: int, forces: list[float]) -> None:
-        self._call("setJointMotorControlArray", self._body, self._hinges, mode, forces=forces)
+        self.place(root.pos, root.quat, np.zeros(len(self._present)))
 
     def place(self, position: np.ndarray, orientation: np.ndarray, angles: np.ndarray) -> None:
         """Moves the robot to a pose of its root, w x y z, and all hinges, rad, at rest."""
-        pose = pybullet.multiplyTransforms(position, np.roll(orientation, -1), *self._base_inertial)
+        pose = pybullet.multiplyTransforms(position, np.roll(orientation, -1), *self._inertial)
         self._call("resetBasePositionAndOrientation", self._body, *pose)
         self._call("resetBaseVelocity", self._body, [0, 0, 0], [0, 0, 0])
         for joint, angle in zip(self._hinges, angles[self._present], strict=True):
@@ -124,8 +85,7 @@ class Bullet:
 
         Those of absent and fixed hinges have no effect.
         """
-        self._control(pybullet.TORQUE_CONTROL, torques[self._present].tolist())
-        self._call("stepSimulation")
+        self._advance(torques[self._present])
 
     def hinges(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns angle, rad, and angular velocity, rad/s, of each hinge of the model.
@@ -135,18 +95,8 @@ class Bullet:
         names = self._robot.anatomy.hinges
         angles = np.array([self._damage.fixed.get(name, 0.0) for name in names])
         speeds = np.zeros(len(names))
-        states = self._call("getJointStates", self._body, self._hinges)
-        angles[self._present] = [state[0] for state in states]
-        speeds[self._present] = [state[1] for state in states]
+        angles[self._present], speeds[self._present] = self._states()
         return angles, speeds
-
-    def base(self) -> tuple[np.ndarray, Rotation, np.ndarray, np.ndarray]:
-        """Returns position, m, orientation, velocity, m/s, angular velocity, rad/s, of the base.
-
-        Those of the origin of the root body; the angular velocity is in the frame of the base.
-        """
-        pose = self._call("getBasePositionAndOrientation", self._body)
-        return root_motion(pose, self._call("getBaseVelocity", self._body), self._base_inertial)
 
     def is_valid(self) -> bool:
         """Returns whether the state is finite: Bullet has no warning of its own."""
@@ -194,14 +144,7 @@ def damaged_urdf(robot: Robot, reality: Reality, damage: Damage) -> str:
     tree = ET.fromstring(exported_urdf(robot))  # noqa: S314  # see the line above
     for link in tree.findall("link"):
         _complete(link, robot.model, reality)
-    joints = {joint.get("name"): joint for joint in tree.findall("joint")}
-    links = {link.get("name"): link for link in tree.findall("link")}
-    for hinge in damage.lost:
-        tree.remove(links[part(joints[hinge], "child").get("link")])
-        tree.remove(joints[hinge])
-    for hinge, angle in damage.fixed.items():
-        fix(joints[hinge], angle)
-    return ET.tostring(tree, encoding="unicode")
+    return with_faults(tree, damage.lost, damage.fixed)
 
 
 def _complete(link: ET.Element, model: mujoco.MjModel, reality: Reality) -> None:

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.other_engine.bullet import Bullet
-from benchmarks.other_engine.reality import SUBSTEP, Damage, Reality
+from benchmarks.other_engine.client import SUBSTEP
+from benchmarks.other_engine.reality import Damage, Reality
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.robot.anatomy import Sensor
 from selfmodel.robot.robot import Robot

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults.joints import JAMMED
+from selfmodel.faults.notation import parse
+from selfmodel.faults.registry import PAPER_KINDS
+from selfmodel.faults.sensors import FAILED_SENSOR
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-
-SUBSTEP = 0.001
-"""Time step of Bullet's physics and of the servos, s: a gear's oscillation takes 15 of them."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def draw_reality(robot: Robot, seed: int) -> Reality:
     return dataclasses.replace(ideal, seed=seed, masses=masses, torques=torques, **drawn)
 
 
-def ideal_reality(robot: Robot, seed: int = 0) -> Reality:
+def ideal_reality(robot: Robot) -> Reality:
     """Returns a robot without noise, delay or deviations of its masses and motors.
 
     Bullet's contacts and the gears of the servos remain.
@@ -89,7 +89,7 @@ def ideal_reality(robot: Robot, seed: int = 0) -> Reality:
     model = robot.model
     # The largest coefficient of two geoms is that of their contact in MuJoCo.
     friction = float(model.geom_friction[:, 0].max())
-    return Reality(seed, (1.0,) * model.nbody, (1.0,) * model.nu, friction=friction)
+    return Reality(0, (1.0,) * model.nbody, (1.0,) * model.nu, friction=friction)
 
 
 @dataclass(frozen=True)
@@ -113,20 +113,12 @@ def damage_of(notation: str, anatomy: Anatomy) -> Damage:
         InputError: The notation has another kind of fault, or an unknown part.
     """
     lost, dead, fixed = set[str](), set[str](), dict[str, float]()
-    for term in notation.split("+") if notation != "intact" else ():
-        kind, _, part = term.partition(":")
-        if kind not in ("break", "jam", "sensor"):
-            raise InputError(
-                f"expected faults of the kinds break, jam, sensor without severities, got {term!r}"
-            )
-        parts = anatomy.sensors if kind == "sensor" else anatomy.joints
-        if part not in (names := [one.name for one in parts]):
-            raise unknown_name("part", part, names)
-        if kind == "sensor":
-            dead.add(part)
+    for fault in parse(notation, anatomy, PAPER_KINDS).faults:
+        if fault.kind == FAILED_SENSOR:
+            dead.add(fault.part)
             continue
-        joint = anatomy.joint(part)
-        if kind == "jam":
+        joint = anatomy.joint(fault.part)
+        if fault.kind == JAMMED:
             for hinge, (low, high) in zip(joint.hinges, joint.limits, strict=True):
                 fixed[hinge] = min(max(low, 0.0), high)
             continue

@@ -5,33 +5,25 @@ commands and an IMU are recorded. Nothing of selfmodel is imported: faults are m
 the servos and in the encoders.
 """
 
-import dataclasses
-import json
 import shutil
-import tempfile
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
-import pybullet
 import pybullet_data
 
-from benchmarks.foreign.cases import CASES, Fault, Faults, notation, stream
-from benchmarks.foreign.model import LEVELS
+from benchmarks.foreign.cases import Fault, Faults
+from benchmarks.foreign.generate import Plan, write_trial, write_truth
 from benchmarks.foreign.motion import TAIL, Gait, Motion, draw_gait
-from benchmarks.foreign.recorder import Noise, encoders_of, mapping, recorded, write_bag
+from benchmarks.foreign.recorder import encoders_of
 from benchmarks.foreign.robots import Part, Robot
-from benchmarks.other_engine.urdf import fix, part, root_motion, scale
+from benchmarks.other_engine.client import SUBSTEP, Client, part, scale, with_faults
 
 FOLDER = Path(pybullet_data.getDataPath(), "a1")
 URDF = FOLDER / "a1.urdf"
-
-SUBSTEP = 0.001
-"""Time step of Bullet's physics and of the servos, s."""
 
 STANCE = {"hip": 0.0, "upper": 0.9, "lower": -1.8}
 """Angle of each kind of joint in the initial pose, rad."""
@@ -64,28 +56,6 @@ RECORDED = ("healthy", "motor", "jam-angle", "break", "encoder")
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What to record: a healthy trial with a trot, and one of the robot with a fault.
-
-    With ``own_gait``, there are two healthy trials, and the other trial has another gait: a walk.
-    """
-
-    case: str
-    seed: int
-    own_gait: bool = False
-    duration: float = 10.0
-
-    @property
-    def name(self) -> str:
-        """Name of the folder of the recording."""
-        return f"a1-{self.case}-{self.seed}{'-own' * self.own_gait}"
-
-    def stream(self, *words: str) -> np.random.Generator:
-        """Returns a random stream of this case."""
-        return stream(self.seed, "a1", self.case, *words)
-
-
-@dataclass(frozen=True)
 class Reality:
     """The draws of one robot."""
 
@@ -98,9 +68,16 @@ class Reality:
     """Time from a command to its effect, in substeps."""
 
 
-def record(out: Path, plan: Plan) -> Path:
-    """Writes the bags, mappings and ``truth.json`` of a plan, and returns their folder."""
-    folder, robot = out / plan.name, a1()
+def record(out: Path, case: str, seed: int, *, own_gait: bool, duration: float = 10.0) -> Path:
+    """Writes a healthy trial with a trot, and one of the robot with a fault, and ``truth.json``.
+
+    With ``own_gait``, there are two healthy trials, and the other trial has another gait: a walk.
+
+    Returns:
+        Their folder.
+    """
+    plan, robot = Plan("a1", case, seed, GAP, duration, trials=1, own_gait=own_gait), a1()
+    folder = out / f"a1-{case}-{seed}{'-own' * own_gait}"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(FOLDER, folder)
     (folder / "a1.toml").write_text(SETTINGS)
@@ -118,32 +95,16 @@ def record(out: Path, plan: Plan) -> Path:
     walk = draw_gait(robot, "walk", plan.stream("gait", "walk"))
 
     def trial(name: str, present: Faults, gait: Gait) -> Motion:
-        motion = simulated(robot, reality, present, gait, plan.duration)
-        noises, noise = plan.stream(name), Noise().scaled(LEVELS[GAP])
+        motion = simulated(robot, reality, present, gait, duration)
         encoders = encoders_of(robot, present, -1.0, dict.fromkeys(robot.hinges, 1))
-        items = recorded(robot, motion, encoders, noise, noises)
-        write_bag(folder / name, items, noise.lost, noises, mcap=plan.seed % 2 == 0)
-        text = mapping(robot, encoders, plan.duration, healthy=name.startswith("before"))
-        (folder / f"{name}.toml").write_text(text)
+        write_trial(folder / name, plan, robot, motion, encoders=encoders, rng=plan.stream(name))
         return motion
 
     before = trial("before", (), trot)
-    if plan.own_gait:
+    if own_gait:
         trial("before-2", (), other)
-    after = trial("after-1", faults, walk if plan.own_gait else trot)
-    truth = {
-        **dataclasses.asdict(plan),
-        "robot": robot.name,
-        "gap": GAP,
-        "trials": 1,
-        "group": CASES[plan.case].group,
-        "truth": notation(faults),
-        "faults": [dataclasses.asdict(fault) for fault in faults],
-        "onset": None,
-        "displacement_healthy": before.displacement(plan.duration).tolist(),
-        "displacement_after": after.displacement(plan.duration).tolist(),
-    }
-    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+    after = trial("after-1", faults, walk if own_gait else trot)
+    write_truth(folder / "truth.json", plan, faults, None, [before, after])
     return folder
 
 
@@ -218,63 +179,27 @@ def simulated(
             target = sent.popleft()[1]
         body.step(target)
     body.close()
-    time, pose, twist, angles, speeds = np.split(
-        np.array(rows), [1, 8, 14, 14 + len(target)], axis=1
-    )
-    clock, touch = robot.control_timestep * np.arange(count), np.zeros((count, 0))
-    return Motion(time[:, 0], angles, speeds, pose, twist, clock, np.array(commands), touch)
+    return Motion.of(robot, rows, commands, np.zeros((count, 0)))
 
 
-class _Body:
-    """The robot on the ground in a client of PyBullet, with its servos; ``close`` ends it."""
+class _Body(Client):
+    """The robot on the ground, with its servos."""
 
     def __init__(self, robot: Robot, reality: Reality, faults: Faults) -> None:
-        self._client = pybullet.connect(pybullet.DIRECT)
-        self._call("setGravity", 0, 0, -9.81)
+        super().__init__()
         self._call("setTimeStep", SUBSTEP)
-        plane = self._call("createCollisionShape", pybullet.GEOM_PLANE)
-        ground = self._call("createMultiBody", 0, plane)
-        self._call("changeDynamics", ground, -1, lateralFriction=1.0)
-        self._body = self._loaded(_with_faults(reality, faults))
-        infos = [
-            self._call("getJointInfo", self._body, joint)
-            for joint in range(self._call("getNumJoints", self._body))
-        ]
-        joints = {i[1].decode(): i[0] for i in infos if i[2] == pybullet.JOINT_REVOLUTE}
-        self._there = np.array([name in joints for name in robot.hinges])
-        self._joints = list(joints.values())
-        for link in range(-1, len(infos)):
-            self._call("changeDynamics", self._body, link, lateralFriction=reality.friction)
-        for name, joint in joints.items():
+        urdf = _with_faults(reality, faults)
+        self._load(urdf, robot.hinges, lateralFriction=reality.friction)
+        there = [name for name, present in zip(robot.hinges, self._present, strict=True) if present]
+        for name, joint in zip(there, self._hinges, strict=True):
             self._call("resetJointState", self._body, joint, _stance(name))
-        # Each joint of PyBullet begins with a motor that holds it.
-        self._motors(pybullet.VELOCITY_CONTROL, [0.0] * len(self._joints))
         fixed = {fault.part: fault.value for fault in faults if fault.kind == "jam"}
         self._fixed = np.array([fixed.get(name, np.nan) for name in robot.hinges])
-        self._damping = np.array([DAMPING[name.split("_")[1]] for name in joints])
+        self._damping = np.array([DAMPING[name.split("_")[1]] for name in there])
         weak = {fault.part: fault.value for fault in faults if fault.kind == "motor"}
-        self._factor = np.array(
-            [reality.torques[robot.hinges.index(name)] * weak.get(name, 1.0) for name in joints]
-        )
-        self._inertial = self._call("getDynamicsInfo", self._body, -1)[3:5]
+        strength = reality.torques * [weak.get(name, 1.0) for name in robot.hinges]
+        self._factor = strength[self._present]
         self._stand()
-
-    def close(self) -> None:
-        """Ends the client."""
-        pybullet.disconnect(physicsClientId=self._client)
-
-    def _call(self, function: str, *arguments: Any, **options: Any) -> Any:  # noqa: ANN401  # PyBullet's
-        return getattr(pybullet, function)(*arguments, physicsClientId=self._client, **options)
-
-    def _motors(self, mode: int, forces: list[float]) -> None:
-        self._call("setJointMotorControlArray", self._body, self._joints, mode, forces=forces)
-
-    def _loaded(self, urdf: str) -> int:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, URDF.name)
-            path.write_text(urdf)
-            flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-            return int(self._call("loadURDF", str(path), flags=flags))
 
     def _stand(self) -> None:
         """Moves the robot so that its lowest point is on the ground."""
@@ -284,26 +209,17 @@ class _Body:
         raised = (*position[:2], position[2] - lowest)
         self._call("resetBasePositionAndOrientation", self._body, raised, turn)
 
-    def _states(self) -> np.ndarray:
-        """Returns angle, rad, and angular velocity, rad/s, of each joint there is."""
-        states = self._call("getJointStates", self._body, self._joints)
-        return np.array([state[:2] for state in states]).T
-
     def step(self, target: np.ndarray) -> None:
         """Advances by a substep under commanded angles, rad."""
         angles, speeds = self._states()
-        torque = STIFFNESS * (target[self._there] - angles) - self._damping * speeds
-        torque = self._factor * np.clip(torque, -TORQUE, TORQUE)
-        self._motors(pybullet.TORQUE_CONTROL, torque.tolist())
-        self._call("stepSimulation")
+        torque = STIFFNESS * (target[self._present] - angles) - self._damping * speeds
+        self._advance(self._factor * np.clip(torque, -TORQUE, TORQUE))
 
     def row(self, time: float) -> np.ndarray:
         """Returns a time, and the pose, the twist, the angles and the speeds of a ``Motion``."""
         angles, speeds = self._fixed.copy(), np.zeros(len(self._fixed))
-        angles[self._there], speeds[self._there] = self._states()
-        centre = self._call("getBasePositionAndOrientation", self._body)
-        twist = self._call("getBaseVelocity", self._body)
-        position, orientation, linear, own = root_motion(centre, twist, self._inertial)
+        angles[self._present], speeds[self._present] = self._states()
+        position, orientation, linear, own = self.base()
         pose = [*position, *orientation.as_quat(scalar_first=True)]
         return np.concatenate([[time], pose, linear, own, angles, speeds])
 
@@ -311,19 +227,10 @@ class _Body:
 def _with_faults(reality: Reality, faults: Faults) -> str:
     """Returns the URDF of a robot with its masses, with locked and without lost joints."""
     tree = _urdf()
-    links = {str(link.get("name")): link for link in tree.findall("link")}
-    joints = {str(joint.get("name")): joint for joint in tree.findall("joint")}
-    for link in links.values():
+    for link in tree.findall("link"):
         for visual in link.findall("visual"):  # their meshes are beside the file
             link.remove(visual)
         scale(link, reality.masses.get(str(link.get("name")), 1.0))
-    for fault in faults:
-        match fault.kind:
-            case "jam":
-                fix(joints[fault.part], fault.value)
-            case "lost":
-                beyond = [fault.part, fault.part.replace("lower_joint", "toe_fixed")]
-                for name in beyond:
-                    tree.remove(links[str(part(joints[name], "child").get("link"))])
-                    tree.remove(joints[name])
-    return ET.tostring(tree, encoding="unicode")
+    lost = [fault.part for fault in faults if fault.kind == "lost"]
+    lost += [name.replace("lower_joint", "toe_fixed") for name in lost]
+    return with_faults(tree, lost, {f.part: f.value for f in faults if f.kind == "jam"})

@@ -19,15 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.rivals.methods import METHODS, Fitness, Problem, Search
+from benchmarks.rivals.methods import METHODS, Fitness, Problem
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
 from selfmodel.recovery.repair import RobustFitness
 from selfmodel.recovery.scores import UPRIGHT
@@ -46,9 +45,6 @@ from selfmodel.studies.tables import markdown_of, table_of
 from selfmodel.tasks import ROBOTS
 
 FILE = "repertoire.npz"
-KEPT = 50
-"""Number of controllers that a search returns."""
-
 PHYSICAL, HEALTHY, HIDDEN = 1, 2, 3
 """Streams of the noise of the damaged robot, as in a recovery, and of the two fitnesses."""
 
@@ -146,24 +142,7 @@ def run(parameters: Mapping[str, Any], needs: Mapping[str, Path], _folder: Path)
     ``best`` is the best displacement up to a fall so far, after each physical trial, m;
     ``upright``, ``displacement``, ``fallen`` and ``steps`` are those of each trial.
     """
-    start, method = perf_counter(), parameters["method"]
-    simulator, problem = problem_of(parameters, needs)
-    METHODS[method](problem)
-    trials = [dataclasses.asdict(trial) for trial in problem.done]
-    columns = {name: [trial[name] for trial in trials] for name in trials[0]}
-    return {
-        "robot": problem.robot.name,
-        "best": np.maximum.accumulate(columns["upright"]).tolist(),
-        **columns,
-        "simulated_steps": simulator.stats.steps,
-        "seconds": perf_counter() - start,
-    }
-
-
-def problem_of(
-    parameters: Mapping[str, Any], needs: Mapping[str, Path]
-) -> tuple[Simulator, Problem]:
-    """Returns the problem of a method, and the simulator that counts its simulated steps."""
+    start = perf_counter()
     shared, method, seed = (parameters[name] for name in ("shared", "method", "seed"))
     robot, steps = recoveries.planned_entry(parameters).robot(), shared["steps"]
     truth = parse(parameters["truth"], robot.anatomy)
@@ -172,50 +151,33 @@ def problem_of(
     hidden = with_model(robot, perturbed_model(robot.model, gap), robot.control_delay + gap.delay)
     twin = Simulator(hidden, 1, simulator.stats)
     key = int.from_bytes(hashlib.sha256(method.encode()).digest()[:4])
-    rng, design = np.random.default_rng([seed, key]), network_for(robot)
-    settings = Settings().scaled(shared["population"])
     own = {ORACLE: ORACLE_TRIALS, "physical-evolution": shared["evolution_trials"]}
-    level = gap.level
     problem = Problem(
         physical=SimulatedRobot(robot, truth, gap, PHYSICAL),
         robot=robot,
         normal=build(robot, truth).normal,
         steps=steps,
         trials=own.get(method, shared["trials"]),
-        design=design,
-        settings=settings,
+        design=network_for(robot),
+        settings=Settings().scaled(shared["population"]),
         period=shared["period"],
-        rng=rng,
+        evaluations=shared["evaluations"],
+        rng=np.random.default_rng([seed, key]),
         evaluate=simulated_evaluation(simulator, INTACT, steps),
-        healthy=noisy_fitness(simulator, INTACT, level, steps, (seed, HEALTHY)),
-        hidden=noisy_fitness(twin, truth, level, steps, (seed, HIDDEN)),
-        search=search_of(design, settings, shared["evaluations"], rng),
+        healthy=noisy_fitness(simulator, INTACT, gap.level, steps, (seed, HEALTHY)),
+        hidden=noisy_fitness(twin, truth, gap.level, steps, (seed, HIDDEN)),
         repertoire=load_repertoire(needs["repertoire"] / FILE, robot) if needs else None,
     )
-    return simulator, problem
-
-
-def search_of(
-    design: Design, settings: Settings, evaluations: int, rng: np.random.Generator
-) -> Search:
-    """Returns a search by CMA-ES with a number of evaluations."""
-
-    def search(fitness: Fitness) -> Sequence[Controller]:
-        cma_es = CmaEs(design.weights, settings, rng, ())
-        known: dict[Controller, float] = {}
-
-        def evaluated(genomes: FloatArray) -> FloatArray:
-            controllers = [Controller(design, genome) for genome in genomes]
-            scores = fitness(controllers)
-            known.update(zip(controllers, scores.tolist(), strict=True))
-            return scores
-
-        while cma_es.evaluations < evaluations:
-            cma_es.tell(evaluated(cma_es.ask()))
-        evaluated(cma_es.candidates(KEPT))
-        return sorted(known, key=lambda one: -known[one])[:KEPT]
-
-    return search
+    METHODS[method](problem)
+    trials = [dataclasses.asdict(trial) for trial in problem.done]
+    columns = {name: [trial[name] for trial in trials] for name in trials[0]}
+    return {
+        "robot": robot.name,
+        "best": np.maximum.accumulate(columns["upright"]).tolist(),
+        **columns,
+        "simulated_steps": simulator.stats.steps,
+        "seconds": perf_counter() - start,
+    }
 
 
 def noisy_fitness(

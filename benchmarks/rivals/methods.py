@@ -14,6 +14,7 @@ from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.errors import InputError, TrialError
 from selfmodel.evolution import Evolution, reproduce
 from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.falls import first_falls, held_at_the_end
 from selfmodel.recovery.map_elites import Evaluate
 from selfmodel.recovery.repertoire import Repertoire
@@ -24,6 +25,9 @@ from selfmodel.trials.trajectory import Sample, collect
 FINALISTS, RUNS = 5, 5
 """Best controllers of each search of the oracle, and further runs of each of them: a single noisy
 run of the best is too optimistic."""
+
+KEPT = 50
+"""Number of controllers that a search returns."""
 
 LENGTH_SCALE, NOISE = 0.4, 0.001
 """Length scale rho over duty factors of the Matérn 5/2 kernel, and variance of the noise. Source of
@@ -39,10 +43,6 @@ CLOSE_ENOUGH = 0.9
 
 Fitness = Callable[[Sequence[Controller]], FloatArray]
 """Fitness of controllers, ``(n,)``: forward displacement up to the first fall, m."""
-
-Search = Callable[[Fitness], Sequence[Controller]]
-"""Search for controllers: from a fitness to the distinct controllers that it evaluated, best first;
-it may leave out the worse ones."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,7 @@ class Problem:
         normal: Unit normal of the ground, ``(3,)``.
         trials: Physical trials that the method may spend, of ``steps`` each.
         period: Generations of T-Resilience between two physical trials.
+        evaluations: Evaluations of a search in simulation.
         evaluate: Evaluation in simulation of the healthy robot, without noise.
         healthy: Fitness in simulation of the healthy robot, with noise of sensors and start.
         hidden: Fitness of the physical robot's own model with its own noise: for the oracle alone.
@@ -80,11 +81,11 @@ class Problem:
     design: Design
     settings: Settings
     period: int
+    evaluations: int
     rng: np.random.Generator
     evaluate: Evaluate
     healthy: Fitness
     hidden: Fitness
-    search: Search
     repertoire: Repertoire | None = None
     done: list[Trial] = field(default_factory=list)
 
@@ -96,6 +97,22 @@ class Problem:
     def controller(self, genome: FloatArray) -> Controller:
         """Returns the controller of a genome."""
         return Controller(self.design, genome)
+
+    def search(self, fitness: Fitness) -> Sequence[Controller]:
+        """Returns the best distinct controllers of a search by CMA-ES, best first."""
+        cma_es = CmaEs(self.design.weights, self.settings, self.rng, ())
+        known: dict[Controller, float] = {}
+
+        def evaluated(genomes: FloatArray) -> FloatArray:
+            controllers = [self.controller(genome) for genome in genomes]
+            scores = fitness(controllers)
+            known.update(zip(controllers, scores.tolist(), strict=True))
+            return scores
+
+        while cma_es.evaluations < self.evaluations:
+            cma_es.tell(evaluated(cma_es.ask()))
+        evaluated(cma_es.candidates(KEPT))
+        return sorted(known, key=lambda one: -known[one])[:KEPT]
 
     def run(self, controller: Controller) -> float:
         """Runs a trial, and returns its displacement up to the first fall, m.
