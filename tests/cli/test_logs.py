@@ -196,6 +196,7 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
     )
 
 
+@pytest.mark.search
 @pytest.mark.parametrize(
     ("run", "options"), [("short", ("--kinds", "paper")), ("recovered_as_the_paper_did", PAPERS)]
 )

@@ -75,6 +75,7 @@ def test_on_a_terminal_a_stage_is_a_bar_with_the_time_left(
     assert re.search(r"refinement .*━.* 33 % about 4 min 00 s left", shown)
 
 
+@pytest.mark.search
 @pytest.mark.usefixtures("coarse_calibration")
 def test_calibration_refinement_and_detectable_severities_report_from_their_start_to_their_end():
     shares = defaultdict[str, list[float]](list)

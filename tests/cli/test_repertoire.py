@@ -3,11 +3,14 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.helpers.command import printed, refused, succeeds
 
 SMALL = ("--evaluations", "40", "--steps", "40", "--seed", "2")
 
 
+@pytest.mark.search
 def test_a_repertoire_is_made_and_shown(tmp_path: Path):
     done = succeeds(
         "repertoire", "make", "quadruped", "--out", "gaits.npz", *SMALL, "--json", cwd=tmp_path

@@ -180,6 +180,7 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
     assert (losses == (refitted if left != best else table.losses([found], trials))).all()
 
 
+@pytest.mark.search
 def test_a_fault_is_left_out_by_what_the_refits_predict_with_it_and_without(
     quadruped: Robot, table: LossTable, weaker: Robot
 ):

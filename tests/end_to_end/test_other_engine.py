@@ -208,6 +208,7 @@ def tripod_walk(robot: Robot, first: tuple[str, ...], steps: int) -> Playback:
     return Playback(motors, commands)
 
 
+@pytest.mark.search
 def test_an_open_loop_walk_goes_as_far_as_in_mujoco_and_its_mirror_image_mirrors():
     robot = ROBOTS["hexapod"].robot()
     legs = ("front_left", "middle_right", "back_left"), ("front_right", "middle_left", "back_right")

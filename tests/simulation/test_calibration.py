@@ -151,6 +151,7 @@ def test_a_model_that_is_exact_is_left_as_it_is_to_the_bit(name: str, lost: tupl
     assert found.deviations.tolist() == prior_of(robot).tolist()
 
 
+@search
 def test_long_trials_without_the_base_share_the_time_that_is_simulated_of_one(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -166,6 +167,7 @@ def test_long_trials_without_the_base_share_the_time_that_is_simulated_of_one(
     assert steps == [STEPS // 2, STEPS // 2]
 
 
+@search
 def test_what_an_earlier_calibration_predicted_of_a_trial_is_not_simulated_again(
     monkeypatch: pytest.MonkeyPatch,
 ):
