@@ -255,9 +255,8 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     """Returns the fitness of a repair by name.
 
     Args:
-        name: ``displacement``; ``upright``, the displacement up to the first fall; ``energy``, that
-            less the work of the joints; ``return``, the sum of the rewards of the robot's task; the
-            name of an entry point in the group ``selfmodel.scores``, or ``package.module:object``.
+        name: One of ``SCORES``; ``return``, the sum of the rewards of the robot's task; the name of
+            an entry point in the group ``selfmodel.scores``, or ``package.module:object``.
         robot: Name of the robot.
         entry: The robot's entry.
 

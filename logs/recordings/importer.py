@@ -83,7 +83,7 @@ def import_recording(
 ) -> ImportedTrial:
     """Returns the trial in a bag or a table of the robot that a mapping names.
 
-    Written as a log (``writing.write_recording``), it is read as any other trial is.
+    Written as a log (``write_recording``), it is read as any other trial is.
 
     Args:
         path: The recording.
@@ -400,7 +400,7 @@ def _in_frame(
 def _rotated_world(quaternions: FloatArray, rotation: FloatArray) -> FloatArray:
     """Orientations ``(steps, 4)`` after a rotation of the world ``(4,)``, w x y z.
 
-    A matrix product, which rounds differently from ``trials.rotation.product``.
+    A matrix product, which rounds differently from ``selfmodel.rotation.product``.
     """
     w, x, y, z = rotation
     matrix = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])

@@ -1,5 +1,8 @@
 """The verdict on the best hypothesis of a search: a function of the trials and the hypotheses.
 
+``verdict_of`` decides it; ``diagnosis_of`` makes it ``not judged`` where the self-model cannot
+carry it, and a search of which every simulation diverged is ``unexplained``.
+
 It does not depend on the random numbers of the search: alternatives to the best hypothesis come
 from its neighbourhood, whatever the search compared. (The best hypothesis, of which a refit may
 leave faults out, and the rest of the ranking are the search's.)

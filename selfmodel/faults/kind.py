@@ -1,4 +1,8 @@
-"""A fault, and the base class of the kinds of faults and environments."""
+"""A fault, and the base class of the kinds of faults and environments.
+
+The kinds are in ``joints.py``, ``sensors.py`` and ``world.py``; ``registry.py`` says how to add
+one.
+"""
 
 import math
 from collections.abc import Mapping

@@ -1,7 +1,8 @@
 """The fault kinds of selfmodel by name, their sets, and the failures of the paper's Table I.
 
 A further kind is a class of what it faults, in ``joints.py``, ``sensors.py`` or ``world.py``, its
-row in ``KINDS``, and its name on the help page, ``cli/options.toml``.
+row in ``KINDS`` and, to be searched by default, in one of the sets below it, and its name on the
+help page, ``cli/options.toml``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

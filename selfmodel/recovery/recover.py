@@ -100,10 +100,11 @@ class RecoveryLoop:
     def run(self, healthy: PhysicalRobot, damaged: PhysicalRobot) -> Recovery:
         """Runs the recovery, once, with a robot before its failure and after it.
 
-        The robot walks with a gait that was evolved in simulation, and the self-model is fitted to
-        the log. It fails, and the same gait is logged again. Then diagnosis and trial alternate:
-        the diagnosis explains all logs since the failure, and the next trial tries a controller
-        that the repair evolved in simulation for the diagnosed robot.
+        The robot walks with a gait that was given or is evolved in simulation, and the self-model
+        is fitted to the log. It fails, and the same gait is logged again. Both logs choose the
+        comparator. Then diagnosis and trial alternate: the diagnosis explains all logs since the
+        failure, and the next trial tries a controller that the repair evolved in simulation for
+        the diagnosed robot (``repaired``). The last diagnosis is of all trials.
         """
         robot = self.simulator.robot
         HypothesisSpace.of(self.kinds, robot.anatomy)  # refused before any trial
@@ -127,7 +128,7 @@ class RecoveryLoop:
         for left in range(self.settings.trials, 0, -1):
             self.trials_left = left
             self._diagnose(search)
-            controller = self.next_trial(self)  # by default, the first of ``repaired``
+            controller = self.next_trial(self)  # by default ``by_repair``: the best of ``repaired``
             self._log_trial(damaged, "recovery", controller)
         self._diagnose(search)
         return self._result(comparator, calibration, search)

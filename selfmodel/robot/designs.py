@@ -1,4 +1,4 @@
-"""Controller designs for a robot, by name."""
+"""Controller designs for a robot, by name; ``controllers/controller.py`` says how to add one."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
