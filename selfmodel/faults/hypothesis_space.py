@@ -141,7 +141,7 @@ class HypothesisSpace:
         is rounded to the nearest level, so a hypothesis with fitted severities can seed a search.
         """
         genome = np.full((genes, GENE_VALUES), 0.25)
-        for gene, fault in zip(genome, hypothesis.faults, strict=False):
+        for gene, fault in zip(genome[: len(hypothesis)], hypothesis.faults, strict=True):
             parts, levels = self.parts(fault.kind), self.levels(fault)
             nearest = int(np.argmin(np.abs(np.array(levels) - fault.severity)))
             # The middle of an index's interval of [0, 1) is exact under int(value * count).

@@ -133,7 +133,6 @@ HEALTHY_ONLY = replace(DISPLACEMENT, name="healthy-only", of=of)
     assert json.loads((tmp_path / "run" / "searches.json").read_text())
 
 
-@pytest.mark.search
 def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, folder: Path):
     found = [
         printed(*QUICK, *given, "--out", name, cwd=tmp_path)

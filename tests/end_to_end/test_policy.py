@@ -310,7 +310,6 @@ RECOVER = (
 )
 
 
-@pytest.mark.search
 def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     tmp_path: Path, quadruped: Robot
 ):

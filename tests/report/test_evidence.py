@@ -71,7 +71,6 @@ def test_without_alternatives_the_section_has_a_sentence_alone(subject: Subject)
     assert (section.items, len(section.text)) == ((), 1)
 
 
-@pytest.mark.search
 def test_a_trial_is_evolved_that_separates_the_alternatives_and_can_be_saved(subject: Subject):
     other = parse("jam:back_left_knee=0.5", subject.robot.anatomy)
     changes = {"verdict": "ambiguous", "indistinguishable": (other,), "undetectable": ()}

@@ -265,6 +265,19 @@ def test_draws_have_a_median_of_one_and_the_given_deviations(quadruped: Robot):
     assert rng.random() == again.random()
 
 
+@pytest.mark.parametrize("contacts", [0.0, 0.1])
+def test_each_deviation_draws_the_factor_in_its_place(quadruped: Robot, contacts: float):
+    count = len(nominal(quadruped).factors)
+    for place in range(count):
+        spread = LogNormal(
+            np.where(np.arange(count) == place, 0.1, 0.0), np.zeros(quadruped.model.nbody), contacts
+        )
+        drawn = spread.draw(np.random.default_rng(place))
+
+        assert np.flatnonzero(np.array(drawn.factors) != 1).tolist() == [place]
+        assert {drawn.contact_stiffness == 1, drawn.contact_damping == 1} == {not contacts}
+
+
 def test_a_draw_scales_the_model_of_the_robot(quadruped: Robot):
     masses, inertias = np.ones((2, quadruped.model.nbody))
     masses[2], inertias[3] = 1.2, 0.5
