@@ -147,6 +147,7 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     if isinstance(design, Policy):
         graph = design.graph
         of_graph = {name: getattr(graph, name) for name in _GRAPH}
+        of_graph |= {"states": graph.states} if graph.states else {}
         content = msgspec.json.encode({**of_graph, "interface": design.interface})
         tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
         return {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
@@ -188,13 +189,14 @@ def _design(
         design, number, _ = KINDS[kind]
         return design(*ends, arrays[number].item(), ranges=ranges)
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
-    from selfmodel.controllers.graph import Graph, Node  # noqa: PLC0415  # few controllers are one
+    from selfmodel.controllers.graph import Graph, Node, State  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Interface, Policy  # noqa: PLC0415  # few controllers are one
 
     if kind == POLICY:
         types = (str, str, int, int, tuple[Node, ...], Interface)
         fields = list(zip((*_GRAPH, "interface"), types, strict=True))
-        form = msgspec.defstruct("Content", fields, forbid_unknown_fields=True)
+        states = ("states", tuple[State, ...], ())  # absent of a feed-forward network
+        form = msgspec.defstruct("Content", [*fields, states], forbid_unknown_fields=True)
         content = msgspec.json.decode(arrays["content"].tobytes(), type=form)
         of_graph = msgspec.structs.asdict(content)
         interface = of_graph.pop("interface")

@@ -26,7 +26,7 @@ from msgspec import Meta, Struct
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
-from selfmodel.controllers.graph import Graph, Node, layers
+from selfmodel.controllers.graph import Graph, Node, State, layers
 from selfmodel.controllers.policy import Action, Interface, Policy, Term
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
@@ -290,10 +290,12 @@ def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
         if attribute.name in ("value_float", "value_floats")
     }
     inputs = [each for each in network.input if each.name not in tensors]
-    if len(inputs) != 1 or not network.output:
+    kept_on = inputs[1:]
+    if not inputs or len(network.output) < 1 + len(kept_on):
         raise ValueError(
-            f"expected one input and an output, got the inputs "
-            f"{', '.join(each.name for each in inputs) or 'none'}"
+            f"expected one input and an output, and both for each state of a recurrent network, "
+            f"got the inputs {', '.join(each.name for each in inputs) or 'none'} and the outputs "
+            f"{', '.join(each.name for each in network.output) or 'none'}"
         )
     nodes = [_node(node, tensors) for node in network.node if node.op_type != "Constant"]
     shapes = [each.type.tensor_type.shape.dim for each in (inputs[0], network.output[0])]
@@ -305,9 +307,28 @@ def _graph(network: Any) -> Graph:  # noqa: ANN401  # onnx is optional
             f"expected an input of one row of numbers, got "
             f"{[one.dim_value or one.dim_param for one in shapes[0]]}"
         )
+    states = tuple(
+        State(before.name, after.name, _state_width(before))
+        for before, after in zip(kept_on, network.output[1:], strict=False)
+    )
     used = {name for node in nodes for name in node.inputs}
     kept = {name: tensor for name, tensor in tensors.items() if name in used}
-    return Graph(inputs[0].name, network.output[0].name, width, outputs, tuple(nodes), kept)
+    ends = inputs[0].name, network.output[0].name
+    return Graph(*ends, width, outputs, tuple(nodes), kept, states)
+
+
+def _state_width(value: Any) -> int:  # noqa: ANN401  # onnx is optional
+    """Returns the numbers a row of a recurrent state: of one layer, for one robot."""
+    sizes = [int(one.dim_value) for one in value.type.tensor_type.shape.dim]  # 0: open
+    if len(sizes) != 3 or sizes[0] != 1 or sizes[1] > 1 or not sizes[2]:
+        raise ValueError(
+            f"expected a state of one layer, (1, 1, width), in the input {value.name}, got {sizes}"
+        )
+    return sizes[2]
+
+
+_USUAL = ([b"Sigmoid", b"Tanh", b"Tanh"], [b"Sigmoid", b"Tanh"])
+"""Activations of an LSTM and of a GRU."""
 
 
 def _node(node: Any, tensors: dict[str, FloatArray]) -> Node:  # noqa: ANN401  # onnx is optional
@@ -317,6 +338,8 @@ def _node(node: Any, tensors: dict[str, FloatArray]) -> Node:  # noqa: ANN401  #
     attributes: dict[str, float | tuple[float, ...]] = {}
     for attribute in node.attribute:
         value = helper.get_attribute_value(attribute)
+        if attribute.name == "activations" and value not in _USUAL:
+            raise ValueError(f"the activations {value} of {node.op_type} are not supported")
         if isinstance(value, float | int):
             attributes[attribute.name] = float(value)
         elif isinstance(value, Sequence) and all(isinstance(one, float | int) for one in value):

@@ -1,8 +1,9 @@
-"""Feed-forward networks as graphs of operators, evaluated for many robots together.
+"""Networks as graphs of operators, evaluated for many robots together.
 
 The operators are those of ONNX with its names, over rows: axis 0 of every value is that of the
-robots, and each row of a result is bit-identical for every number of rows. Arithmetic is in
-float64: against another evaluation, only the rounding of its float32 is left.
+robots, and each row of a result is bit-identical for every number of rows. Of a recurrent network,
+the values around its cell have the robots on axis 1, after one time step: ``(1, n, width)``.
+Arithmetic is in float64: against another evaluation, only the rounding of its float32 is left.
 """
 
 import functools
@@ -44,6 +45,21 @@ class Node:
     attributes: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
 
 
+@dataclass(frozen=True)
+class State:
+    """Numbers that a recurrent network hands to its next evaluation, ``(1, n, width)``; 0 at first.
+
+    Attributes:
+        input: Name of the input that receives them.
+        output: Name of the output that has the next ones.
+        width: Numbers a row.
+    """
+
+    input: str
+    output: str
+    width: int
+
+
 @dataclass(frozen=True, eq=False)
 class Graph:
     """A network from one row of numbers to another; graphs of equal content are equal.
@@ -53,7 +69,8 @@ class Graph:
         output: Name of the output, of ``outputs`` numbers a row; 0 for as many as are computed.
         nodes: Operators, in the order of their evaluation.
         tensors: Weights and constants by name; arrays of whole numbers are shapes and axes. The
-            second factor of a product is one of them.
+            second factor of a product is one of them, and so are the weights of a recurrent cell.
+        states: What it keeps from one evaluation to the next; none of a feed-forward network.
 
     Raises:
         ValueError: An operator is unknown, a value is used before it is computed or has another
@@ -66,6 +83,7 @@ class Graph:
     outputs: int
     nodes: tuple[Node, ...]
     tensors: Mapping[str, FloatArray]
+    states: tuple[State, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_names()
@@ -74,8 +92,10 @@ class Graph:
                 raise ValueError(f"the tensor {name} has numbers that are not finite")
         tensors = {name: frozen(tensor) for name, tensor in self.tensors.items()}
         object.__setattr__(self, "tensors", MappingProxyType(tensors))
-        if not 1 <= self.inputs <= MAX_NUMBERS:
-            raise ValueError(f"expected 1 to {MAX_NUMBERS} inputs, got {self.inputs}")
+        for name, width in (("", self.inputs), *((s.input, s.width) for s in self.states)):
+            if not 1 <= width <= MAX_NUMBERS:
+                what = f"numbers of the state {name}" if name else "inputs"
+                raise ValueError(f"expected 1 to {MAX_NUMBERS} {what}, got {width}")
         for rows in (1, 2):  # a tensor of two rows fits two robots alone
             given = (rows, self.inputs)
             found = self(np.zeros(given)).shape  # raises ValueError
@@ -86,11 +106,22 @@ class Graph:
                 raise ValueError(
                     f"its output for inputs of {given} has the shape {found}, expected {expected}"
                 )
+        self._check_states()
+
+    def _check_states(self) -> None:
+        first = self.initial(2)
+        _, later = self.step(np.zeros((2, self.inputs)), first)  # raises ValueError
+        for state, before, after in zip(self.states, first, later, strict=True):
+            if before.shape != after.shape:
+                raise ValueError(
+                    f"the state {state.output} has the shape {after.shape}, expected that of "
+                    f"{state.input}, {before.shape}"
+                )
 
     def _check_names(self) -> None:
         if len(self.nodes) > MAX_NODES:
             raise ValueError(f"it has {len(self.nodes)} operators, expected at most {MAX_NODES}")
-        known = {self.input, *self.tensors}
+        known = {self.input, *(state.input for state in self.states), *self.tensors}
         for node in self.nodes:
             if node.operator not in OPERATORS:
                 raise ValueError(
@@ -103,19 +134,36 @@ class Graph:
                 if not np.isfinite(value).all():
                     raise ValueError(f"the {name} of {node.operator} is not finite")
             # The product with a row of another robot would be no row.
-            factors = node.inputs[1:2] if node.operator in ("Gemm", "MatMul") else ()
-            if not self.tensors.keys() >= set(factors):
+            factors = node.inputs[1 : 1 + _FACTORS.get(node.operator, 0)]
+            if not self.tensors.keys() >= set(filter(None, factors)):
                 raise ValueError(f"the second factor of {node.operator} must be a tensor")
             known |= set(node.outputs)
-        if self.output not in known:
-            raise ValueError(f"no operator computes the output {self.output}")
+        for output in (self.output, *(state.output for state in self.states)):
+            if output not in known:
+                raise ValueError(f"no operator computes the output {output}")
+
+    def initial(self, rows: int) -> tuple[FloatArray, ...]:
+        """Returns the states before the first evaluation."""
+        return tuple(np.zeros((1, rows, state.width)) for state in self.states)
+
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        """Returns the output of each row for its first states, as ``step`` does."""
+        return self.step(rows, self.initial(len(rows)))[0]
 
     @np.errstate(all="ignore")  # the numbers of a simulation that diverged
-    def __call__(self, rows: FloatArray) -> FloatArray:
-        """Returns the output of each row, ``(n, outputs)``, for rows of ``(n, inputs)``."""
+    def step(
+        self, rows: FloatArray, states: Sequence[FloatArray]
+    ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """Returns the output of each row, ``(n, outputs)``, and the next states.
+
+        Args:
+            rows: Inputs, ``(n, inputs)``.
+            states: Those of ``initial``, or of the last evaluation.
+        """
         # In the order of C: otherwise numpy sums along a row in another order than of one row.
         rows = np.ascontiguousarray(rows)
         values: dict[str, FloatArray] = {**self.tensors, self.input: rows}
+        values |= {own.input: each for own, each in zip(self.states, states, strict=True)}
         left = MAX_NUMBERS * len(rows)
         for node in self.nodes:
             arguments: list[Any] = [values[name] if name else None for name in node.inputs]
@@ -126,7 +174,7 @@ class Graph:
                 raise ValueError(f"{node.operator} of the shapes {shapes}: {error}") from error
             left -= sum(map(np.size, results))
             values.update(zip(node.outputs, results, strict=False))
-        return values[self.output]
+        return values[self.output], tuple(values[state.output] for state in self.states)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Graph):
@@ -139,7 +187,8 @@ class Graph:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the operators and the tensors."""
-        shape = [self.input, self.output, self.inputs, self.outputs]
+        states = [[s.input, s.output, s.width] for s in self.states]
+        shape = [self.input, self.output, self.inputs, self.outputs, *states]
         nodes = [[n.operator, n.inputs, n.outputs, n.attributes] for n in self.nodes]
         digest = hashlib.sha256(json.dumps([shape, nodes]).encode())
         for name, tensor in sorted(self.tensors.items()):
@@ -195,9 +244,15 @@ def _results(node: Node, arguments: "Arguments", left: int) -> Sequence[FloatArr
     return results
 
 
-_BY_SHAPE = ("Gemm", "MatMul", "Concat", "Split", "Slice", "Reshape", "Clip", "LayerNormalization")
+_FACTORS: Mapping[str, int] = MappingProxyType({"Gemm": 1, "MatMul": 1, "GRU": 3, "LSTM": 3})
+"""Number of inputs, after the first, that must be tensors."""
+
+_BY_SHAPE = (
+    *("Gemm", "MatMul", "Concat", "Split", "Slice", "Reshape", "Clip", "LayerNormalization"),
+    *("Squeeze", "Unsqueeze", "GRU", "LSTM"),
+)
 """Operators whose arguments do not broadcast; none makes more numbers than it is given, but a
-product, of its tensor's rows."""
+product or a cell, of its tensor's rows."""
 
 
 # ---------------------------------------------------------------- operators
@@ -210,6 +265,8 @@ Operator = Callable[[Arguments, Attributes], Sequence[FloatArray]]
 
 def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     """Returns ``rows @ matrix.T``; BLAS sums in an order that depends on the number of rows."""
+    if np.shape(rows)[-1] != np.shape(matrix)[-1]:  # einsum would repeat a single number
+        raise ValueError("a product of other sizes")
     return np.asarray(np.einsum("ni,ji->nj", np.ascontiguousarray(rows), matrix))
 
 
@@ -310,6 +367,89 @@ def _softmax(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArra
     return [raised / raised.sum(axis=-1, keepdims=True)]
 
 
+def _axes(arguments: Arguments, attributes: Attributes) -> list[int]:
+    """Returns the axes of ``Squeeze`` and ``Unsqueeze``, which were attributes up to version 11."""
+    given = arguments[1] if len(arguments) > 1 else attributes.get("axes", ())
+    return [int(axis) for axis in np.ravel(given)]
+
+
+def _unsqueezed(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    x, axes = arguments[0], _axes(arguments, attributes)
+    if axes not in ([0], [-3]) or x.ndim != 2:
+        raise ValueError("expected axis 0 of rows")
+    return [x[np.newaxis]]
+
+
+def _squeezed(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    x, axes = arguments[0], _axes(arguments, attributes)
+    if not axes or any(axis % x.ndim >= x.ndim - 2 for axis in axes):
+        raise ValueError("expected axes before that of the robots")
+    return [np.squeeze(x, tuple(axes))]
+
+
+def _recurrent(
+    arguments: Arguments,
+    attributes: Attributes,
+    gates: int,
+    cell: Callable[..., Sequence[FloatArray]],
+) -> Sequence[FloatArray]:
+    """Returns the outputs of a recurrent cell of one direction after one time step.
+
+    Args:
+        arguments: Rows, ``(1, n, inputs)``, both matrices, bias, lengths, states.
+        attributes: Those of the node.
+        gates: Number of its gates.
+        cell: Function from the product of the rows, ``(n, gates * width)``, the matrix of the
+            states, both biases and the rows of the states to the next rows of the states.
+    """
+    x, matrix, own, *more = arguments
+    more += [None] * (4 - len(more))
+    bias, lengths, states = more[0], more[1], more[2:]
+    width, allowed = own.shape[-1], {"hidden_size", "linear_before_reset", "num_outputs"}
+    if x.ndim != 3 or len(x) != 1 or lengths is not None or len(states) > 2:
+        raise ValueError("expected one time step of rows")
+    if own.shape != (1, gates * width, width) or matrix.shape[:2] != own.shape[:2]:
+        raise ValueError("expected weights of one direction")
+    if others := {name for name, value in attributes.items() if value} - allowed:
+        raise ValueError(f"its {', '.join(sorted(others))} is not supported")
+    if bias is None:
+        bias = np.zeros((1, 2 * gates * width))
+    rows = [np.zeros((x.shape[1], width)) if state is None else state[0] for state in states]
+    results = cell(_matmul(x[0], matrix[0]), own[0], *np.split(bias[0], 2), *rows)
+    return [results[0][np.newaxis, np.newaxis], *(each[np.newaxis] for each in results)]
+
+
+def _lstm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    def cell(
+        x: FloatArray, own: FloatArray, bias: FloatArray, back: FloatArray, *states: FloatArray
+    ) -> Sequence[FloatArray]:
+        hidden, kept = states
+        gates = x + _matmul(hidden, own) + (bias + back)
+        enter, leave, forget, new = np.split(gates, 4, axis=1)
+        kept = _sigmoid(forget) * kept + _sigmoid(enter) * np.tanh(new)
+        return [_sigmoid(leave) * np.tanh(kept), kept]
+
+    return _recurrent(arguments, attributes, 4, cell)
+
+
+def _gru(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
+    def cell(
+        x: FloatArray, own: FloatArray, bias: FloatArray, back: FloatArray, *states: FloatArray
+    ) -> Sequence[FloatArray]:
+        hidden, width = states[0], own.shape[1]
+        end = 2 * width  # of the weights of its two gates
+        gates = x[:, :end] + _matmul(hidden, own[:end]) + (bias + back)[:end]
+        update, reset = np.split(_sigmoid(gates), 2, axis=1)
+        if attributes.get("linear_before_reset"):
+            past = reset * (_matmul(hidden, own[end:]) + back[end:])
+        else:
+            past = _matmul(reset * hidden, own[end:]) + back[end:]
+        new = np.tanh(x[:, end:] + bias[end:] + past)
+        return [(1 - update) * new + update * hidden]
+
+    return _recurrent(arguments, attributes, 3, cell)
+
+
 _FLOATS, _INTEGERS = (1, 10, 11, 16), (2, 3, 4, 5, 6, 7, 12, 13)
 """Types of numbers in ONNX."""
 
@@ -355,6 +495,10 @@ OPERATORS: Mapping[str, Operator] = MappingProxyType(
         "Flatten": _flat,
         "Reshape": _flat,
         "Softmax": _softmax,
+        "Squeeze": _squeezed,
+        "Unsqueeze": _unsqueezed,
+        "LSTM": _lstm,
+        "GRU": _gru,
         "Add": _of_two(np.add),
         "Sub": _of_two(np.subtract),
         "Mul": _of_two(np.multiply),

@@ -280,6 +280,7 @@ class PolicyBatch:
         self._pose = np.array(own.pose)
         self._scale, self._offset = np.array(action.scale), np.array(action.offset)
         self._output = np.zeros((count, policy.graph.outputs))
+        self._states = policy.graph.initial(count)
         self._history: list[list[FloatArray]] = []
         self._step = 0
 
@@ -287,7 +288,7 @@ class PolicyBatch:
         """Writes the commands of the next control step; see ``ControllerBatch``."""
         own = self._interface
         if self._step % own.decimation == 0:
-            output = self._graph(self._observation())
+            output, self._states = self._graph.step(self._observation(), self._states)
             most = math.inf if own.action.clip is None else own.action.clip
             self._output = np.clip(output, -most, most)
         targets[:] = own.holding

@@ -9,9 +9,15 @@ import onnxruntime
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.controllers.graph import OPERATORS, Graph, Node, layers
+from selfmodel.controllers.graph import OPERATORS, Graph, Node, State, layers
 from selfmodel.logs.policies import read_network
-from tests.helpers.policies import onnx_bytes, random_layers, random_network
+from tests.helpers.policies import (
+    CELLS,
+    onnx_bytes,
+    random_layers,
+    random_network,
+    recurrent_bytes,
+)
 
 UNARY = (
     *("Neg", "Abs", "Exp", "Sqrt", "Sin", "Cos", "Tanh", "Sigmoid", "Relu", "Softplus"),
@@ -36,6 +42,10 @@ MODELS: list[tuple[str, int]] = [
     ("y = Reshape(x, shape)", 6),
     ("a = Cast<to=11>(x); y = Cast<to=1>(a)", 6),
     ("a = Cast<to=7>(x); y = Cast<to=1>(a)", 6),
+    ("u = Unsqueeze(x, zero); y = Squeeze(u, zero)", 6),
+    ("u = Unsqueeze(x, zero); q, h = LSTM<hidden_size=2>(u, w4, r4, b4); y = Squeeze(h, zero)", 2),
+    ("u = Unsqueeze(x, zero); q = LSTM<hidden_size=2>(u, w4, r4); y = Squeeze(q, both)", 2),
+    ("u = Unsqueeze(x, zero); q, h = GRU<hidden_size=2>(u, w3, r3, b3); y = Squeeze(h, zero)", 2),
 ]
 W = np.eye(6, 5, dtype=np.float32) - 0.3
 TENSORS = {
@@ -48,6 +58,11 @@ TENSORS = {
     "sizes": np.array([1, 2, 3]),
     **{name: np.array([k]) for name, k in (("one", 1), ("two", 2), ("four", -4), ("minus", -1))},
     "end": np.array([2**63 - 1]),
+    "zero": np.array([0]),
+    "both": np.array([0, 1]),
+    **{f"w{k}": np.linspace(-1, 1, 12 * k, dtype=np.float32).reshape(1, 2 * k, 6) for k in (3, 4)},
+    **{f"r{k}": np.linspace(-2, 1, 4 * k, dtype=np.float32).reshape(1, 2 * k, 2) for k in (3, 4)},
+    **{f"b{k}": np.linspace(-1, 3, 4 * k, dtype=np.float32).reshape(1, 4 * k) for k in (3, 4)},
     "shape": np.array([-1, 6]),
 }
 
@@ -65,6 +80,40 @@ def test_an_operator_is_that_of_onnx(tmp_path: Path, code: str, outputs: int):
 
 def test_every_operator_is_compared_with_onnx():
     assert [name for name in OPERATORS if all(f"= {name}" not in code for code, _ in MODELS)] == []
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_recurrent_network_is_that_of_onnx_over_many_evaluations(tmp_path: Path, cell: str):
+    path = tmp_path / "network.onnx"
+    path.write_bytes(recurrent_bytes(cell, 6, 3))
+    network, session = read_network(path), onnxruntime.InferenceSession(path)
+    states, names = network.initial(7), [state.input for state in network.states]
+    theirs = [each.astype(np.float32) for each in states]
+    for seed in range(20):
+        rows = np.random.default_rng(seed).normal(size=(7, 6)).astype(np.float32)
+        output, states = network.step(rows.astype(float), states)
+        expected, *theirs = session.run(None, {"x": rows, **dict(zip(names, theirs, strict=True))})
+
+        np.testing.assert_allclose(output, expected, rtol=1e-6, atol=1e-6)
+        for own, other in zip(states, theirs, strict=True):
+            np.testing.assert_allclose(own, other, rtol=1e-6, atol=1e-6)
+    assert float(np.abs(states[0]).min()) > 0
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_row_of_a_recurrent_network_is_the_same_to_the_bit_in_any_batch(
+    tmp_path: Path, cell: str
+):
+    path = tmp_path / "network.onnx"
+    path.write_bytes(recurrent_bytes(cell, 6, 3))
+    network = read_network(path)
+    x = np.random.default_rng(2).normal(size=(4, 33, 6))
+    states, own = network.initial(33), network.initial(1)
+    for rows in x:
+        output, states = network.step(rows, states)
+        alone, own = network.step(rows[[20]], own)
+
+        assert output[20].tobytes() == alone.tobytes()
 
 
 def test_layers_are_the_plain_formula():
@@ -155,6 +204,9 @@ def node(operator: str, *inputs: str, out: str = "y", **attributes: float) -> No
         ),
         ([node("Slice", out="a"), GEMM], {}, "export with 10 or a later one"),
         ([node("Add", "x", "x", out="a"), GEMM], {}, "too many values"),
+        ([GEMM, Node("Gemm", ("y", "m"), ("y",))], {"m": np.ones((3, 2))}, "of other sizes"),
+        ([node("Unsqueeze", "s", out="a"), GEMM], {"s": np.array([1.0])}, "expected axis 0 of ro"),
+        ([node("Squeeze", "s", out="a"), GEMM], {"s": np.array([0.0])}, "before that of the robot"),
         ([Node("Gemm", ("w", "x"), ("a",)), GEMM], {}, "second factor of Gemm must be a tensor"),
         ([GEMM] * 1001, {}, "it has 1001 operators, expected at most 1000"),
     ],
@@ -175,3 +227,22 @@ def test_networks_are_equal_when_their_content_is():
     assert graph(GEMM) != graph(GEMM, w=np.ones((2, 3)) + 1e-9)
     assert graph(GEMM) != graph(replace(GEMM, attributes=(("alpha", 2.0), ("transB", 1.0))))
     assert graph(GEMM) != "a network"
+
+
+@pytest.mark.parametrize(
+    ("state", "match"),
+    [
+        (State("h", "h1", 0), "numbers of the state h, got 0"),
+        (State("h", "h1", 2**60), "numbers of the state h, got"),
+        (
+            State("h", "h1", 2),
+            r"the state h1 has the shape \(1, 2, 3\), expected that of h, \(1, 2",
+        ),
+        (State("h", "z", 3), "no operator computes the output z"),
+    ],
+)
+def test_a_state_that_does_not_come_back_is_refused(state: State, match: str):
+    nodes = (GEMM, Node("Unsqueeze", ("x", "zero"), ("h1",)))
+    tensors = {"w": np.ones((2, 3)), "zero": np.zeros(1)}
+    with pytest.raises(ValueError, match=match):
+        Graph("x", "y", 3, 2, nodes, tensors, (state,))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,11 +26,11 @@ def seen(own: Policy, steps: int, sense: Callable[[PolicyBatch, int], None] = fe
     batch, rows = own.batch(np.empty((1, 0)), [frozenset()]), []
     network = batch._graph
 
-    def spy(observation: np.ndarray) -> np.ndarray:
+    def spy(observation: np.ndarray, states: tuple) -> tuple:
         rows.append(observation[0].tolist())
-        return network(observation)
+        return network.step(observation, states)
 
-    batch._graph = spy
+    batch._graph = SimpleNamespace(step=spy)
     for k in range(steps):
         sense(batch, k)
         batch.step(np.empty((1, len(MOTORS))))

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from selfmodel.arguments import read_controller
 from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, make_batch
+from selfmodel.controllers.graph import Graph
 from selfmodel.controllers.policy import Policy
 from selfmodel.errors import InputError, TrialError
 from selfmodel.faults.hypothesis import INTACT
@@ -34,7 +35,13 @@ from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.bench import NAMES, STEPS, Bench, bench_robot, observation
 from tests.helpers.command import SMALL, printed, refused, succeeds
 from tests.helpers.hostile import unstable
-from tests.helpers.policies import policy_of, save_layers, save_policy
+from tests.helpers.policies import (
+    POLICY,
+    policy_of,
+    recurrent_bytes,
+    save_layers,
+    save_policy,
+)
 from tests.helpers.robots.arms import arm
 
 DAMAGE = "break:back_left_knee"
@@ -82,6 +89,30 @@ def test_a_trial_of_a_policy_file_has_a_log_with_the_policy_that_replays_to_the_
         "a policy of 35 observations, 8 motors"
         in succeeds("logs", "info", "walk.mcap", cwd=tmp_path).stdout
     )
+
+
+def test_a_trial_of_a_recurrent_policy_replays_to_the_bit_and_remembers(
+    tmp_path: Path, quadruped: Robot
+):
+    path = save_policy(tmp_path, quadruped, POLICY.replace("npz", "onnx"))
+    (tmp_path / "network.onnx").write_bytes(recurrent_bytes("LSTM", 35, 8))
+    run = ("--controller", str(path), "--steps", "50")
+    succeeds("trial", "quadruped", *run, "--out", "walk.mcap", cwd=tmp_path)
+    trial = read_log(tmp_path / "walk.mcap").trial
+    graph = trial.plan.controller.design.graph
+    without = replace(graph, states=(), tensors={**graph.tensors, **zeros_of(graph)})
+    forgets = replace(trial.plan.controller.design, graph=without)
+    runs = [(INTACT, Controller(each, np.zeros(0))) for each in (forgets,)]
+    again = Simulator(quadruped, 1).run(runs, 50, ["commands"]).trajectory["commands"][0]
+
+    assert replay(trial, INTACT, Simulator(quadruped, 1)).identical
+    assert again[0].tobytes() == trial.trajectory["commands"][0].tobytes()
+    assert not np.array_equal(again[1:], trial.trajectory["commands"][1:])
+
+
+def zeros_of(graph: Graph) -> dict[str, np.ndarray]:
+    """The states before the first evaluation of a row, as tensors."""
+    return {state.input: np.zeros((1, 1, state.width)) for state in graph.states}
 
 
 def test_the_policy_of_a_log_drives_another_trial(tmp_path: Path, quadruped: Robot):

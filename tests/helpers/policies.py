@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import onnx
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, ValueInfoProto, helper, numpy_helper
 
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.graph import Graph, layers
@@ -93,6 +94,30 @@ def random_network(*sizes: int, seed: int = 0, activation: str = "Tanh") -> Grap
     return layers([(w.astype(float), b.astype(float)) for w, b in pairs], activation)
 
 
+RNG = np.random.default_rng(5)
+CELLS: dict[str, tuple[str, dict[str, tuple[str, int]], int]] = {
+    "LSTM": ("LSTM<hidden_size=4>", {"h": ("h1", 4), "c": ("c1", 4)}, 4),
+    "GRU": ("GRU<hidden_size=4, linear_before_reset=1>", {"h": ("h1", 4)}, 3),
+    "plain GRU": ("GRU<hidden_size=4>", {"h": ("h1", 4)}, 3),
+}
+"""Recurrent cells as ONNX's text, their states, and their numbers of gates."""
+
+
+def recurrent_bytes(cell: str, inputs: int, outputs: int) -> bytes:
+    """Returns a model with a cell of four numbers and a layer, as frameworks export it."""
+    text, states, gates = CELLS[cell]
+    sizes = {"w": (1, gates * 4, inputs), "r": (1, gates * 4, 4), "b": (1, gates * 8)}
+    sizes |= {"out": (outputs, 4), "bias": (outputs,)}
+    tensors = {name: RNG.normal(size=size).astype(np.float32) for name, size in sizes.items()}
+    tensors |= {"zero": np.array([0]), "one": np.array([1])}
+    ends = ", ".join(after for after, _ in states.values())
+    code = (
+        f'u = Unsqueeze(x, zero); q, {ends} = {text}(u, w, r, b, "", {", ".join(states)}); '
+        "s = Squeeze(q, one); t = Squeeze(s, zero); e = Elu(t); y = Gemm<transB=1>(e, out, bias)"
+    )
+    return onnx_bytes(code, tensors, inputs, outputs, states=states)
+
+
 def save_layers(folder: Path, pairs: Layers) -> Path:
     """Writes ``network.npz`` of layers."""
     arrays = {f"weight{k}": weight for k, (weight, _) in enumerate(pairs)}
@@ -101,18 +126,33 @@ def save_layers(folder: Path, pairs: Layers) -> Path:
     return path
 
 
-def onnx_bytes(code: str, tensors: Mapping[str, np.ndarray], inputs: int, outputs: int) -> bytes:
+def onnx_bytes(
+    code: str,
+    tensors: Mapping[str, np.ndarray],
+    inputs: int,
+    outputs: int,
+    *,
+    states: Mapping[str, tuple[str, int]] = MappingProxyType({}),
+    layers: int = 1,
+) -> bytes:
     """Returns a model from ``x`` to ``y``, whose number of rows is open.
 
-    The code has ONNX's text of each operator, separated by ``;``.
+    The code has ONNX's text of each operator, separated by ``;``. A state has the name of its
+    input, and that of its output and its width.
     """
+
+    def value(name: str, *sizes: int | str) -> ValueInfoProto:
+        return helper.make_tensor_value_info(name, TensorProto.FLOAT, sizes)
+
     nodes = [onnx.parser.parse_node(line) for line in code.split(";")]
     used = {name for node in nodes for name in node.input}
+    before = [value(name, layers, "rows", width) for name, (_, width) in states.items()]
+    after = [value(name, layers, "rows", width) for name, width in states.values()]
     graph = helper.make_graph(
         nodes,
         "network",
-        [helper.make_tensor_value_info("x", TensorProto.FLOAT, ["rows", inputs])],
-        [helper.make_tensor_value_info("y", TensorProto.FLOAT, ["rows", outputs])],
+        [value("x", "rows", inputs), *before],
+        [value("y", "rows", outputs), *after],
         [numpy_helper.from_array(each, name) for name, each in tensors.items() if name in used],
     )
     opset = [helper.make_opsetid("", 18)]

@@ -23,11 +23,13 @@ from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.robot import Robot
 from tests.helpers.drivers import random_cpgs
 from tests.helpers.policies import (
+    CELLS,
     POLICY,
     onnx_bytes,
     policy_of,
     random_layers,
     random_network,
+    recurrent_bytes,
     save_layers,
     save_policy,
 )
@@ -221,14 +223,31 @@ def without_weights(graph: onnx.GraphProto) -> None:
     del graph.node[0].input[1:]
 
 
+def cell(text: str, width: int = 4, layers: int = 1) -> bytes:
+    """A recurrent network; its weights are of two directions where it has two numbers of each."""
+    own, directions = (2, 2) if "size=2" in text else (4, 1)
+    tensors = {"w": np.ones((directions, 3 * own, 6)), "r": np.ones((directions, 3 * own, own))}
+    tensors = {name: each.astype(np.float32) for name, each in tensors.items()}
+    text = text.replace("size=2", 'size=2, direction="bidirectional"')
+    code = f'u = Unsqueeze(x, z); q, h = {text}(u, w, r, "", "", h0); y = Squeeze(h, z)'
+    return onnx_bytes(
+        code, {**tensors, "z": np.array([0])}, 6, own, states={"h0": ("h", width)}, layers=layers
+    )
+
+
 @pytest.mark.parametrize(
     ("data", "match"),
     [
         (b"no model", "expected a network as ONNX"),
-        (b"", "expected one input and an output, got the inputs none"),
+        (b"", "expected one input and an output, .* got the inputs none and the outputs none"),
         (edited(external), "its weights are in another file: export it with weights inside"),
         (edited(open_ended), "its input has no fixed size: export it with one"),
-        (edited(recurrent), "expected one input and an output, got the inputs x, h0"),
+        (edited(recurrent), "expected one input .* got the inputs x, h0 and the outputs y"),
+        (cell("GRU<hidden_size=4>", layers=2), r"one layer, \(1, 1, width\), in the input h0, got"),
+        (cell('GRU<hidden_size=4, activations=["Relu", "Tanh"]>'), "activations .* not supported"),
+        (cell("GRU<hidden_size=4, clip=1.0>"), "its clip is not supported"),
+        (cell("GRU<hidden_size=4>", width=5), "GRU of the shapes"),
+        (cell("GRU<hidden_size=2>"), "expected weights of one direction"),
         (edited(without_weights), "expected a network as ONNX"),
         (onnx_bytes("y = Erf(x)", {}, 6, 6), "the operator Erf is not supported"),
     ],
@@ -313,6 +332,17 @@ def test_a_policy_comes_back_equal_from_a_file(
     rows = np.random.default_rng(0).normal(size=(3, again.design.graph.inputs))
     assert again.design.graph(rows).tobytes() == policy.design.graph(rows).tobytes()
     assert again != policy_of(tmp_path, quadruped, POLICY.replace("0.4", "0.5"))
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_recurrent_policy_comes_back_equal(tmp_path: Path, quadruped: Robot, cell: str):
+    path = save_policy(tmp_path, quadruped, POLICY.replace("npz", "onnx"))
+    saved(tmp_path, recurrent_bytes(cell, 35, 8))
+    before = Controller(read_policy(path, quadruped), np.zeros(0))
+    again = parse_controller(controller_bytes(before), "here")
+
+    assert again == before
+    assert again.design.graph.states == before.design.graph.states != ()
 
 
 def test_weights_that_float32_lacks_and_names_of_any_kind_come_back(policy: Controller):
