@@ -33,7 +33,15 @@ from selfmodel.recovery.repair import (
     layered,
 )
 from selfmodel.recovery.repertoire import Repertoire
-from selfmodel.recovery.scores import DISPLACEMENT, SCORES, TRACKING, UPRIGHT, Score, checked
+from selfmodel.recovery.scores import (
+    DISPLACEMENT,
+    SCORES,
+    TRACKING,
+    UPRIGHT,
+    VELOCITY,
+    Score,
+    checked,
+)
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
@@ -268,7 +276,7 @@ def score(name: str, robot: str, entry: Entry) -> Score:
     if name in SCORES:
         return SCORES[name]
     if name != RETURN:
-        found = _plug_in("score", name, "selfmodel.scores", (*SCORES, RETURN, TRACKING))
+        found = _plug_in("score", name, "selfmodel.scores", (*SCORES, RETURN, TRACKING, VELOCITY))
         if not isinstance(found, Score):
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, ControllerBatch, Design
-from selfmodel.controllers.policy import VELOCITY, Policy, PolicyBatch, gravity
+from selfmodel.controllers.policy import PolicyBatch, gravity
 
 OFFSET = 0.5
 """Largest offset of a motor, as a fraction of the half width of its command range."""
@@ -78,14 +78,6 @@ class Compensated(Design):
         return cls(own.sensors, own.motors, ranges=own.ranges, base=inner, feedback=feedback)
 
     @property
-    def shifts_velocity(self) -> bool:
-        """Whether the controller within is a policy that observes a commanded velocity."""
-        design = self.base.design
-        return isinstance(design, Policy) and any(
-            one.name == "velocity" for one in design.interface.terms
-        )
-
-    @property
     def hidden(self) -> int:
         """Number of hidden neurons of the controller within."""
         return self.base.design.hidden
@@ -107,10 +99,15 @@ class Compensated(Design):
         return self.base.design.neutral
 
     @property
+    def velocity(self) -> tuple[float, ...] | None:
+        """That of the controller within, without a shift."""
+        return self.base.design.velocity
+
+    @property
     def weights(self) -> int:
         """Length of a genome."""
         per_motor = 2 + (RESPONSES if self.feedback else 0)
-        return per_motor * len(self.motors) + (VELOCITY if self.shifts_velocity else 0)
+        return per_motor * len(self.motors) + len(self.velocity or ())
 
     @property
     def description(self) -> str:
@@ -138,7 +135,7 @@ class Compensated(Design):
     def decode(self, genomes: FloatArray) -> "Layer":
         """Returns the numbers of genomes, ``(n, weights)``."""
         motors, half = len(self.motors), np.array([half for _, half in self.ranges])
-        ends = np.cumsum([motors, motors, VELOCITY if self.shifts_velocity else 0])
+        ends = np.cumsum([motors, motors, len(self.velocity or ())])
         offset, gain, shift, response = np.split(genomes, ends, axis=1)
         felt = motors if self.feedback else 0
         scale = np.array([TILT, TILT, TURN, TURN, TURN])

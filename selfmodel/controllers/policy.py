@@ -231,6 +231,12 @@ class Policy(Design):
         )
 
     @property
+    def velocity(self) -> tuple[float, ...] | None:
+        """That of its interface, if it observes it."""
+        observed = any(term.name == "velocity" for term in self.interface.terms)
+        return self.interface.velocity if observed else None
+
+    @property
     def weights(self) -> int:
         """No weight is evolved."""
         return 0

@@ -17,8 +17,11 @@ from .scores import (
     DISPLACEMENT as DISPLACEMENT,
     ENERGY as ENERGY,
     STEPS as STEPS,
-    Reference as Reference,
     Score as Score,
-    tracking as tracking,
     upright_within as upright_within,
+)
+from .tracking import (
+    Reference as Reference,
+    following as following,
+    tracking as tracking,
 )

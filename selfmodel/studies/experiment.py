@@ -30,13 +30,13 @@ from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import (
     TRACKING,
     UPRIGHT,
-    Reference,
+    VELOCITY,
     Score,
     check_measurable,
     observed_of,
-    tracking,
     upright_within,
 )
+from selfmodel.recovery.tracking import Reference, following, tracking
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import RealityGap
@@ -194,8 +194,8 @@ def choose_score(
     """Returns the score of that name for a robot.
 
     Args:
-        name: A name of ``SCORES``, ``return`` or ``tracking``; the name of an
-            entry point in the group ``selfmodel.scores``, or ``package.module:object``.
+        name: A name of ``SCORES``, ``return``, ``tracking`` or ``velocity``; the name of an entry
+            point in the group ``selfmodel.scores``, or ``package.module:object``.
         entry: The robot.
         design: Design of the controllers.
         steps: Control steps of a trial.
@@ -213,12 +213,17 @@ def choose_score(
             stops.
     """
     robot = entry.robot()
-    check_score(name, entry)
+    commanded = gait.design.velocity if gait is not None and name == VELOCITY else None
+    if commanded is None:
+        check_score(name, entry)
     if reference is not None and name != TRACKING:
         raise InputError(f"--reference is a trajectory for --score {TRACKING}, got {name}")
     limits = (max_speed, max_torque, max_self_collision)
     if any(limit is not None for limit in limits):
         return ChosenScore(_limited(name, limits), gait)
+    if commanded is not None:
+        check_measurable(score := following(commanded), robot)
+        return ChosenScore(score, gait)
     if name != TRACKING:
         return ChosenScore(plugins.score(name, robot.name, entry), gait)
     if reference is not None:
@@ -254,6 +259,11 @@ def _limited(name: str, limits: Sequence[float | None]) -> Score:
 
 def check_score(name: str, entry: Entry) -> None:
     """Checks that a robot has a score of that name, which can be measured on it."""
+    if name == VELOCITY:
+        raise InputError(
+            f"--score {VELOCITY} is of the velocity that a policy is commanded: give --controller "
+            f"policy.toml with the term velocity, or another score"
+        )
     if name != TRACKING:
         robot = entry.robot()
         check_measurable(plugins.score(name, robot.name, entry), robot)

@@ -19,6 +19,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.recovery.repair import layered
+from selfmodel.recovery.tracking import following
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.domain import (
     DomainDistribution,
@@ -339,6 +340,19 @@ RECOVER = (
     *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
     *("--gap", "0.05", "--out", "run", "--json"),
 )
+
+
+@pytest.mark.search
+def test_a_recovery_of_a_policy_is_scored_by_the_velocity_that_it_is_commanded(
+    tmp_path: Path, quadruped: Robot
+):
+    policy_of(tmp_path, quadruped, "velocity = [0.2, 0.0, 0.0]\n" + POLICY)
+    found = printed(*RECOVER, "--controller", "policy.toml", "--score", "velocity", cwd=tmp_path)
+    trial = read_log(tmp_path / found["trials"][0]["log"]).trial
+
+    assert found["score"]["name"] == "velocity"
+    assert 0 < found["score"]["before"] == following((0.2, 0, 0)).of_trial(quadruped, INTACT, trial)
+    refused(*RECOVER, "--score", "velocity", said="give --controller policy.toml", cwd=tmp_path)
 
 
 def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(

@@ -14,14 +14,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.scores import (
-    ENERGY,
-    UPRIGHT,
-    Reference,
-    Score,
-    check_measurable,
-    upright_within,
-)
+from selfmodel.recovery.scores import ENERGY, UPRIGHT, Score, check_measurable, upright_within
+from selfmodel.recovery.tracking import Reference
 from selfmodel.robot.designs import cpg_for, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

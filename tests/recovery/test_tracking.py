@@ -1,12 +1,18 @@
-"""Promises of the score of following a joint trajectory."""
+"""Promises of the scores of following a joint trajectory and a commanded velocity."""
+
+import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.scores import Reference, tracking
+from selfmodel.recovery.scores import check_measurable
+from selfmodel.recovery.tracking import Reference, following, tracking
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_cpgs
@@ -89,3 +95,70 @@ def test_an_unusable_reference_is_refused(
 ):
     with pytest.raises(InputError, match=sentence):
         tracking(Reference(hinges, time, positions), arm())
+
+
+# ---------------------------------------------------------------- a commanded velocity
+
+COMMANDED = (0.8, -0.3, 0.4)
+STEPS = 200
+TURNED = Rotation.from_euler("z", 2.0)
+
+
+def walked(robot: Robot, velocity: tuple[float, ...] = COMMANDED, **signals: object) -> Trajectory:
+    """A run of a robot that has turned, and moves in its own frame as told."""
+    forward, left, turn = velocity
+    rows = {
+        "base_position": (0.0, 0.0, robot.standing_height),
+        "base_orientation": TURNED.as_quat(scalar_first=True),
+        "base_linear_velocity": TURNED.apply((forward, left, 0.0)),
+        "base_angular_velocity": (0.0, 0.0, turn),
+    }
+    every = {name: np.tile(row, (1, STEPS, 1)) for name, row in rows.items()} | signals
+    return Trajectory(robot.anatomy.names, np.arange(STEPS) * robot.control_timestep, every)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "expected"),
+    [
+        (COMMANDED, 1.0),
+        ((0.3, -0.3, 0.4), (math.exp(-1) + 0.5) / 1.5),
+        ((0.8, 0.2, 0.4), (math.exp(-1) + 0.5) / 1.5),
+        ((0.8, -0.3, -0.6), (1 + 0.5 * math.exp(-4)) / 1.5),
+        ((-9.0, 0.0, 9.0), 0.0),
+    ],
+)
+def test_the_score_of_a_velocity_is_the_mean_reward_of_training(
+    quadruped: Robot, velocity: tuple[float, ...], expected: float
+):
+    score = following(COMMANDED)
+    (found,) = score.of(quadruped, INTACT, walked(quadruped, velocity))
+
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert (score.name, score.unit, score.grows_with_time) == ("velocity", "", True)
+
+
+def test_steps_after_a_fall_earn_nothing_and_those_without_a_measurement_are_left_out(
+    quadruped: Robot,
+):
+    position = np.tile((0.0, 0.0, quadruped.standing_height), (1, STEPS, 1))
+    position[:, 50:, 2] = 0.0
+    fallen = walked(quadruped, base_position=position)
+    turn = np.tile((0.0, 0.0, COMMANDED[2]), (1, STEPS, 1))
+    turn[:, 100:] = np.nan
+
+    assert following(COMMANDED).of(quadruped, INTACT, fallen) == pytest.approx(50 / STEPS)
+    seen = walked(quadruped, base_angular_velocity=turn)
+    assert following(COMMANDED).of(quadruped, INTACT, seen) == pytest.approx(1)
+    none = walked(quadruped, base_angular_velocity=turn * np.nan)
+    assert np.isnan(following(COMMANDED).of(quadruped, INTACT, none))
+
+
+def test_the_velocity_of_a_robot_without_odometry_or_with_a_fixed_base_is_refused(
+    quadruped: Robot,
+):
+    score, seen = following(COMMANDED), set(SIGNALS) - {"base_linear_velocity"}
+    check_measurable(score, quadruped)
+    with pytest.raises(InputError, match=r"base_linear_velocity.*velocity.*--score"):
+        check_measurable(score, quadruped, seen)
+    with pytest.raises(InputError, match="fixed"):
+        check_measurable(score, arm())
