@@ -9,7 +9,8 @@ import onnxruntime
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from selfmodel.controllers.graph import OPERATORS, Graph, Node, State, layers
+from selfmodel.controllers.graph import Graph, Node, State, layers
+from selfmodel.controllers.operators import OPERATORS
 from selfmodel.logs.policies import read_network
 from tests.helpers.policies import (
     CELLS,
