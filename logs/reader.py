@@ -14,6 +14,7 @@ from selfmodel.arrays import BoolArray, FloatArray, frozen
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import played_back
 from selfmodel.errors import InputError
+from selfmodel.files import path_of
 from selfmodel.logs import errors, records
 from selfmodel.logs.controllers import parse_controller
 from selfmodel.logs.log_file import Contents, Messages, read_contents
@@ -101,9 +102,9 @@ def read_log(path: str | Path) -> TrialLog:
 
     Raises:
         LogError: A check failed.
-        InputError: The file does not exist.
+        InputError: The file does not exist, or the type is another.
     """
-    return interpret(read_contents(Path(path), (records.HIDDEN,)))
+    return interpret(read_contents(path_of(path, "a log"), (records.HIDDEN,)))
 
 
 def interpret(contents: Contents) -> TrialLog:

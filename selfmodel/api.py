@@ -8,14 +8,16 @@ from pathlib import Path
 from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, RobotSource, TrialSource
 from selfmodel.controllers.controller import CommandSource, Controller, Design
+from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, items_of, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
+from selfmodel.files import path_of
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.records import TrialHeader
@@ -34,7 +36,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.studies.experiment import draw_reality
+from selfmodel.studies.experiment import choose_score, draw_reality
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan, by_stage
 
@@ -44,9 +46,9 @@ def evolve_controller(
     hypothesis: Hypothesis | str = INTACT,
     *,
     design: str | Design = "network",
-    seeds: Sequence[Controller] = (),
+    seeds: Controller | str | Path | Sequence[Controller | str | Path] = (),
     settings: Settings | None = None,
-    score: Score = DISPLACEMENT,
+    score: Score | str = DISPLACEMENT,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = ignore,
@@ -63,9 +65,9 @@ def evolve_controller(
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         hypothesis: The faults of the robot in simulation, or their notation.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
-        seeds: Controllers of the first generation, in addition to random controllers.
+        seeds: Controllers of the first generation, or their files, in addition to random ones.
         settings: Parameters of the search; the paper's by default.
-        score: Fitness; the forward displacement by default.
+        score: Fitness, its name, or ``package.module:object``; the displacement by default.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the search.
@@ -74,15 +76,16 @@ def evolve_controller(
         InputError: The design or the robot is unknown, the notation is invalid, a motor has no
             command range, or the robot cannot have the score.
     """
-    arguments.check_seed(seed)
-    robot = arguments.robot_of(robot)
-    check_measurable(score, robot)
-    chosen = plugins.design(design, robot) if isinstance(design, str) else design
-    repair = RepairSearch(Simulator(robot, threads), settings or Settings(), chosen, score=score)
+    seed, settings = whole_number("seed", seed, 0, least=0), arguments.settings_of(settings)
+    arguments.check_options(on_event)
+    robot = (entry := arguments.entry_of(robot)).robot()
+    chosen = arguments.design_of(design, robot)
+    fitness, _ = choose_score(score, entry, chosen, steps=settings.steps, seed=seed)
+    repair = RepairSearch(Simulator(robot, threads), settings, chosen, score=fitness)
     repaired = repair(
-        (arguments.hypothesis_of(hypothesis, robot),),
+        (arguments.parse_hypothesis(hypothesis, robot),),
         partial(assumed_uncertainty, robot),
-        seeds,
+        [arguments.controller_of(one, robot) for one in items_of(seeds)],
         recovery_loop.random_stream(seed, "repair"),
         on_event,
     )
@@ -91,7 +94,7 @@ def evolve_controller(
 
 def run_trial(
     physical: PhysicalRobot,
-    controller: CommandSource,
+    controller: CommandSource | str | Path,
     path: str | Path,
     *,
     robot: RobotSource,
@@ -113,7 +116,7 @@ def run_trial(
 
     Args:
         physical: The physical robot.
-        controller: Controller or playback that drives the robot.
+        controller: Controller or playback that drives the robot, or the path of a controller.
         path: Name of the log, ``NAME.mcap``; the trial is called NAME.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         steps: Control steps of the trial.
@@ -121,18 +124,21 @@ def run_trial(
         seed: Seed of the trial, for the record.
 
     Raises:
-        InputError: The log exists, NAME is no name of a trial, or the controller does not fit the
-            robot.
+        InputError: The log exists, NAME is no name of a trial, the controller does not fit the
+            robot, or an argument is invalid.
         LogError: The robot stopped early, or the log failed its verification.
         TrialError: The physical robot could not finish the trial.
     """
-    arguments.check_seed(seed)
-    path, header = Path(path), TrialHeader(Settings())
-    plan = TrialPlan(path.stem, stage, controller, steps, seed)
-    return physical_trial.run_trial(physical, plan, path, arguments.robot_of(robot), header)
+    arguments.check_physical(physical)
+    path, header = path_of(path, "the new log"), TrialHeader(Settings())
+    robot, seed = arguments.load_robot(robot), whole_number("seed", seed, 0, least=0)
+    if not isinstance(controller, Playback):
+        controller = arguments.controller_of(controller, robot)
+    plan = TrialPlan(path.stem, stage, controller, whole_number("steps", steps, 1000), seed)
+    return physical_trial.run_trial(physical, plan, path, robot, header)
 
 
-def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
+def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:
     """Writes a trial, such as one of ``Trial.from_arrays``, as a new log.
 
     Example:
@@ -143,7 +149,7 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
         60
 
     Args:
-        trial: The trial; its step timing is not written.
+        trial: The trial, or the path of its log; its step timing is not written.
         path: Name of the log, ``NAME.mcap``; it must not exist.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
 
@@ -151,9 +157,10 @@ def write_log(trial: Trial, path: str | Path, robot: RobotSource) -> Path:
         InputError: The log exists, or the trial does not fit the robot.
         LogWriteError: The disk is full, or failed.
     """
+    trial = arguments.trial_of(trial)
     return write_trial(
-        Path(path),
-        arguments.robot_of(robot),
+        path_of(path, "the new log"),
+        arguments.load_robot(robot),
         trial.plan,
         samples_of(trial.trajectory),
         TrialHeader(Settings()),
@@ -189,7 +196,7 @@ def calibrate(
             needs.
     """
     (healthy,), _ = arguments.trials_of(trials)
-    return calibration.calibrate(arguments.robot_of(robot), healthy, thread_count(threads))
+    return calibration.calibrate(arguments.load_robot(robot), healthy, thread_count(threads))
 
 
 def replay(
@@ -217,16 +224,16 @@ def replay(
     Raises:
         InputError: The log is unusable, the robot is unknown, or the notation is invalid.
     """
-    ((logged,),), _ = arguments.trials_of([trial])
-    robot = arguments.robot_of(robot)
-    assumed = arguments.hypothesis_of(hypothesis, robot)
+    logged, tolerance = arguments.trial_of(trial), real_number("tolerance", tolerance, 0.0, 0.0)
+    robot = arguments.load_robot(robot)
+    assumed = arguments.parse_hypothesis(hypothesis, robot)
     return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)
 
 
 def diagnose(
     trials: TrialSource | Sequence[TrialSource],
     *,
-    healthy: TrialSource | Sequence[TrialSource] = (),
+    healthy: TrialSource | Sequence[TrialSource] | None = (),
     robot: RobotSource | None = None,
     comparator: str | Comparator = AUTO,
     kinds: KindSource = DEFAULT_KINDS,
@@ -270,10 +277,11 @@ def diagnose(
         InputError: There are no trials, a log is unusable, the comparator cannot judge a trial, or
             no kind applies to the robot.
     """
-    arguments.check_seed(seed)
-    own = None if robot is None else arguments.robot_of(robot)
+    seed = None if seed is None else whole_number("seed", seed, 0, least=0)
+    arguments.check_options(on_event, calibrate=calibrate)
+    own = None if robot is None else arguments.load_robot(robot)
     choose, searched = arguments.comparator_choice(comparator), arguments.kinds_of(kinds)
-    (to_explain, reference), logs = arguments.trials_of(trials, healthy)
+    (to_explain, reference), logs = arguments.trials_of(trials, () if healthy is None else healthy)
     if not to_explain:
         raise InputError("expected at least one trial to explain, got none")
     if own is None and len(logs) < len(to_explain) + len(reference):
@@ -290,7 +298,7 @@ def diagnose(
         robot=own or arguments.robot_of_logs(logs, None),
         choose_comparator=choose,
         kinds=searched,
-        settings=settings or logged.get(to_explain[0].path, Settings()),
+        settings=arguments.settings_of(settings or logged.get(to_explain[0].path)),
         seed=seed,
         calibrate=calibrate,
         threads=threads,
@@ -308,10 +316,10 @@ def recover(
     kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
     design: str | Design = "network",
-    gait: Controller | None = None,
+    gait: Controller | str | Path | None = None,
     calibrate: bool = True,
-    next_trial: recovery_loop.NextTrial = recovery_loop.by_repair,
-    score: Score | None = None,
+    next_trial: recovery_loop.NextTrial | str = recovery_loop.by_repair,
+    score: Score | str | None = None,
     repair: str | None = None,
     search: str | None = None,
     repertoire: Repertoire | str | Path | None = None,
@@ -346,12 +354,12 @@ def recover(
             separated by commas.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
-        gait: Controller with which the robot walks, such as its policy; ``design`` is then its own.
-            Evolved if not given.
+        gait: Controller with which the robot walks, such as its policy, or the path of its file;
+            ``design`` is then its own. Evolved if not given.
         calibrate: Whether the self-model is fitted to the trial before the failure.
-        next_trial: Chooses the controller of each trial after the failing one.
-        score: Fitness of the repair; by default the forward displacement until the first fall, or
-            the whole displacement for the paper's repair.
+        next_trial: Choice of the controllers of later trials, a function or its name.
+        score: Fitness of the repair, its name, or ``package.module:object``; by default the forward
+            displacement until the first fall, or the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; ``paper``, in one exact
             simulation; or ``compensate``, of a layer around ``gait``, the default with one.
         search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair, CMA-ES or the
@@ -366,17 +374,22 @@ def recover(
             not observed of the robot.
         TrialError: A physical robot could not finish a trial.
     """
-    arguments.check_seed(seed)
-    robot, count = arguments.robot_of(robot), thread_count(threads)
-    score = score or (DISPLACEMENT if repair == plugins.PAPER else UPRIGHT)
-    check_measurable(score, robot, observed_of(healthy, damaged))
-    chosen, searched = settings or Settings(), arguments.kinds_of(kinds)
-    drawn = plugins.design(design, robot) if isinstance(design, str) else design
+    arguments.check_physical(healthy, damaged)
+    arguments.check_options(on_event, calibrate=calibrate)
+    folder = path_of(folder, "a new or empty folder")
+    robot = (entry := arguments.entry_of(robot)).robot()
+    seed, count = whole_number("seed", seed, 0, least=0), thread_count(threads)
+    chosen, searched = arguments.settings_of(settings), arguments.kinds_of(kinds)
+    drawn = arguments.design_of(design, robot)
+    gait = None if gait is None else arguments.controller_of(gait, robot)
     if gait is not None:
         arguments.check_robot(gait.design, robot, "the gait")
     repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
+    score = score or (DISPLACEMENT if repair == plugins.PAPER else UPRIGHT)
+    score, gait = choose_score(score, entry, drawn, steps=chosen.steps, seed=seed, gait=gait)
+    check_measurable(score, robot, observed_of(healthy, damaged))
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
-    journal = create_journal(Path(folder), robot.anatomy, searched, calibrated=calibrate)
+    journal = create_journal(folder, robot.anatomy, searched, calibrated=calibrate)
     return recovery_loop.RecoveryLoop(
         simulator=Simulator(robot, count),
         choose_comparator=arguments.comparator_choice(comparator),
@@ -391,7 +404,7 @@ def recover(
         calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
         if calibrate
         else None,
-        next_trial=next_trial,
+        next_trial=plugins.next_trial(next_trial),
         score=score,
         make_repair=make_repair,
     ).run(healthy, damaged)
@@ -423,9 +436,9 @@ def simulated_robot(
         InputError: The level is out of range, the seed is negative, the robot is unknown, or the
             notation is invalid.
     """
-    arguments.check_seed(seed)
-    robot = arguments.robot_of(robot)
-    hidden = arguments.hypothesis_of(hypothesis, robot)
+    seed, gap = whole_number("seed", seed, 0, least=0), real_number("gap", gap, 0.05)
+    robot = arguments.load_robot(robot)
+    hidden = arguments.parse_hypothesis(hypothesis, robot)
     stream = 1 if hidden.faults else 0
     return SimulatedRobot(robot, hidden, draw_reality(robot, seed, gap), stream)
 

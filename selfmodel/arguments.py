@@ -3,9 +3,9 @@
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import UnionType
 
 import numpy as np
 
@@ -14,12 +14,12 @@ from selfmodel.comparators import PREFERENCE
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.choice import ComparatorChoice, chosen_comparator
-from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.errors import InputError
+from selfmodel.diagnosis.comparator import Comparator, as_comparator
+from selfmodel.errors import InputError, check_type, items_of
 from selfmodel.faults import KINDS, FaultKind
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
-from selfmodel.files import encodable, file_digest, read_file
+from selfmodel.files import encodable, file_digest, path_of, read_file
 from selfmodel.logs import LogError, TrialLog, load_controller, read_log
 from selfmodel.logs.repertoires import check_model, load_repertoire
 from selfmodel.logs.robots import common_robot, describe_difference
@@ -31,6 +31,7 @@ from selfmodel.robot.mjcf.load import check_compiles, load_mjcf
 from selfmodel.robot.mjcf.settings import MjcfSettings, parse_setting, read_settings
 from selfmodel.robot.mjcf.untrusted import MAX_TEXT
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration, Known, calibrate
 from selfmodel.tasks import Entry, entry
 from selfmodel.trials.signals import Names
@@ -45,14 +46,19 @@ RobotSource = Robot | str | Path
 TrialSource = Trial | str | Path
 """A trial, or the path of its log."""
 
-KindSource = str | Sequence[str | FaultKind]
-"""Names of fault kinds separated by commas, or a sequence of names and fault kinds."""
+KindSource = str | FaultKind | Sequence[str | FaultKind]
+"""Names of fault kinds separated by commas, a fault kind, or a sequence of names and kinds."""
+
+NOTATION = tuple(KINDS.values())
+"""The built-in kinds that a notation may name."""
+
+_ROBOT = 'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file'
 
 _MODEL_ENDINGS = (".xml", ".urdf", ".xacro")
 """Endings of models; a xacro is refused with the remedy."""
 
 
-def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
+def load_robot(name: RobotSource, settings: MjcfSettings | None = None) -> Robot:
     """Returns a robot by name, or the robot of an MJCF or URDF file.
 
     Example:
@@ -62,24 +68,25 @@ def load_robot(name: str | Path, settings: MjcfSettings | None = None) -> Robot:
 
     Args:
         name: ``quadruped``, ``hexapod``, ``suite-DOMAIN-TASK``, or the path of an MJCF or URDF
-            file.
+            file; a robot is returned as it is.
         settings: Settings of the file; None for those of the TOML file beside it.
 
     Raises:
-        InputError: The name is unknown, the file is no valid robot, or settings are given for a
-            robot by name.
+        InputError: The name is unknown, the file is no valid robot, settings are given for a
+            robot by name, or the type is another.
     """
-    if is_model(str(name)):
+    check_type(name, Robot | str | Path, _ROBOT)
+    if isinstance(name, str | Path) and is_model(str(name)):
         return load_mjcf(name, settings)
     if settings is not None:
         raise InputError(
             f"settings are for an MJCF or URDF file: {str(name)!r} is the name of a robot"
         )
-    return robot_entry(str(name)).robot()
+    return name if isinstance(name, Robot) else robot_entry(str(name)).robot()
 
 
 def parse_hypothesis(
-    text: str, robot: RobotSource, kinds: Sequence[FaultKind] = tuple(KINDS.values())
+    text: Hypothesis | str, robot: RobotSource, kinds: KindSource = NOTATION
 ) -> Hypothesis:
     """Returns the hypothesis of a text in notation.
 
@@ -90,36 +97,27 @@ def parse_hypothesis(
 
     Args:
         text: Terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, or
-            ``intact``.
+            ``intact``; a hypothesis is returned as it is.
         robot: The robot whose parts the text names, its name, or the path of its MJCF or URDF file.
-        kinds: The fault kinds that the text may name.
+        kinds: The fault kinds that the text may name, or their names.
 
     Raises:
         InputError: A term is malformed, or names an unknown kind or part.
     """
-    return parse(text, robot_of(robot).anatomy, kinds)
+    check_type(text, Hypothesis | str, 'a Hypothesis or notation such as "break:front_left_knee"')
+    if isinstance(text, Hypothesis):
+        return text
+    return parse(text, load_robot(robot).anatomy, kinds_of(kinds))
 
 
-def robot_of(source: RobotSource) -> Robot:
-    """Returns a robot, given as itself, by name or by MJCF or URDF file.
-
-    Raises:
-        InputError: The name is unknown, the file is no valid robot, or the type is another.
-    """
-    expected = 'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file'
-    _check_type(source, Robot | str | Path, expected)
-    return source if isinstance(source, Robot) else load_robot(source)
-
-
-def hypothesis_of(source: Hypothesis | str, robot: Robot) -> Hypothesis:
-    """Returns a hypothesis, given as itself or in notation.
-
-    Raises:
-        InputError: The notation is invalid for the robot, or the type is another.
-    """
-    expected = 'a Hypothesis or notation such as "break:front_left_knee"'
-    _check_type(source, Hypothesis | str, expected)
-    return source if isinstance(source, Hypothesis) else parse_hypothesis(source, robot)
+def entry_of(source: RobotSource) -> Entry:
+    """Returns the entry of a robot, whose model is loaded once; a ``Robot`` has no task."""
+    if isinstance(source, Robot):
+        return Entry(lambda: source)
+    check_type(source, str | Path, _ROBOT)
+    entry = robot_entry(str(source))
+    robot = entry.robot()
+    return replace(entry, robot=lambda: robot)
 
 
 def comparator_choice(source: Comparator | str) -> ComparatorChoice:
@@ -128,10 +126,16 @@ def comparator_choice(source: Comparator | str) -> ComparatorChoice:
     Raises:
         InputError: The name is unknown, or its object is no comparator.
     """
-    if source == AUTO:
+    if isinstance(source, str) and source == AUTO:
         return partial(chosen_comparator, PREFERENCE)
-    given = plugins.comparator(source) if isinstance(source, str) else source
-    return partial(chosen_comparator, PREFERENCE, given=given)
+    return partial(chosen_comparator, PREFERENCE, given=comparator_of(source))
+
+
+def comparator_of(source: Comparator | str) -> Comparator:
+    """Returns a comparator, given as itself or by name; see ``plugins.comparator``."""
+    if isinstance(source, str):
+        return plugins.comparator(source)
+    return as_comparator(source)
 
 
 def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:
@@ -141,9 +145,9 @@ def kinds_of(source: KindSource) -> tuple[FaultKind, ...]:
         InputError: There are none, a name is unknown, or an item has another type.
     """
     found: list[FaultKind] = []
-    for item in [source] if isinstance(source, str | FaultKind) else source:
-        _check_type(item, str | FaultKind, "a FaultKind or its name")
-        found += plugins.kinds(item) if isinstance(item, str) else [item]
+    for item in items_of(source):
+        check_type(item, str | FaultKind, "a FaultKind or its name")
+        found += [item] if isinstance(item, FaultKind) else plugins.kinds(str(item))
     if not found:
         raise InputError('expected at least one fault kind, got none: give kinds="break,jam"')
     return tuple(dict.fromkeys(found))
@@ -165,9 +169,9 @@ def trials_of(
         (group,) if isinstance(group, Trial | str | Path) else group for group in groups
     ]
     for sources in listed:
-        _check_type(sources, Sequence, expected)
+        check_type(sources, Sequence, expected)
         for source in sources:
-            _check_type(source, Trial | str | Path, expected)
+            check_type(source, Trial | str | Path, expected)
     logs = read_logs([Path(s) for sources in listed for s in sources if not isinstance(s, Trial)])
     read = iter(logs)
     found = [
@@ -177,16 +181,48 @@ def trials_of(
     return found, logs
 
 
-def _check_type(got: object, known: type | UnionType, expected: str) -> None:
-    if not isinstance(got, known):
-        remedy = ": give its attribute trial" if hasattr(got, "trial") else ""
-        raise InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
+def trial_of(source: TrialSource | Sequence[TrialSource]) -> Trial:
+    """Returns one trial, given as itself or as the path of its log, or in a sequence of one."""
+    (found,), _ = trials_of(source)
+    if len(found) != 1:
+        raise InputError(f"expected one trial or the path of its log, got {len(found)}: give one")
+    return found[0]
 
 
-def check_seed(seed: int | None) -> None:
-    """Raises ``InputError`` for a negative seed."""
-    if seed is not None and seed < 0:
-        raise InputError(f"expected a seed of 0 or above, got {seed}: give one such as seed=0")
+def settings_of(settings: Settings | None) -> Settings:
+    """Returns settings, the paper's for None, or raises ``InputError``."""
+    check_type(settings, Settings | None, "settings such as selfmodel.Settings(steps=500)")
+    return settings or Settings()
+
+
+def design_of(source: str | Design, robot: Robot) -> Design:
+    """Returns a design of controllers for a robot, given as itself or by name."""
+    check_type(source, str | Design, 'a Design or a name such as "network"')
+    return plugins.design(source, robot) if isinstance(source, str) else source
+
+
+def controller_of(source: object, robot: Robot) -> Controller:
+    """Returns a controller, given as itself or as the path of its file; see ``read_controller``."""
+    if isinstance(source, Controller):
+        return source
+    return read_controller(path_of(source, "a controller, or a Controller"), robot)
+
+
+def check_options(on_event: object, *, calibrate: object = True) -> None:
+    """Raises ``InputError`` for an observer that cannot be called, or no bool."""
+    if not callable(on_event):
+        raise InputError(f"expected a function as on_event, got {on_event!r:.80}: leave it out")
+    check_type(calibrate, bool | int | np.bool_, "True or False as calibrate")
+
+
+def check_physical(*robots: object) -> None:
+    """Raises ``InputError`` for an object that is no physical robot."""
+    for one in robots:
+        if not callable(getattr(one, "run", None)):
+            raise InputError(
+                f"expected a physical robot, with a method run, got {one!r:.80}: give "
+                f'selfmodel.simulated_robot("quadruped"), or an EnvironmentRobot'
+            )
 
 
 def repertoire_of(
@@ -203,7 +239,7 @@ def repertoire_of(
     if isinstance(source, Repertoire):
         found, named = source, "the repertoire"
     else:
-        found, named = load_repertoire(Path(source)), str(source)
+        found, named = load_repertoire(path_of(source, "a repertoire")), str(source)
     check_model(found, robot, named)
     if found.design != design:
         wanted, got = (f"a {one.name} of {one.weights} weights" for one in (design, found.design))

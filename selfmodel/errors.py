@@ -1,7 +1,11 @@
-"""The errors of selfmodel, and the parts of their sentences."""
+"""The errors of selfmodel, the parts of their sentences, and checks of arguments."""
 
 import difflib
+import math
 from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
+from pathlib import Path
+from types import UnionType
 
 
 class InputError(ValueError):
@@ -34,9 +38,67 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
         known: Every valid name.
     """
     names = [str(item) for item in known]
-    nearest = _nearest(name, names)
+    nearest = _nearest(str(name), names)
     hint = f"did you mean {listed(nearest)}? " if nearest else ""
     return InputError(f"unknown {what} {name!r}: {hint}the known ones are {listed(names)}")
+
+
+def check_type(got: object, known: type | UnionType, expected: str) -> None:
+    """Raises ``InputError`` for an object of another type; ``expected`` is part of its sentence."""
+    if not isinstance(got, known):
+        has_trial = "trials" in expected and hasattr(got, "trial")
+        remedy = ": give its attribute trial" if has_trial else ""
+        raise InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
+
+
+def real_number(
+    name: str, value: object, example: float, least: float = -math.inf, kind: str = "finite"
+) -> float:
+    """Returns an argument as a finite float; a bool is no number.
+
+    Raises:
+        InputError: It is no number of the kind, finite or whole, or less than the least.
+    """
+    if isinstance(value, Real) and not isinstance(value, bool):
+        number = float(value)
+        if math.isfinite(number) and number >= least and (kind != "whole" or number.is_integer()):
+            return number
+    bound = f" of {least:g} or above" if math.isfinite(least) else ""
+    raise InputError(
+        f"expected a {kind} number{bound} as {name}, got {value!r:.80}: give one such as "
+        f"{name}={example}"
+    )
+
+
+def whole_number(name: str, value: object, example: int, least: float = -math.inf) -> int:
+    """Returns an argument as an int, where that is exact, as of 1e3; see ``real_number``."""
+    number = real_number(name, value, example, least, "whole")
+    return int(value) if isinstance(value, Integral) else int(number)
+
+
+def items_of(source: object) -> list[object]:
+    """Returns the items of a sequence; anything else, such as a text, is one item."""
+    if isinstance(source, str) or not isinstance(source, Iterable):
+        return [source]
+    return list(source)
+
+
+def whole_numbers(name: str, source: object) -> tuple[int, ...]:
+    """Returns whole numbers of 0 or above, given as one or in a sequence."""
+    return tuple(whole_number(name, one, 0, least=0) for one in items_of(source))
+
+
+def real_numbers(name: str, source: object) -> tuple[float, ...]:
+    """Returns finite numbers, given as one or in a sequence."""
+    return tuple(real_number(name, one, 0.05) for one in items_of(source))
+
+
+def names_of(source: object, expected: str, also: type = Path) -> tuple[str, ...]:
+    """Returns texts, or objects of another type as texts, given as one or in a sequence."""
+    found = items_of(source)
+    for one in found:
+        check_type(one, str | also, expected)
+    return tuple(map(str, found))
 
 
 _MOST_COMPARED, _LONGEST_COMPARED = 1000, 200

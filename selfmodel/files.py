@@ -11,7 +11,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, check_type
+
+
+def path_of(source: object, what: str) -> Path:
+    """Returns a path that is given as a path or a text, or raises ``InputError``."""
+    check_type(source, str | Path, f"the path of {what}")
+    return Path(str(source))
 
 
 def read_file(path: Path, what: str, limit: int) -> bytes:

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_type, items_of, unknown_name
 from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
@@ -87,9 +87,61 @@ def comparator(name: str) -> Comparator:
     return as_comparator(_plug_in("comparator", name, "selfmodel.comparators", COMPARATORS), name)
 
 
+def _name_of(what: str, found: object, home: str, known: Mapping[str, object]) -> str:
+    """Returns the name by which another process finds an object.
+
+    Raises:
+        InputError: It is none of the known objects by name, nor a variable of the module ``home``.
+    """
+    if isinstance(found, str):
+        return found
+    names = [name for name, one in known.items() if one is found]
+    if home in sys.modules and home != "__main__":
+        own = vars(sys.modules[home]).items()
+        names += [f"{home}:{name}" for name, one in own if one is found]
+    if not names:
+        raise InputError(
+            f"expected a {what} that other processes find by name, got the object {found!r:.200}, "
+            f"which is no variable of the module {home or 'that defines it'}: give "
+            f"package.module:object, a variable of a file that can be imported"
+        )
+    return names[0]
+
+
+def comparator_names(source: object) -> tuple[str, ...]:
+    """Returns the names of comparators, given as one or in a sequence, as names or as themselves.
+
+    Raises:
+        InputError: An item is no comparator, or other processes do not find it by name.
+    """
+    names = []
+    for one in items_of(source):
+        found = one if isinstance(one, str) else as_comparator(one)
+        names.append(_name_of("comparator", found, type(one).__module__, COMPARATORS))
+    return tuple(names)
+
+
+def kinds_named(source: object) -> str:
+    """Returns the names of fault kinds, separated by commas; see ``comparator_names``."""
+    known = {kind.name: kind for kind in ALL_KINDS}
+    names = []
+    for one in items_of(source):
+        check_type(one, str | FaultKind, "a FaultKind or its name")
+        names.append(_name_of("kind", one, type(one).__module__, known))
+    return ",".join(names)
+
+
+def score_named(source: Score | str | None) -> str | None:
+    """Returns the name of a score; see ``comparator_names``."""
+    check_type(source, Score | str | None, 'a Score or its name, such as "energy"')
+    if not isinstance(source, Score):
+        return source
+    return _name_of("score", source, getattr(source.of, "__module__", ""), SCORES)
+
+
 def check_known(what: str, name: str, known: Collection[str]) -> None:
     """Raises ``InputError`` with the nearest names for a name that is unknown."""
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise unknown_name(what, name, known)
 
 
@@ -201,6 +253,14 @@ def kinds(names: str) -> tuple[FaultKind, ...]:
                     f"notation: give yours a unique name and a unique keyword"
                 )
     return tuple(dict.fromkeys(chosen))
+
+
+def next_trial(source: NextTrial | str) -> NextTrial:
+    """Returns a choice of the next trial, given as a function or by its name in ``NEXT_TRIAL``."""
+    if callable(source):
+        return source
+    check_known("choice of the next trial", source, NEXT_TRIAL)
+    return NEXT_TRIAL[source]
 
 
 def _kind(name: str) -> FaultKind:

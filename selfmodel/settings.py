@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, real_number, whole_number
 
 MAX_SETTINGS: Mapping[str, int] = MappingProxyType(
     {
@@ -44,7 +44,8 @@ class Settings:
         kept: Number of hypotheses that a diagnosis reports and that seed the next diagnosis.
 
     Raises:
-        InputError: A setting is out of range, or inconsistent with another setting.
+        InputError: A setting is no number, out of range, or inconsistent with another setting. A
+            number such as 1e3 is a whole one.
     """
 
     steps: int = 1000
@@ -59,6 +60,10 @@ class Settings:
     kept: int = 10
 
     def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            number = real_number if field.name == "mutation" else whole_number
+            value = number(field.name, getattr(self, field.name), getattr(Settings, field.name))
+            object.__setattr__(self, field.name, value)
         for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -94,6 +99,7 @@ class Settings:
         Raises:
             InputError: ``population`` is below 2.
         """
+        population = whole_number("population", population, 100)
         if population < 2:
             raise InputError(f"population must be at least 2, got {population}")
         survivors = population // 2

@@ -140,7 +140,7 @@ def test_a_controller_evolves_equally_from_names_and_objects():
         ({"kinds": []}, "expected at least one fault kind, got none: give kinds="),
         ({"robot": "octopod"}, "unknown robot 'octopod'"),
         ({"robot": 3}, 'expected a Robot, a name such as "quadruped" .* got .* type int'),
-        ({"seed": -1}, "expected a seed of 0 or above, got -1"),
+        ({"seed": -1}, "expected a whole number of 0 or above as seed, got -1"),
     ],
 )
 def test_a_wrong_argument_is_refused_in_a_sentence(options: dict[str, object], message: str):
@@ -161,7 +161,7 @@ def test_a_trial_without_a_log_requires_a_robot():
 def test_an_unknown_design_and_a_negative_seed_are_refused():
     with pytest.raises(InputError, match="unknown kind of controller 'net'"):
         selfmodel.evolve_controller("quadruped", design="net", settings=SMALL)
-    with pytest.raises(InputError, match="expected a seed of 0 or above, got -1"):
+    with pytest.raises(InputError, match="expected a whole number of 0 or above as seed, got -1"):
         selfmodel.evolve_controller("quadruped", settings=SMALL, seed=-1)
 
 

@@ -155,11 +155,12 @@ class TrialRefusedError(InputError):
         self.reason = reason
 
 
-def as_comparator(value: Any, name: str) -> Comparator:  # noqa: ANN401  # of a plug-in
+def as_comparator(value: Any, name: str = "") -> Comparator:  # noqa: ANN401  # of a plug-in
     """Returns an object as a comparator, or raises an ``InputError`` with the name given to it."""
     if isinstance(value, Comparator) and not isinstance(value, type):
         return value
+    called = name or getattr(value, "__name__", type(value).__name__)
     raise InputError(
-        f"{name!r} is no comparator: expected an object, not a class, with the members of "
+        f"{called!r} is no comparator: expected an object, not a class, with the members of "
         f"selfmodel.diagnosis.comparator.Comparator, got {value!r}"
     )

@@ -14,6 +14,7 @@ from collections.abc import (
 from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
+from numbers import Real
 from typing import Any
 
 import dm_env
@@ -22,7 +23,14 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import InputError, TrialError
+from selfmodel.errors import (
+    InputError,
+    TrialError,
+    check_type,
+    real_number,
+    unknown_name,
+    whole_number,
+)
 from selfmodel.physical.interface import Limit
 from selfmodel.physical.safety import (
     HangError,
@@ -134,6 +142,16 @@ class EnvironmentRobot:
     _dog: Watchdog | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
+        check_type(self.robot, Robot, 'a Robot, such as selfmodel.load_robot("quadruped")')
+        if not hasattr(self.env, "action_spec"):
+            raise InputError(
+                f"expected a dm_env.Environment that drives the robot, got {self.env!r:.80}"
+            )
+        self.patience = whole_number("patience", self.patience, 5, least=0)
+        self.tolerance = real_number("tolerance", self.tolerance, 0.25, least=0.0)
+        self.signals, self.critical = _signals(self.signals), _signals(self.critical)
+        if isinstance(self.silent_neurons, int):
+            self.silent_neurons = (self.silent_neurons,)
         anatomy = self.robot.anatomy
         motors = (len(anatomy.motors),)
         if self.safe is None:
@@ -151,13 +169,14 @@ class EnvironmentRobot:
                     f"({', '.join(anatomy.motors)}), got the shape {shape}"
                 )
         seconds = self.watchdog
-        if seconds is not None and (self.stop is None or not 0 < seconds < math.inf):
+        timed = isinstance(seconds, Real) and 0 < seconds < math.inf
+        if seconds is not None and not (self.stop and timed):
             raise InputError(
                 f"a watchdog needs a time of more than 0 s, and stop=, a function that stops the "
                 f"robot while the environment hangs; got {seconds!r} and "
                 f"{'no function' if self.stop is None else 'a function'}"
             )
-        named = self.signals
+        named: Collection[Signal] = self.signals
         if not named and self.observe is signals_by_name:
             named = [signal for signal in SIGNALS if signal in self.env.observation_spec()]
         self.signals = {*named, "commands"} if named else SIGNALS
@@ -301,6 +320,15 @@ class EnvironmentRobot:
         for limit in self.limits:
             if reason := limit.reason(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
+
+
+def _signals(given: str | Collection[Signal]) -> tuple[Signal, ...]:
+    """Returns signals, given as one or in a collection, or raises ``InputError``."""
+    names = [given] if isinstance(given, str) else given
+    for name in names:
+        if name not in SIGNALS:
+            raise unknown_name("signal", name, SIGNALS)
+    return tuple(signal for signal in SIGNALS if signal in names)
 
 
 def _step_to(env: dm_env.Environment, targets: FloatArray) -> None:

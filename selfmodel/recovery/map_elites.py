@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.errors import InputError, WorkError
+from selfmodel.errors import InputError, WorkError, check_type, whole_number
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
@@ -92,9 +92,17 @@ def make_repertoire(
         on_filling: Called after each batch.
 
     Raises:
-        InputError: The robot has no touch sensors or too many, or pyribs is not installed.
+        InputError: The robot has no touch sensors or too many, pyribs is not installed, or an
+            argument is invalid.
         WorkError: No gait entered the repertoire.
     """
+    check_type(robot, Robot, 'a Robot, such as selfmodel.load_robot("quadruped")')
+    check_type(design, Design, "a Design, such as the one of a controller")
+    seed = whole_number("seed", seed, 0, least=0)
+    steps = whole_number("steps", steps, 1000, least=1)
+    evaluations = whole_number("evaluations", evaluations, EVALUATIONS, least=1)
+    batch = whole_number("batch", batch, BATCH, least=1)
+    levels = None if levels is None else whole_number("levels", levels, 5, least=1)
     start, feet = perf_counter(), len(feet_of(robot.anatomy))
     cells, rng = levels or LEVELS[feet], np.random.default_rng(seed)
     archive, emitter = _archive(design.weights, feet, cells, batch, rng)

@@ -11,6 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
+from selfmodel.errors import whole_number
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.actuators import ancestors
@@ -38,7 +39,7 @@ not limit them: each takes up to half of that of a batch. A dog with its meshes 
 
 def thread_count(requested: int) -> int:
     """Returns the number of threads to use: ``requested``, or all processors where it is 0."""
-    return requested or len(os.sched_getaffinity(0))
+    return whole_number("threads", requested, 0, least=0) or len(os.sched_getaffinity(0))
 
 
 class Simulator:

@@ -14,7 +14,7 @@ from selfmodel import plugins
 from selfmodel.arguments import fitted, read_logs
 from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.diagnosis.choice import ComparatorChoice
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, check_type
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
@@ -179,7 +179,7 @@ class ChosenScore(NamedTuple):
 
 
 def choose_score(
-    name: str,
+    name: Score | str,
     entry: Entry,
     design: Design,
     *,
@@ -194,7 +194,7 @@ def choose_score(
     """Returns the score of that name for a robot.
 
     Args:
-        name: A name of ``SCORES``, ``return``, ``tracking`` or ``velocity``; the name of an entry
+        name: A name of ``SCORES``, ``return``, ``tracking``, ``velocity``, a score, or an entry
             point in the group ``selfmodel.scores``, or ``package.module:object``.
         entry: The robot.
         design: Design of the controllers.
@@ -213,6 +213,10 @@ def choose_score(
             stops.
     """
     robot = entry.robot()
+    check_type(name, Score | str, 'a Score or its name, such as "energy"')
+    if isinstance(name, Score):
+        check_measurable(name, robot)
+        return ChosenScore(name, gait)
     commanded = gait.design.velocity if gait is not None and name == VELOCITY else None
     if commanded is None:
         check_score(name, entry)

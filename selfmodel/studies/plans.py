@@ -9,14 +9,18 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
-from selfmodel import plugins
-from selfmodel.arguments import AUTO, comparator_choice, is_model, robot_entry
+from selfmodel import arguments, plugins
+from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.errors import InputError, names_of, real_numbers, unknown_name, whole_numbers
+from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import kind_names, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
+from selfmodel.files import path_of
+from selfmodel.recovery.scores import Score
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
@@ -66,21 +70,24 @@ Share = tuple[int, int]
 
 ALL: Share = (1, 1)
 
+ROBOT = "names of robots or paths of their models, which each process of a study loads"
+"""What is expected as the robots of a study."""
+
 
 def ablation(
-    folder: Path,
+    folder: str | Path,
     *,
-    robots: Sequence[str],
-    cases: Sequence[int] | None,
-    comparators: Sequence[str],
-    gaps: Sequence[float],
-    seeds: Sequence[int],
+    robots: str | Path | Iterable[str | Path],
+    cases: int | Iterable[int] | None,
+    comparators: str | Comparator | Iterable[str | Comparator],
+    gaps: float | Iterable[float],
+    seeds: int | Iterable[int],
     settings: Settings = Settings(),  # noqa: B008  # frozen
-    damages: Sequence[str] = (),
-    kinds: str = "default",
+    damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
+    kinds: KindSource = "default",
     next_trial: str = BANK,
-    bank: Path | None = None,
-    score: str | None = None,
+    bank: str | Path | None = None,
+    score: str | Score | None = None,
     repair: str = plugins.PAPER,
     search: str | None = None,
     only: Share = ALL,
@@ -90,23 +97,33 @@ def ablation(
     The diagnoses of a run need its trials, which need its gaits. With other choices of the next
     trial than the bank, a recovery needs the first gait alone.
 
+    One value may stand for a sequence of it. The processes of a study find comparators, kinds and a
+    score by name: such an object is built in, or a variable of a module that can be imported.
+
     Args:
         folder: Folder of the study.
         robots: Names of robots, or paths of MJCF or URDF files.
         cases: Numbers of failures of Table I; None for all that apply to each robot.
-        comparators: Names of comparators, or ``package.module:object``.
+        comparators: Comparators, their names, or ``package.module:object``.
         gaps: Levels of the reality gap.
         seeds: Seeds, one run each.
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
-        kinds: Fault kinds to search, as in ``--kinds``.
+        kinds: Fault kinds to search, or their names as in ``--kinds``.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
-        score: Name of the fitness; None for that of the repair.
+        score: The fitness, or its name; None for that of the repair.
         repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
         search: Name of its search; None for that of the repair.
         only: Share of the runs.
     """
+    robots = names_of(robots, ROBOT)
+    cases = None if cases is None else whole_numbers("cases", cases)
+    comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
+    gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds)
+    damages = names_of(damages, "failures in notation", Hypothesis)
+    bank = None if bank is None else path_of(bank, "a folder of gaits")
+    settings = arguments.settings_of(settings)
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
@@ -156,18 +173,18 @@ def ablation(
 
 
 def suite(
-    folder: Path,
+    folder: str | Path,
     *,
-    bodies: Sequence[str],
-    cases: Sequence[int],
-    seeds: Sequence[int],
+    bodies: str | Path | Iterable[str | Path],
+    cases: int | Iterable[int],
+    seeds: int | Iterable[int],
     settings: Settings,
-    comparator: str,
+    comparator: str | Comparator,
     controller: str = "network",
     neurons: int | None = None,
-    kinds: str = "paper",
+    kinds: KindSource = "paper",
     gap: float = 0.0,
-    score: str | None = None,
+    score: str | Score | None = None,
     repair: str = plugins.PAPER,
     search: str | None = None,
     only: Share = ALL,
@@ -178,6 +195,10 @@ def suite(
     or to its controllers is omitted; the share is of bodies with their seeds. The comparator may be
     ``auto``, and ``score`` is reported per trial too.
     """
+    bodies, cases = names_of(bodies, ROBOT), whole_numbers("cases", cases)
+    seeds, (gap,) = whole_numbers("seeds", seeds), real_numbers("gap", [gap])
+    (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
+    settings = arguments.settings_of(settings)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score)
@@ -201,19 +222,22 @@ def suite(
 
 
 def paper(
-    folder: Path,
+    folder: str | Path,
     *,
-    robots: Sequence[str] = tuple(ROBOTS),
-    cases: Sequence[int] = tuple(TABLE_ONE),
-    seeds: Sequence[int] = range(1),
-    comparators: Sequence[str] = PAPER_COMPARATORS,
+    robots: str | Path | Iterable[str | Path] = tuple(ROBOTS),
+    cases: int | Iterable[int] = tuple(TABLE_ONE),
+    seeds: int | Iterable[int] = range(1),
+    comparators: str | Comparator | Iterable[str | Comparator] = PAPER_COMPARATORS,
     settings: Settings = Settings(),  # noqa: B008  # frozen
 ) -> Study:
     """Returns the paper's experiment: its failures, repair and fault kinds, and no reality gap.
 
     A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
-    is exact, and is not calibrated.
+    is exact, and is not calibrated. One value may stand for a sequence of it.
     """
+    robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases)
+    seeds, comparators = whole_numbers("seeds", seeds), plugins.comparator_names(comparators)
+    settings = arguments.settings_of(settings)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)
     _check_cases("case of Table I", cases, TABLE_ONE)
@@ -244,7 +268,7 @@ def _one_gait(models: Mapping[str, Mapping[str, str]], shared: Mapping[str, Any]
 
 def _study(
     name: str,
-    folder: Path,
+    folder: str | Path,
     points: Iterable[Point],
     shared: Mapping[str, Any],
     needs: Needs,
@@ -264,7 +288,8 @@ def _study(
                 f"{other} and {point['robot']} would have the same file names: rename one of the "
                 f"files"
             )
-    return Study(name, folder, f"{recoveries.__name__}:{function}", named, shared, needs)
+    place = path_of(folder, "the folder of a study")
+    return Study(name, place, f"{recoveries.__name__}:{function}", named, shared, needs)
 
 
 def _point(

@@ -37,7 +37,7 @@ from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import model_digest
 from selfmodel.recovery.result import Event, SearchBegins
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -93,7 +93,7 @@ def robot_key(robot: str) -> str:
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "_"
 
 
-def repair_parameters(repair: str, search: str | None, score: str | None) -> dict[str, str]:
+def repair_parameters(repair: str, search: str | None, score: Score | str | None) -> dict[str, str]:
     """Returns the names that determine a repair, with the defaults of the repair for None."""
     if search == plugins.REPERTOIRE:
         raise InputError(
@@ -110,7 +110,7 @@ def repair_parameters(repair: str, search: str | None, score: str | None) -> dic
     return {
         "repair": repair,
         "search": plugins.search_name(repair, search, None),
-        "score": score or plugins.DEFAULT_SCORES[repair],
+        "score": plugins.score_named(score) or plugins.DEFAULT_SCORES[repair],
     }
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import quote
 
 from selfmodel.errors import InputError
+from selfmodel.files import path_of
 from selfmodel.studies.cells import REMEDY, Cell, finished, made_with
 from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
 
@@ -44,7 +45,7 @@ class Study:
 
     Attributes:
         name: Name of the study, such as that of its command.
-        folder: Folder of the cells and results.
+        folder: Folder of the cells and results; a text is made a path.
         function: The ``Work`` that is computed at each point, as ``package.module:function``; its
             parameters are those of the point, and ``shared``. Its result is a row, a list of rows,
             or lists of rows by the name of a table.
@@ -59,6 +60,9 @@ class Study:
     points: Mapping[str, Point]
     shared: Mapping[str, Any] = field(default_factory=dict)
     needs: Callable[[Point], Mapping[str, Cell]] = lambda _point: {}
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", path_of(self.folder, "the folder of a study"))
 
     def cells(self) -> list[Cell]:
         """Returns the cell of each point, with those that it needs.

@@ -67,6 +67,8 @@ class TrialPlan:
     seed: int
 
     def __post_init__(self) -> None:
+        if self.stage not in STAGES:
+            raise unknown_name("stage", self.stage, STAGES)
         if not 0 <= self.seed <= MAX_SEED:
             raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {self.seed}")
 
