@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from selfmodel.arguments import RobotSource, comparator_of, kinds_of, load_robot, parse_hypothesis
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
@@ -19,6 +20,8 @@ from selfmodel.diagnosis.comparator import (
     PreparedTrial,
     piece_steps_of,
 )
+from selfmodel.diagnosis.losses import simulate
+from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -31,12 +34,15 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, TrialPlan
 
 DEPENDS_ON_BATCH = (
     "must not depend on the other runs, to the last bit: numpy sums in memory order, so "
     "np.ascontiguousarray is required before a sum or a mean"
 )
+
+CHECKED_STEPS = 60
+"""Control steps of the trial on which a comparator is checked without one of its own."""
 
 BATCH_STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""
@@ -48,7 +54,9 @@ def _require(holds: object, breach: str) -> None:
         raise ValueError(breach)
 
 
-def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory) -> None:
+def check_comparator(
+    comparator: Comparator | str, trial: Trial | None = None, simulated: Trajectory | None = None
+) -> None:
     """Checks that a comparator fulfils ``Comparator``, and its trials ``PreparedTrial``.
 
     If the prepared trial has losses, they and their parts are checked too.
@@ -56,6 +64,7 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
     Example:
         >>> import selfmodel
         >>> from selfmodel.comparators import FORWARD_DISPLACEMENT
+        >>> selfmodel.check_comparator(FORWARD_DISPLACEMENT)
         >>> robot = selfmodel.load_robot("quadruped")
         >>> walk = selfmodel.read_log("before.mcap").trial.plan.controller
         >>> physical = selfmodel.simulated_robot(robot)
@@ -66,8 +75,9 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
         >>> selfmodel.check_comparator(FORWARD_DISPLACEMENT, trial, simulated)
 
     Args:
-        comparator: The comparator to check.
-        trial: A logged trial.
+        comparator: The comparator to check, its name, or ``package.module:object``.
+        trial: A logged trial. Without one, the comparator is checked on a trial of the quadruped of
+            ``CHECKED_STEPS`` steps, simulated for this.
         simulated: The simulation that ``comparator.prepare(trial).request`` requires, for at least
             two hypotheses; the first reproduces the trial to the bit, as ``shown`` returns. Other
             signals are ignored: all signals, ``(n, steps, width)``, serve every ``ClosedLoop``
@@ -76,7 +86,14 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
     Raises:
         ValueError: The comparator violates its contract, or ``simulated`` does not have the
             requested shapes; the message names the violation.
+        InputError: The name is unknown, the object is no comparator, it refuses the trial of the
+            quadruped, or there are no simulations with the trial.
     """
+    comparator = comparator_of(comparator)
+    if (trial is None) != (simulated is None):
+        raise InputError("expected a trial and its simulations, got one of them: give both or none")
+    if trial is None or simulated is None:
+        trial, simulated = _walk(comparator)
     name = comparator.name
     _require(name and name == name.strip(), f"a comparator needs a name, got {name!r}")
     logged = _bits(trial.trajectory.signals)
@@ -118,6 +135,24 @@ def check_comparator(comparator: Comparator, trial: Trial, simulated: Trajectory
             _require(alone, f"the {what} of run {run} {DEPENDS_ON_BATCH}")
     _require(before == _bits(requested.signals), "a comparator must not change its arguments")
     _require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
+
+
+def _walk(comparator: Comparator) -> tuple[Trial, Trajectory]:
+    """Returns a trial of the quadruped, and what a comparator requires: exact, then damaged."""
+    robot = load_robot("quadruped")
+    network = network_for(robot)
+    controller = Controller(network, np.linspace(-1, 1, network.weights))
+    simulator = Simulator(robot, 1)
+    logged = simulator.run([(INTACT, controller)], CHECKED_STEPS, SIGNALS).trajectory.run(0)
+    plan = TrialPlan("check", "single", controller, CHECKED_STEPS, 0)
+    trial = Trial(plan, robot.name, logged, "check")
+    request = comparator.prepare(trial).request
+    _check_request(request, trial)
+    broken = parse_hypothesis("break:front_left_knee", robot)
+    runs = simulate(simulator, request, trial, [INTACT, broken]).trajectory
+    exact = shown(request, trial)
+    signals = {one: np.concatenate([exact[one], runs[one][1:]]) for one in request.record}
+    return trial, replace(runs, signals=signals)
 
 
 def _bits(arrays: Mapping[Any, NDArray[Any]]) -> dict[Any, bytes]:
@@ -268,22 +303,27 @@ def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Traj
     return replace(simulated, signals=signals)
 
 
-def check_fault_kind(kind: FaultKind, robot: Robot) -> None:
+def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") -> None:
     """Checks that a kind fulfils the contract of ``FaultKind``.
 
     Example:
         >>> import selfmodel
         >>> kind = selfmodel.PAPER_KINDS[0]
-        >>> selfmodel.check_fault_kind(kind, selfmodel.load_robot("quadruped"))
+        >>> selfmodel.check_fault_kind(kind, "quadruped")
 
     Args:
-        kind: The kind to check, searchable or not.
-        robot: A robot that the kind applies to.
+        kind: The kind to check, searchable or not, its name, or ``package.module:object``.
+        robot: A robot that the kind applies to, its name, or the path of its MJCF or URDF file.
 
     Raises:
         ValueError: The kind breaks its contract; the message names the broken rule.
-        InputError: The notation of the kind's own faults cannot be parsed.
+        InputError: The notation of the kind's own faults cannot be parsed, or an argument is no
+            kind or robot.
     """
+    robot, kinds = load_robot(robot), kinds_of(kind)
+    if len(kinds) != 1:
+        raise InputError(f"expected one kind, got {len(kinds)}: check each of them")
+    (kind,) = kinds
     for what, text in (("name", kind.name), ("keyword", kind.keyword)):
         _require(
             text and not set(text) & set(" ,:+="),
