@@ -1,0 +1,292 @@
+"""Promises of the Python functions: a plain call is accepted, any other refused in a sentence."""
+
+import dataclasses
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import selfmodel
+from selfmodel import Settings, studies
+from selfmodel.comparators import FORWARD_DISPLACEMENT, SENSOR_SERIES
+from selfmodel.controllers.controller import Controller
+from selfmodel.errors import InputError
+from selfmodel.faults import JAMMED
+from selfmodel.logs.controllers import save_controller
+from selfmodel.physical.interface import PhysicalRobot
+from selfmodel.recovery import ENERGY, Recovery, make_repertoire
+from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
+from selfmodel.tasks import entry
+from selfmodel.testing import check_comparator, check_fault_kind
+from selfmodel.trials.trial import Trial
+
+SMALL = Settings(steps=60, generations=1, trials=1).scaled(4)
+
+MINE = """
+import dataclasses
+from selfmodel.comparators import SENSOR_SERIES
+from selfmodel.faults.joints import Jammed
+from selfmodel.recovery import DISPLACEMENT
+
+class Dtw:
+    name = "dtw"
+
+    def prepare(self, trial):
+        return SENSOR_SERIES.prepare(trial)
+
+DTW = Dtw()
+SCORE = dataclasses.replace(DISPLACEMENT, name="mine", of=lambda *_: DISPLACEMENT.of(*_))
+"""
+
+
+class Place(NamedTuple):
+    """What the calls name: a robot, its trial and its controller, and a module of plug-ins."""
+
+    robot: Robot
+    walk: Controller
+    trial: Trial
+    physical: PhysicalRobot
+    damaged: PhysicalRobot
+    numbers: Callable[[], int]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    folder = tmp_path_factory.mktemp("calls")
+    (folder / "calls_plugins.py").write_text(MINE, encoding="utf-8")
+    robot = selfmodel.load_robot("quadruped")
+    design = network_for(robot)
+    walk = Controller(design, np.linspace(-1, 1, design.weights))
+    save_controller(folder / "walk.npz", walk)
+    physical = selfmodel.simulated_robot(robot)
+    trial = selfmodel.run_trial(physical, walk, folder / "walk.mcap", robot=robot, steps=60)
+    damaged = selfmodel.simulated_robot(robot, "break:front_left_knee")
+    return Place(robot, walk, trial, physical, damaged, iter(range(1000)).__next__)
+
+
+@pytest.fixture(autouse=True)
+def here(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = Path(place.trial.path).parent
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def mine(name: str) -> object:
+    return getattr(__import__("calls_plugins"), name)
+
+
+def ran(place: Place, **options: object) -> tuple[object, ...]:
+    given = {"physical": place.physical, "controller": place.walk, "robot": place.robot, "steps": 5}
+    given |= {"path": f"{place.numbers()}.mcap", **options}
+    trial = selfmodel.run_trial(**given)
+    return trial.plan.steps, trial.plan.seed, trial.trajectory["base_position"].tobytes()
+
+
+def evolved(place: Place, **options: object) -> bytes:
+    found = selfmodel.evolve_controller(place.robot, **{"settings": SMALL, **options})
+    return found.genome.tobytes()
+
+
+def diagnosed(**options: object) -> str:
+    given = {"trials": "walk.mcap", "comparator": "forward-displacement", "kinds": "jam"}
+    given |= {"settings": SMALL, "calibrate": False, **options}
+    return str(selfmodel.diagnose(given.pop("trials"), **given))
+
+
+def recovered(place: Place, **options: object) -> tuple[object, ...]:
+    given = {"comparator": FORWARD_DISPLACEMENT, "kinds": "jam", "repair": "paper"}
+    given |= {"settings": SMALL, "calibrate": False, "healthy": place.physical}
+    given |= {"folder": f"run-{place.numbers()}", **options}
+    found: Recovery = selfmodel.recover(
+        given.pop("healthy"), place.damaged, place.robot, given.pop("folder"), **given
+    )
+    return tuple(trial.trajectory["commands"].tobytes() for trial in found.trials)
+
+
+def planned(**options: object) -> list[tuple[str, str]]:
+    given = {"robots": ["quadruped"], "cases": [1], "comparators": ["sensor-series"]}
+    given |= {"gaps": [0.0], "seeds": [0], "settings": SMALL, "folder": Path("study"), **options}
+    study = studies.ablation(given.pop("folder"), **given)
+    return [(cell.name, cell.place) for cell in study.cells()]
+
+
+def filled(place: Place, **options: object) -> object:
+    given = {"robot": place.robot, "design": place.walk.design, "evaluate": lambda _: None}
+    return make_repertoire(**{**given, "steps": 20, "seed": 0, **options})
+
+
+@cache
+def environment() -> object:
+    return entry("quadruped").suite["walk"]()
+
+
+def driven(place: Place, **options: object) -> tuple[object, ...]:
+    found = selfmodel.EnvironmentRobot(**{"env": environment(), "robot": place.robot, **options})
+    return set(found.signals), tuple(found.critical), found.silent_neurons
+
+
+Call = Callable[[Place], object]
+
+ACCEPTED: dict[str, tuple[Call, Call]] = {
+    "a whole float as a setting": (lambda _: Settings(steps=1e3), lambda _: Settings(steps=1000)),
+    "a numpy number as a setting": (
+        lambda _: repr(Settings(steps=np.int64(100))),
+        lambda _: repr(Settings(steps=100)),
+    ),
+    "a robot to load": (lambda p: selfmodel.load_robot(p.robot), lambda p: p.robot),
+    "a hypothesis to parse": (
+        lambda p: selfmodel.parse_hypothesis(selfmodel.Hypothesis(), p.robot),
+        lambda p: selfmodel.parse_hypothesis("intact", p.robot),
+    ),
+    "names of kinds in a notation": (
+        lambda p: selfmodel.parse_hypothesis("jam:front_left_knee", p.robot, ["jam"]),
+        lambda p: selfmodel.parse_hypothesis("jam:front_left_knee", p.robot),
+    ),
+    "a float as steps": (lambda p: ran(p, steps=5.0), ran),
+    "a controller's file": (lambda p: ran(p, controller="walk.npz"), ran),
+    "the name of a score": (
+        lambda p: evolved(p, score="energy"),
+        lambda p: evolved(p, score=ENERGY),
+    ),
+    "a score of a module": (lambda p: evolved(p, score="calls_plugins:SCORE"), evolved),
+    "one controller as seeds": (
+        lambda p: evolved(p, seeds="walk.npz"),
+        lambda p: evolved(p, seeds=[p.walk]),
+    ),
+    "names of kinds": (lambda _: diagnosed(kinds=["jam"]), lambda _: diagnosed(kinds=JAMMED)),
+    "a comparator of a module": (
+        lambda _: diagnosed(comparator="calls_plugins:DTW"),
+        lambda _: diagnosed(comparator=mine("DTW")),
+    ),
+    "no healthy trials": (lambda _: diagnosed(healthy=None), lambda _: diagnosed()),
+    "the names of a score and of a next trial": (
+        lambda p: recovered(p, score="displacement", next_trial="repair"),
+        recovered,
+    ),
+    "a list of one trial": (
+        lambda p: repr(selfmodel.replay(["walk.mcap"], "intact", p.robot)),
+        lambda p: repr(selfmodel.replay(p.trial, "intact", "quadruped")),
+    ),
+    "a comparator of mine in a study": (
+        lambda _: planned(comparators=[mine("DTW")]),
+        lambda _: planned(comparators=["calls_plugins:DTW"]),
+    ),
+    "one comparator in a study": (
+        lambda _: planned(comparators=SENSOR_SERIES),
+        lambda _: planned(),
+    ),
+    "a text as the folder of a study": (lambda _: planned(folder="study"), lambda _: planned()),
+    "kinds of a study": (
+        lambda _: planned(kinds=["jam", JAMMED]),
+        lambda _: planned(kinds="jam"),
+    ),
+    "one gap, seed, case and robot": (
+        lambda _: planned(gaps=0, seeds=0, cases=1, robots="quadruped"),
+        lambda _: planned(),
+    ),
+    "scores of a study": (
+        lambda _: planned(score=mine("SCORE")),
+        lambda _: planned(score="calls_plugins:SCORE"),
+    ),
+    "one signal and one neuron": (
+        lambda p: driven(p, signals="sensors", critical="sensors", silent_neurons=1),
+        lambda p: driven(p, signals=["sensors"], critical=["sensors"], silent_neurons=[1]),
+    ),
+    "a comparator alone": (lambda _: check_comparator("calls_plugins:DTW"), lambda _: None),
+    "the name of a kind": (lambda _: check_fault_kind("jam", "quadruped"), lambda _: None),
+}
+
+STRANGER = dataclasses.replace(ENERGY, name="stranger")
+
+REFUSED: dict[str, tuple[Call, str]] = {
+    "a fraction": (lambda _: Settings(steps=10.5), "whole number as steps, got 10.5: give one"),
+    "a bool": (lambda _: Settings(trials=True), "whole number as trials, got True"),
+    "a text": (lambda _: Settings(mutation="0.1"), "finite number as mutation, got '0.1'"),
+    "infinity": (lambda _: Settings(trials=float("inf")), "whole number as trials, got inf"),
+    "no robot": (lambda _: selfmodel.load_robot(5), "expected a Robot, a name such as"),
+    "no log": (lambda p: selfmodel.read_log(p.trial), "expected the path of a log, got .* Trial$"),
+    "a stage": (lambda p: ran(p, stage="bfore"), "unknown stage 'bfore': did you mean before"),
+    "a robot's name": (
+        lambda p: recovered(p, healthy="quadruped"),
+        "expected a physical robot, .* got 'quadruped': give selfmodel.simulated_robot",
+    ),
+    "a mapping": (
+        lambda p: evolved(p, settings={"steps": 20}),
+        "expected settings such as .* dict",
+    ),
+    "a thread": (lambda p: evolved(p, threads=-1), "of 0 or above as threads, got -1"),
+    "a class": (
+        lambda _: diagnosed(comparator=mine("Dtw")),
+        "'Dtw' is no comparator: .* not a class",
+    ),
+    "no answer": (lambda _: diagnosed(calibrate="no"), "expected True or False as calibrate"),
+    "a folder": (lambda p: recovered(p, folder=5), "the path of a new or empty folder, got .* int"),
+    "a tolerance": (
+        lambda p: selfmodel.replay(p.trial, "intact", p.robot, tolerance=float("nan")),
+        "of 0 or above as tolerance, got nan",
+    ),
+    "a gap": (lambda _: planned(gaps=["0.1"]), "finite number as gaps, got '0.1': .* gaps=0.05"),
+    "a seed": (lambda _: planned(seeds=[-1]), "of 0 or above as seeds, got -1"),
+    "a robot in a study": (lambda p: planned(robots=[p.robot]), "names of robots .* got .* Robot"),
+    "a score without a name": (lambda _: planned(score=STRANGER), "give package.module:object"),
+    "a repertoire": (lambda p: filled(p, robot="quadruped"), "selfmodel.load_robot.*got .* str"),
+    "a batch": (lambda p: filled(p, batch=0), "of 1 or above as batch, got 0"),
+    "a signal": (lambda p: driven(p, signals=["sensor"]), "unknown signal 'sensor': did you mean"),
+    "patience": (lambda p: driven(p, patience=1.5), "as patience, got 1.5"),
+    "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
+}
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_a_call_whose_meaning_is_plain_is_the_canonical_call(name: str, place: Place):
+    call, canonical = ACCEPTED[name]
+
+    assert call(place) == canonical(place)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_another_call_is_refused_in_a_sentence(name: str, place: Place):
+    call, sentence = REFUSED[name]
+
+    with pytest.raises(InputError, match=sentence) as refused:
+        call(place)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_comparator_of_a_script_is_no_comparator_of_other_processes(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    dtw = mine("DTW")
+    monkeypatch.setattr(type(dtw), "__module__", "__main__")
+    monkeypatch.setattr(sys.modules["__main__"], "DTW", dtw, raising=False)
+
+    with pytest.raises(InputError, match=r"which is no variable of the module __main__: give"):
+        planned(comparators=[dtw])
+
+
+def test_a_comparator_that_depends_on_the_batch_fails_the_check_of_one_argument():
+    class Uneven:
+        """Distances of the sensor series, less their smallest: the others change each."""
+
+        name = "uneven"
+
+        def prepare(self, trial: Trial) -> object:
+            prepared = SENSOR_SERIES.prepare(trial)
+
+            class Ours:
+                request = prepared.request
+
+                def distances(self, simulated: selfmodel.Trajectory) -> np.ndarray:
+                    found = prepared.losses(simulated)
+                    total = getattr(found, "total", found).mean(axis=1)
+                    return total * len(total)
+
+            return Ours()
+
+    with pytest.raises(ValueError, match="must not depend on the other runs"):
+        check_comparator(Uneven())
