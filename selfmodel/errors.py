@@ -54,14 +54,15 @@ def check_type(got: object, known: type | UnionType, expected: str) -> None:
 def real_number(
     name: str, value: object, example: float, least: float = -math.inf, kind: str = "finite"
 ) -> float:
-    """Returns an argument as a finite float; a bool is no number.
+    """Returns an argument as a float; a bool is no number.
 
     Raises:
-        InputError: It is no number of the kind, finite or whole, or less than the least.
+        InputError: It is no number of the kind, finite, whole or real, or less than the least.
     """
     if isinstance(value, Real) and not isinstance(value, bool):
         number = float(value)
-        if math.isfinite(number) and number >= least and (kind != "whole" or number.is_integer()):
+        of_kind = {"finite": math.isfinite(number), "whole": number.is_integer()}.get(kind, True)
+        if of_kind and not number < least:
             return number
     bound = f" of {least:g} or above" if math.isfinite(least) else ""
     raise InputError(
@@ -89,8 +90,8 @@ def whole_numbers(name: str, source: object) -> tuple[int, ...]:
 
 
 def real_numbers(name: str, source: object) -> tuple[float, ...]:
-    """Returns finite numbers, given as one or in a sequence."""
-    return tuple(real_number(name, one, 0.05) for one in items_of(source))
+    """Returns numbers, whose range is not checked, given as one or in a sequence."""
+    return tuple(real_number(name, one, 0.05, kind="real") for one in items_of(source))
 
 
 def names_of(source: object, expected: str, also: type = Path) -> tuple[str, ...]:

@@ -230,7 +230,7 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda p: selfmodel.replay(p.trial, "intact", p.robot, tolerance=float("nan")),
         "of 0 or above as tolerance, got nan",
     ),
-    "a gap": (lambda _: planned(gaps=["0.1"]), "finite number as gaps, got '0.1': .* gaps=0.05"),
+    "a gap": (lambda _: planned(gaps=["0.1"]), "real number as gaps, got '0.1': .* gaps=0.05"),
     "a seed": (lambda _: planned(seeds=[-1]), "of 0 or above as seeds, got -1"),
     "a robot in a study": (lambda p: planned(robots=[p.robot]), "names of robots .* got .* Robot"),
     "a score without a name": (lambda _: planned(score=STRANGER), "give package.module:object"),
