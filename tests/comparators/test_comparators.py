@@ -1,5 +1,6 @@
 """The contract of every registered comparator: add one, and it is tested."""
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -71,6 +72,12 @@ def with_none_fixed(outcome: Trajectory) -> dict[str, np.ndarray | None]:
 @pytest.mark.parametrize("name", COMPARATORS)
 def test_a_comparator_keeps_its_contract(name: str, quadruped: Robot, logged_and_simulated: Both):
     keeps_its_contract(name, quadruped, logged_and_simulated[0])
+
+
+@pytest.mark.parametrize("name", COMPARATORS)
+def test_a_comparator_is_a_value_equal_to_its_copy_and_a_key(name: str):
+    comparator = COMPARATORS[name]
+    assert {comparator: name}[copy.deepcopy(comparator)] == name
 
 
 def test_the_contract_is_kept_for_joints_of_several_hinges():
