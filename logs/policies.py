@@ -340,6 +340,10 @@ def _node(node: Any, tensors: dict[str, FloatArray]) -> Node:  # noqa: ANN401  #
         value = helper.get_attribute_value(attribute)
         if attribute.name == "activations" and value not in _USUAL:
             raise ValueError(f"the activations {value} of {node.op_type} are not supported")
+        if attribute.name == "direction" and value != b"forward":
+            raise ValueError(f"the direction {value.decode()} of {node.op_type} is not supported")
+        if isinstance(value, bytes):
+            continue
         if isinstance(value, float | int):
             attributes[attribute.name] = float(value)
         elif isinstance(value, Sequence) and all(isinstance(one, float | int) for one in value):

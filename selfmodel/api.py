@@ -224,7 +224,8 @@ def replay(
     Raises:
         InputError: The log is unusable, the robot is unknown, or the notation is invalid.
     """
-    logged, tolerance = arguments.trial_of(trial), real_number("tolerance", tolerance, 0.0, 0.0)
+    logged = arguments.trial_of(trial)
+    tolerance = real_number("tolerance", tolerance, 0.0, 0.0, "real")
     robot = arguments.load_robot(robot)
     assumed = arguments.parse_hypothesis(hypothesis, robot)
     return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)
@@ -345,11 +346,9 @@ def recover(
     Args:
         healthy: The physical robot before its failure.
         damaged: The physical robot after its failure; on hardware, the same object.
-        robot: The nominal robot, its name, or the path of its MJCF or URDF file; the self-model is
-            made from it.
+        robot: The nominal robot, its name, or its MJCF or URDF file, which is the self-model.
         folder: Folder of the run, new or empty: every trial's log and every diagnosis.
-        comparator: A comparator, its name, or ``package.module:object``; ``auto`` for the best
-            that the trials allow.
+        comparator: A comparator, its name, or ``package.module:object``; ``auto`` for the best one.
         kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
             separated by commas.
         settings: Parameters of the recovery; the paper's by default.
@@ -389,10 +388,11 @@ def recover(
     score, gait = choose_score(score, entry, drawn, steps=chosen.steps, seed=seed, gait=gait)
     check_measurable(score, robot, observed_of(healthy, damaged))
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
+    choose, choice = arguments.comparator_choice(comparator), plugins.next_trial(next_trial)
     journal = create_journal(folder, robot.anatomy, searched, calibrated=calibrate)
     return recovery_loop.RecoveryLoop(
         simulator=Simulator(robot, count),
-        choose_comparator=arguments.comparator_choice(comparator),
+        choose_comparator=choose,
         run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
         store_diagnosis=journal.add,
         settings=chosen,
@@ -404,7 +404,7 @@ def recover(
         calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
         if calibrate
         else None,
-        next_trial=plugins.next_trial(next_trial),
+        next_trial=choice,
         score=score,
         make_repair=make_repair,
     ).run(healthy, damaged)

@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set as AbstractSet
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
@@ -60,9 +60,12 @@ def real_number(
         InputError: It is no number of the kind, finite, whole or real, or less than the least.
     """
     if isinstance(value, Real) and not isinstance(value, bool):
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
         of_kind = {"finite": math.isfinite(number), "whole": number.is_integer()}.get(kind, True)
-        if of_kind and not number < least:
+        if of_kind and (number >= least or least == -math.inf):
             return number
     bound = f" of {least:g} or above" if math.isfinite(least) else ""
     raise InputError(
@@ -73,20 +76,26 @@ def real_number(
 
 def whole_number(name: str, value: object, example: int, least: float = -math.inf) -> int:
     """Returns an argument as an int, where that is exact, as of 1e3; see ``real_number``."""
-    number = real_number(name, value, example, least, "whole")
-    return int(value) if isinstance(value, Integral) else int(number)
+    if isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least:
+        return int(value)
+    return int(real_number(name, value, example, least, "whole"))
 
 
 def items_of(source: object) -> list[object]:
-    """Returns the items of a sequence; anything else, such as a text, is one item."""
+    """Returns the items of a sequence, or sorted of a set, whose order is another in each process.
+
+    Anything else, such as a text, is one item.
+    """
     if isinstance(source, str) or not isinstance(source, Iterable):
         return [source]
-    return list(source)
+    return sorted(source, key=str) if isinstance(source, AbstractSet) else list(source)
 
 
-def whole_numbers(name: str, source: object) -> tuple[int, ...]:
-    """Returns whole numbers of 0 or above, given as one or in a sequence."""
-    return tuple(whole_number(name, one, 0, least=0) for one in items_of(source))
+def whole_numbers(
+    name: str, source: object, example: int, least: float = -math.inf
+) -> tuple[int, ...]:
+    """Returns whole numbers, given as one or in a sequence; see ``whole_number``."""
+    return tuple(whole_number(name, one, example, least) for one in items_of(source))
 
 
 def real_numbers(name: str, source: object) -> tuple[float, ...]:

@@ -16,8 +16,9 @@ from selfmodel.errors import InputError, check_type
 
 def path_of(source: object, what: str) -> Path:
     """Returns a path that is given as a path or a text, or raises ``InputError``."""
-    check_type(source, str | Path, f"the path of {what}")
-    return Path(str(source))
+    path = os.fspath(source) if isinstance(source, os.PathLike) else source
+    check_type(path, str, f"the path of {what}")
+    return Path(str(path))
 
 
 def read_file(path: Path, what: str, limit: int) -> bytes:

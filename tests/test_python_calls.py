@@ -1,6 +1,7 @@
 """Promises of the Python functions: a plain call is accepted, any other refused in a sentence."""
 
 import dataclasses
+import os
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -197,6 +198,32 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda p: driven(p, signals="sensors", critical="sensors", silent_neurons=1),
         lambda p: driven(p, signals=["sensors"], critical=["sensors"], silent_neurons=[1]),
     ),
+    "a generator of signals": (
+        lambda p: driven(
+            p, signals=iter(["sensors"]), critical=iter(["sensors"]), silent_neurons=np.int64(1)
+        ),
+        lambda p: driven(p, signals=["sensors"], critical=["sensors"], silent_neurons=[1]),
+    ),
+    "every difference": (
+        lambda p: repr(selfmodel.replay(p.trial, "intact", p.robot, tolerance=np.inf)),
+        lambda p: repr(selfmodel.replay(p.trial, "intact", p.robot)),
+    ),
+    "an entry of a folder": (
+        lambda _: [
+            selfmodel.read_log(one).trial.plan.name
+            for one in os.scandir()
+            if one.name == "walk.mcap"
+        ],
+        lambda _: ["walk"],
+    ),
+    "a set, whose order is another in each process": (
+        lambda _: planned(robots={"quadruped", "hexapod"}, gaps=0),
+        lambda _: planned(robots=["hexapod", "quadruped"]),
+    ),
+    "a large seed": (
+        lambda p: evolved(p, seed=10**400 + 1) != evolved(p, seed=10**400),
+        lambda _: True,
+    ),
     "a comparator alone": (lambda _: check_comparator("calls_plugins:DTW"), lambda _: None),
     "the name of a kind": (lambda _: check_fault_kind("jam", "quadruped"), lambda _: None),
 }
@@ -206,6 +233,19 @@ STRANGER = dataclasses.replace(ENERGY, name="stranger")
 REFUSED: dict[str, tuple[Call, str]] = {
     "a fraction": (lambda _: Settings(steps=10.5), "whole number as steps, got 10.5: give one"),
     "a bool": (lambda _: Settings(trials=True), "whole number as trials, got True"),
+    "a number of 400 digits": (
+        lambda _: Settings(steps=10**400),
+        "steps must be at most 1000000, got 10000",
+    ),
+    "a float of 400 digits": (
+        lambda _: Settings(mutation=10**400),
+        "finite number as mutation, got 10000",
+    ),
+    "a bool as a watchdog": (
+        lambda p: driven(p, watchdog=True, stop=lambda: None),
+        "a watchdog needs a time of more than 0 s",
+    ),
+    "a case": (lambda _: planned(cases=-1), "unknown case of quadruped '-1'"),
     "a text": (lambda _: Settings(mutation="0.1"), "finite number as mutation, got '0.1'"),
     "infinity": (lambda _: Settings(trials=float("inf")), "whole number as trials, got inf"),
     "no robot": (lambda _: selfmodel.load_robot(5), "expected a Robot, a name such as"),
@@ -256,6 +296,13 @@ def test_another_call_is_refused_in_a_sentence(name: str, place: Place):
     with pytest.raises(InputError, match=sentence) as refused:
         call(place)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("wrong", [{"next_trial": "reppair"}, {"comparator": "dtww"}])
+def test_a_refused_recovery_leaves_no_folder(place: Place, wrong: dict[str, str]):
+    with pytest.raises(InputError, match="unknown"):
+        recovered(place, folder="refused", **wrong)
+    assert not Path("refused").exists()
 
 
 def test_a_comparator_of_a_script_is_no_comparator_of_other_processes(

@@ -109,14 +109,15 @@ class Graph:
         self._check_states()
 
     def _check_states(self) -> None:
-        first = self.initial(2)
-        _, later = self.step(np.zeros((2, self.inputs)), first)  # raises ValueError
-        for state, before, after in zip(self.states, first, later, strict=True):
-            if before.shape != after.shape:
-                raise ValueError(
-                    f"the state {state.output} has the shape {after.shape}, expected that of "
-                    f"{state.input}, {before.shape}"
-                )
+        for rows in (1, 2):
+            first = self.initial(rows)
+            _, later = self.step(np.zeros((rows, self.inputs)), first)  # raises ValueError
+            for state, before, after in zip(self.states, first, later, strict=True):
+                if before.shape != after.shape:
+                    raise ValueError(
+                        f"the state {state.output} has the shape {after.shape}, expected that of "
+                        f"{state.input}, {before.shape}"
+                    )
 
     def _check_names(self) -> None:
         if len(self.nodes) > MAX_NODES:

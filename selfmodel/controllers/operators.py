@@ -112,6 +112,8 @@ def _slice(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray
 
 def _flat(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
     x, *shape = arguments
+    if x.ndim != 2:  # the rows of all robots would become one
+        raise ValueError("expected rows")
     if shape and (len(shape[0]) != 2 or shape[0][1] not in (-1, x.size // len(x))):
         raise ValueError(f"a shape of {shape[0].tolist()}: expected one row of numbers a robot")
     return [x.reshape(len(x), -1)]
@@ -167,6 +169,8 @@ def _recurrent(
         raise ValueError("expected one time step of rows")
     if own.shape != (1, gates * width, width) or matrix.shape[:2] != own.shape[:2]:
         raise ValueError("expected weights of one direction")
+    if attributes.get("hidden_size", width) != width:
+        raise ValueError(f"expected weights of the hidden size, which are of {width}")
     if others := {name for name, value in attributes.items() if value} - allowed:
         raise ValueError(f"its {', '.join(sorted(others))} is not supported")
     if bias is None:

@@ -14,7 +14,7 @@ from collections.abc import (
 from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import dm_env
@@ -27,6 +27,7 @@ from selfmodel.errors import (
     InputError,
     TrialError,
     check_type,
+    items_of,
     real_number,
     unknown_name,
     whole_number,
@@ -148,10 +149,10 @@ class EnvironmentRobot:
                 f"expected a dm_env.Environment that drives the robot, got {self.env!r:.80}"
             )
         self.patience = whole_number("patience", self.patience, 5, least=0)
-        self.tolerance = real_number("tolerance", self.tolerance, 0.25, least=0.0)
+        self.tolerance = real_number("tolerance", self.tolerance, 0.25, 0.0, "real")
         self.signals, self.critical = _signals(self.signals), _signals(self.critical)
-        if isinstance(self.silent_neurons, int):
-            self.silent_neurons = (self.silent_neurons,)
+        if isinstance(self.silent_neurons, Integral):
+            self.silent_neurons = (int(self.silent_neurons),)
         anatomy = self.robot.anatomy
         motors = (len(anatomy.motors),)
         if self.safe is None:
@@ -169,7 +170,7 @@ class EnvironmentRobot:
                     f"({', '.join(anatomy.motors)}), got the shape {shape}"
                 )
         seconds = self.watchdog
-        timed = isinstance(seconds, Real) and 0 < seconds < math.inf
+        timed = isinstance(seconds, Real) and seconds is not True and 0 < seconds < math.inf
         if seconds is not None and not (self.stop and timed):
             raise InputError(
                 f"a watchdog needs a time of more than 0 s, and stop=, a function that stops the "
@@ -324,10 +325,10 @@ class EnvironmentRobot:
 
 def _signals(given: str | Collection[Signal]) -> tuple[Signal, ...]:
     """Returns signals, given as one or in a collection, or raises ``InputError``."""
-    names = [given] if isinstance(given, str) else given
+    names = items_of(given)
     for name in names:
         if name not in SIGNALS:
-            raise unknown_name("signal", name, SIGNALS)
+            raise unknown_name("signal", str(name), SIGNALS)
     return tuple(signal for signal in SIGNALS if signal in names)
 
 

@@ -118,9 +118,9 @@ def ablation(
         only: Share of the runs.
     """
     robots = names_of(robots, ROBOT)
-    cases = None if cases is None else whole_numbers("cases", cases)
+    cases = None if cases is None else whole_numbers("cases", cases, 1)
     comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
-    gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds)
+    gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds, 0, 0)
     damages = names_of(damages, "failures in notation", Hypothesis)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings = arguments.settings_of(settings)
@@ -195,8 +195,8 @@ def suite(
     or to its controllers is omitted; the share is of bodies with their seeds. The comparator may be
     ``auto``, and ``score`` is reported per trial too.
     """
-    bodies, cases = names_of(bodies, ROBOT), whole_numbers("cases", cases)
-    seeds, (gap,) = whole_numbers("seeds", seeds), real_numbers("gap", [gap])
+    bodies, cases = names_of(bodies, ROBOT), whole_numbers("cases", cases, 1)
+    seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings = arguments.settings_of(settings)
     comparator_choice(comparator)
@@ -235,8 +235,8 @@ def paper(
     A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
     is exact, and is not calibrated. One value may stand for a sequence of it.
     """
-    robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases)
-    seeds, comparators = whole_numbers("seeds", seeds), plugins.comparator_names(comparators)
+    robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases, 1)
+    seeds, comparators = whole_numbers("seeds", seeds, 0, 0), plugins.comparator_names(comparators)
     settings = arguments.settings_of(settings)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)

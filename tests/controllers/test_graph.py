@@ -207,6 +207,11 @@ def node(operator: str, *inputs: str, out: str = "y", **attributes: float) -> No
         ([node("Add", "x", "x", out="a"), GEMM], {}, "too many values"),
         ([GEMM, Node("Gemm", ("y", "m"), ("y",))], {"m": np.ones((3, 2))}, "of other sizes"),
         ([node("Unsqueeze", "s", out="a"), GEMM], {"s": np.array([1.0])}, "expected axis 0 of ro"),
+        (
+            [node("Unsqueeze", "s", out="a"), Node("Flatten", ("a",), ("b",)), GEMM],
+            {"s": np.array([0.0])},
+            "Flatten .* expected rows",
+        ),
         ([node("Squeeze", "s", out="a"), GEMM], {"s": np.array([0.0])}, "before that of the robot"),
         ([Node("Gemm", ("w", "x"), ("a",)), GEMM], {}, "second factor of Gemm must be a tensor"),
         ([GEMM] * 1001, {}, "it has 1001 operators, expected at most 1000"),
@@ -237,13 +242,18 @@ def test_networks_are_equal_when_their_content_is():
         (State("h", "h1", 2**60), "numbers of the state h, got"),
         (
             State("h", "h1", 2),
-            r"the state h1 has the shape \(1, 2, 3\), expected that of h, \(1, 2",
+            r"the state h1 has the shape \(1, 1, 3\), expected that of h, \(1, 1, 2",
         ),
         (State("h", "z", 3), "no operator computes the output z"),
+        (State("h", "two", 3), r"the state two has the shape \(1, 2, 3\), expected .* \(1, 1, 3\)"),
+        (State("h", "wide", 3), r"the state wide has the shape \(1, 2, 3\), expected .* \(1, 1, 3"),
     ],
 )
 def test_a_state_that_does_not_come_back_is_refused(state: State, match: str):
-    nodes = (GEMM, Node("Unsqueeze", ("x", "zero"), ("h1",)))
-    tensors = {"w": np.ones((2, 3)), "zero": np.zeros(1)}
+    nodes = (
+        *(GEMM, Node("Unsqueeze", ("x", "zero"), ("h1",))),
+        Node("Add", ("h", "two") if state.output == "wide" else ("h1", "two"), ("wide",)),
+    )
+    tensors = {"w": np.ones((2, 3)), "zero": np.zeros(1), "two": np.ones((1, 2, 3))}
     with pytest.raises(ValueError, match=match):
         Graph("x", "y", 3, 2, nodes, tensors, (state,))

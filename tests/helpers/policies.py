@@ -97,7 +97,7 @@ def random_network(*sizes: int, seed: int = 0, activation: str = "Tanh") -> Grap
 RNG = np.random.default_rng(5)
 CELLS: dict[str, tuple[str, dict[str, tuple[str, int]], int]] = {
     "LSTM": ("LSTM<hidden_size=4>", {"h": ("h1", 4), "c": ("c1", 4)}, 4),
-    "GRU": ("GRU<hidden_size=4, linear_before_reset=1>", {"h": ("h1", 4)}, 3),
+    "GRU": ('GRU<hidden_size=4, linear_before_reset=1, direction="forward">', {"h": ("h1", 4)}, 3),
     "plain GRU": ("GRU<hidden_size=4>", {"h": ("h1", 4)}, 3),
 }
 """Recurrent cells as ONNX's text, their states, and their numbers of gates."""

@@ -228,7 +228,6 @@ def cell(text: str, width: int = 4, layers: int = 1) -> bytes:
     own, directions = (2, 2) if "size=2" in text else (4, 1)
     tensors = {"w": np.ones((directions, 3 * own, 6)), "r": np.ones((directions, 3 * own, own))}
     tensors = {name: each.astype(np.float32) for name, each in tensors.items()}
-    text = text.replace("size=2", 'size=2, direction="bidirectional"')
     code = f'u = Unsqueeze(x, z); q, h = {text}(u, w, r, "", "", h0); y = Squeeze(h, z)'
     return onnx_bytes(
         code, {**tensors, "z": np.array([0])}, 6, own, states={"h0": ("h", width)}, layers=layers
@@ -248,6 +247,8 @@ def cell(text: str, width: int = 4, layers: int = 1) -> bytes:
         (cell("GRU<hidden_size=4, clip=1.0>"), "its clip is not supported"),
         (cell("GRU<hidden_size=4>", width=5), "GRU of the shapes"),
         (cell("GRU<hidden_size=2>"), "expected weights of one direction"),
+        (cell('GRU<hidden_size=4, direction="reverse">'), "direction reverse of GRU is not supp"),
+        (cell("GRU<hidden_size=7>"), "expected weights of the hidden size, which are of 4"),
         (edited(without_weights), "expected a network as ONNX"),
         (onnx_bytes("y = Erf(x)", {}, 6, 6), "the operator Erf is not supported"),
     ],
