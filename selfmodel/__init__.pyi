@@ -4,9 +4,6 @@ from .api import (
     evolve_controller as evolve_controller,
     recover as recover,
     replay as replay,
-    run_trial as run_trial,
-    simulated_robot as simulated_robot,
-    write_log as write_log,
 )
 from .arguments import load_robot as load_robot, parse_hypothesis as parse_hypothesis
 from .controllers.controller import Controller as Controller
@@ -18,6 +15,11 @@ from .faults.registry import ALL_KINDS as ALL_KINDS, PAPER_KINDS as PAPER_KINDS
 from .logs.reader import read_log as read_log
 from .physical.environment import EnvironmentRobot as EnvironmentRobot
 from .physical.interface import PhysicalRobot as PhysicalRobot
+from .recording import (
+    run_trial as run_trial,
+    simulated_robot as simulated_robot,
+    write_log as write_log,
+)
 from .recovery.result import Recovery as Recovery
 from .robot.robot import Robot as Robot
 from .settings import Settings as Settings

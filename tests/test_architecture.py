@@ -14,7 +14,8 @@ LINKED = ("tasks", "comparators", "logs")
 
 ROOMS = (
     *("controllers", "trials", "robot", "faults", "simulation", "physical", "diagnosis"),
-    *("recovery", *LINKED, "plugins", "arguments", "testing", "studies", "api", "report", "cli"),
+    *("recovery", *LINKED, "plugins", "arguments", "testing", "studies", "recording", "api"),
+    *("report", "cli"),
 )
 """The rooms, in the order in which data flows: each may import itself and the rooms before it. Some
 are a file: plug-ins, arguments, the public functions, and contract checks."""
