@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from typer.testing import CliRunner
 
-from selfmodel import api, plugins
+from selfmodel import api, plugins, recording
 from selfmodel.cli import app, commands, inputs
 from selfmodel.cli.groups import options, parameters_of
 from selfmodel.errors import InputError
@@ -47,8 +47,8 @@ def defaults(target: Callable[..., object]) -> dict[str, Any]:
         (commands.Diagnose, api.diagnose, {}),
         (commands.Calibrate, api.calibrate, {}),
         (commands.ReplayTrial, api.replay, {}),
-        (commands.RunTrial, api.run_trial, {}),
-        (commands.RunTrial, api.simulated_robot, {}),
+        (commands.RunTrial, recording.run_trial, {}),
+        (commands.RunTrial, recording.simulated_robot, {}),
         (commands.Study, Settings, {}),
         (commands.Ablate, plans.ablation, {}),
         (commands.RunSuite, plans.suite, {}),
