@@ -22,10 +22,9 @@ from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import ignore
 from selfmodel.recovery import recover as recovery_loop
-from selfmodel.recovery.repair import RepairSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, check_measurable, observed_of
+from selfmodel.recovery.scores import Score, check_measurable, observed_of
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -43,12 +42,15 @@ def evolve_controller(
     design: str | Design = "network",
     seeds: Controller | str | Path | Sequence[Controller | str | Path] = (),
     settings: Settings | None = None,
-    score: Score | str = DISPLACEMENT,
+    score: Score | str | None = None,
+    repair: str = plugins.ROBUST,
+    search: str | None = None,
+    repertoire: Repertoire | str | Path | None = None,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = ignore,
 ) -> Controller:
-    """Returns the controller with the largest score that the repair EA finds.
+    """Returns the best controller that a repair finds: by default the first gait of ``recover``.
 
     Example:
         >>> import selfmodel
@@ -62,7 +64,11 @@ def evolve_controller(
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         seeds: Controllers of the first generation, or their files, in addition to random ones.
         settings: Parameters of the search; the paper's by default.
-        score: Fitness, its name, or ``package.module:object``; the displacement by default.
+        score: Fitness, its name, or ``package.module:object``; by default that of the repair.
+        repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
+            simulation.
+        search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair.
+        repertoire: Gaits from which the search begins, or the path of their file.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the search.
@@ -75,9 +81,12 @@ def evolve_controller(
     arguments.check_options(on_event)
     robot = (entry := arguments.entry_of(robot)).robot()
     chosen = arguments.design_of(design, robot)
+    repair, chosen, _ = plugins.repaired_around(repair, chosen, None)
+    score = score or plugins.DEFAULT_SCORES[repair]
     fitness, _ = choose_score(score, entry, chosen, steps=settings.steps, seed=seed)
-    repair = RepairSearch(Simulator(robot, threads), settings, chosen, score=fitness)
-    repaired = repair(
+    gaits = arguments.repertoire_of(repertoire, robot, chosen)
+    make_repair = plugins.repair(repair, search, gaits)
+    repaired = make_repair(Simulator(robot, threads), settings, chosen, fitness)(
         (arguments.parse_hypothesis(hypothesis, robot),),
         partial(assumed_uncertainty, robot),
         [arguments.controller_of(one, robot) for one in items_of(seeds)],
@@ -304,7 +313,7 @@ def recover(
     if gait is not None:
         arguments.check_robot(gait.design, robot, "the gait")
     repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
-    score = score or (DISPLACEMENT if repair == plugins.PAPER else UPRIGHT)
+    score = score or plugins.DEFAULT_SCORES[repair]
     score, gait = choose_score(score, entry, drawn, steps=chosen.steps, seed=seed, gait=gait)
     check_measurable(score, robot, observed_of(healthy, damaged))
     make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))

@@ -38,17 +38,17 @@ def reference() -> selfmodel.Diagnosis:
     return diagnosis()
 
 
-@pytest.fixture
-def recovery(tmp_path: Path) -> selfmodel.Recovery:
+def recovered(folder: Path, **options: object) -> selfmodel.Recovery:
+    """A small recovery without a calibration."""
     healthy = selfmodel.simulated_robot("quadruped")
     damaged = selfmodel.simulated_robot("quadruped", KNEE)
-    return selfmodel.recover(
-        *(healthy, damaged, "quadruped", tmp_path / "run"),
-        settings=SMALL,
-        calibrate=False,
-        comparator=FORWARD_DISPLACEMENT,
-        repair="paper",
-    )
+    given = {"settings": SMALL, "calibrate": False, "comparator": FORWARD_DISPLACEMENT}
+    return selfmodel.recover(healthy, damaged, "quadruped", folder, **given, **options)
+
+
+@pytest.fixture
+def recovery(tmp_path: Path) -> selfmodel.Recovery:
+    return recovered(tmp_path / "run", repair="paper")
 
 
 @pytest.mark.parametrize(
@@ -122,6 +122,13 @@ def test_a_controller_evolves_equally_from_names_and_objects():
     assert named == selfmodel.evolve_controller(
         robot, knee, design=named.design, settings=SMALL, seed=1, threads=1
     )
+
+
+@pytest.mark.parametrize("options", [{}, {"repair": "paper"}, {"search": "ea", "seed": 3}])
+def test_a_controller_evolves_as_the_first_gait_of_a_recovery(tmp_path: Path, options: dict):
+    first = recovered(tmp_path / "run", kinds="jam", **options).trials[0].plan.controller
+
+    assert first == selfmodel.evolve_controller("quadruped", settings=SMALL, **options)
 
 
 @pytest.mark.parametrize(

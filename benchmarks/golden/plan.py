@@ -254,7 +254,7 @@ def _commands() -> Iterator[Scenario]:
     small = "--steps 100 --population 8 --generations 2 --workers 1 --json"
     ablate = (
         "ablate --robots quadruped --comparator forward-displacement,segment-prediction --case 1 "
-        f"--seeds 2 --out study {small}"
+        f"--repair paper --seeds 2 --out study {small}"
     )
     yield "commands/ablate", {"ablate": ablate, "compare": "compare study --json"}
     displacement = "--case 1 --comparator forward-displacement --trials 1 --out study"

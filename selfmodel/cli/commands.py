@@ -89,7 +89,7 @@ class Study(Command):
 class Repair(Command):
     """The repair of a study's recoveries."""
 
-    repair: str = "paper"
+    repair: str | None = None
     search: str | None = None
     score: str | None = None
     only: str = "1/1"

@@ -66,18 +66,6 @@ def numbers(option: str, given: str) -> tuple[float, ...]:
         raise InputError(f"{option} needs {expected}, got {given!r}") from None
 
 
-def share(option: str, given: str) -> tuple[int, int]:
-    """Returns ``(i, n)`` of the text ``i/n``, every n-th run from the i-th, or an InputError."""
-    first, _, count = given.partition("/")
-    is_pair = first.isdecimal() and count.isdecimal() and len(given) <= 20
-    if not (is_pair and 1 <= int(first) <= int(count)):
-        raise InputError(
-            f"{option} needs i/n, the i-th of every n runs with i from 1 to n, such as 2/8, "
-            f"got {given!r}"
-        )
-    return int(first), int(count)
-
-
 def check_new_file(path: Path, *endings: str) -> None:
     """Checks the name of a file to be written.
 

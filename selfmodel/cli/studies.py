@@ -45,7 +45,7 @@ def ablate(options: Ablate) -> None:
         score=options.score,
         repair=options.repair,
         search=options.search,
-        only=inputs.share("--only", options.only),
+        only=options.only,
     )
     _run(study, options, formats.ablation_results)
 
@@ -76,7 +76,7 @@ def run_suite(options: RunSuite) -> None:
         neurons=options.neurons,
         repair=options.repair,
         search=options.search,
-        only=inputs.share("--only", options.only),
+        only=options.only,
     )
     _run(study, options, formats.suite_results)
 

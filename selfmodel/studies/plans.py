@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -11,9 +12,16 @@ from urllib.parse import quote
 
 from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
-from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.errors import InputError, names_of, real_numbers, unknown_name, whole_numbers
+from selfmodel.errors import (
+    InputError,
+    items_of,
+    names_of,
+    real_numbers,
+    unknown_name,
+    whole_numbers,
+)
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
@@ -77,20 +85,20 @@ ROBOT = "names of robots or paths of their models, which each process of a study
 def ablation(
     folder: str | Path,
     *,
-    robots: str | Path | Iterable[str | Path],
-    cases: int | Iterable[int] | None,
-    comparators: str | Comparator | Iterable[str | Comparator],
-    gaps: float | Iterable[float],
-    seeds: int | Iterable[int],
+    robots: str | Path | Iterable[str | Path] = tuple(ROBOTS),
+    cases: int | Iterable[int] | None = None,
+    comparators: str | Comparator | Iterable[str | Comparator] = tuple(COMPARATORS),
+    gaps: float | Iterable[float] = 0.0,
+    seeds: int | Iterable[int] = range(1),
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
     next_trial: str = BANK,
     bank: str | Path | None = None,
     score: str | Score | None = None,
-    repair: str = plugins.PAPER,
+    repair: str | None = None,
     search: str | None = None,
-    only: Share = ALL,
+    only: Share | str = ALL,
 ) -> Study:
     """Returns a study in which every comparator diagnoses the same trials.
 
@@ -113,9 +121,10 @@ def ablation(
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: The fitness, or its name; None for that of the repair.
-        repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
+        repair: Name of the repair that evolves gaits and recoveries, ``robust``, the default, or
+            ``paper``.
         search: Name of its search; None for that of the repair.
-        only: Share of the runs.
+        only: Share of the runs, such as ``(2, 8)`` or ``2/8``.
     """
     robots = names_of(robots, ROBOT)
     cases = None if cases is None else whole_numbers("cases", cases, 1)
@@ -123,12 +132,12 @@ def ablation(
     gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds, 0, 0)
     damages = names_of(damages, "failures in notation", Hypothesis)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
-    settings = arguments.settings_of(settings)
+    settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
     _check(lists, cases, damages, next_trial, trials)
-    if bank is not None and by_bank and repair != plugins.PAPER:
+    if bank is not None and by_bank and repair is not None:
         raise InputError(
             f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
             f"--repair {repair}: leave one of them out, or give --next-trial repair"
@@ -145,7 +154,7 @@ def ablation(
         for seed, robot in itertools.product(seeds, robots)
         for case, truth in failures[robot]
         for gap in gaps
-    ][only[0] - 1 :: only[1]]
+    ][share - 1 :: shares]
     # The trials of a recovery exclude the failing one.
     own = dataclasses.replace(settings, trials=trials if by_bank else trials - 1)
     evolves = {"evolves": bank is None or not by_bank}
@@ -175,30 +184,31 @@ def ablation(
 def suite(
     folder: str | Path,
     *,
-    bodies: str | Path | Iterable[str | Path],
-    cases: int | Iterable[int],
-    seeds: int | Iterable[int],
-    settings: Settings,
-    comparator: str | Comparator,
+    bodies: str | Path | Iterable[str | Path] | None = None,
+    cases: int | Iterable[int] | None = None,
+    seeds: int | Iterable[int] = range(1),
+    settings: Settings = Settings(),  # noqa: B008  # frozen
+    comparator: str | Comparator = SEGMENT_PREDICTION.name,
     controller: str = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
     gap: float = 0.0,
     score: str | Score | None = None,
-    repair: str = plugins.PAPER,
+    repair: str | None = None,
     search: str | None = None,
-    only: Share = ALL,
+    only: Share | str = ALL,
 ) -> Study:
     """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.
 
-    Bodies are names of robots, or paths of MJCF or URDF files. A case that does not apply to a body
-    or to its controllers is omitted; the share is of bodies with their seeds. The comparator may be
-    ``auto``, and ``score`` is reported per trial too.
+    Bodies are names of robots, or paths of MJCF or URDF files; by default those of all domains. A
+    case that does not apply to a body or to its controllers is omitted; the share is of bodies with
+    their seeds. The comparator may be ``auto``, and ``score`` is reported per trial too.
     """
-    bodies, cases = names_of(bodies, ROBOT), whole_numbers("cases", cases, 1)
+    bodies = bodies_of(tuple(DOMAINS), None) if bodies is None else names_of(bodies, ROBOT)
+    cases = known_cases(bodies) if cases is None else whole_numbers("cases", cases, 1)
     seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
-    settings = arguments.settings_of(settings)
+    settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score)
@@ -206,7 +216,7 @@ def suite(
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
     _check_cases("case of these bodies", cases, known_cases(bodies))
     points: list[Point] = []
-    for seed, body in list(itertools.product(seeds, bodies))[only[0] - 1 :: only[1]]:
+    for seed, body in list(itertools.product(seeds, bodies))[share - 1 :: shares]:
         entry, robot = entries[body], entries[body].robot()
         check_score(chosen["score"], entry)
         hidden = plugins.design(controller, robot, neurons).hidden
@@ -364,6 +374,18 @@ def _check_cases(what: str, cases: Sequence[int], known: Iterable[int]) -> None:
     names = list(map(str, known))
     for case in cases:
         plugins.check_known(what, str(case), names)
+
+
+def share_of(only: object) -> Share:
+    """Returns a share, given as a pair or as the text ``i/n``, or raises ``InputError``."""
+    pair = only.split("/") if isinstance(only, str) else items_of(only)
+    whole = [int(str(one)) for one in pair if re.fullmatch("[0-9]{1,9}", str(one), re.ASCII)]
+    if not (len(pair) == len(whole) == 2 and 1 <= whole[0] <= whole[1]):
+        raise InputError(
+            f"--only needs i/n, the i-th of every n runs with i from 1 to n, such as 2/8, in "
+            f"Python only=(2, 8), got {only!r:.80}"
+        )
+    return whole[0], whole[1]
 
 
 def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:

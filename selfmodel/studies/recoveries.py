@@ -93,8 +93,11 @@ def robot_key(robot: str) -> str:
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "_"
 
 
-def repair_parameters(repair: str, search: str | None, score: Score | str | None) -> dict[str, str]:
-    """Returns the names that determine a repair, with the defaults of the repair for None."""
+def repair_parameters(
+    repair: str | None, search: str | None, score: Score | str | None
+) -> dict[str, str]:
+    """Returns the names that determine a repair, the robust one by default, with its defaults."""
+    repair = plugins.ROBUST if repair is None else repair
     if search == plugins.REPERTOIRE:
         raise InputError(
             f"a repertoire is of one robot, and a study of many has none, got --search {search}: "

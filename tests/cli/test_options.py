@@ -28,7 +28,8 @@ COMMANDS = [
 
 PARSERS: dict[str, Callable[[str], object]] = {
     "kinds": plugins.kinds,
-    "only": lambda text: inputs.share("--only", text),
+    "only": plans.share_of,
+    "gaps": float,
     "next_trial": lambda text: plugins.NEXT_TRIAL.get(text, text),
 }
 """What makes the library's values of options that are texts."""

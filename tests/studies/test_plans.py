@@ -67,20 +67,20 @@ def test_all_cases_are_those_that_each_robot_can_have(tmp_path: Path):
 
 
 @pytest.mark.parametrize("made", [ablated, bodies])
-def test_the_repair_is_the_papers_unless_another_is_given_which_has_its_own_score(
+def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_own_score(
     made: type, tmp_path: Path
 ):
     (plain,) = made(tmp_path).cells()
-    (robust,) = made(tmp_path, repair="robust").cells()
+    (papers,) = made(tmp_path, repair="paper").cells()
     (same,) = made(tmp_path, repair="robust", search="cma-es", score="upright").cells()
     shared, names = plain.parameters["shared"], ("repair", "search", "score")
 
-    assert [shared[name] for name in names] == ["paper", "ea", "displacement"]
-    assert robust.parameters["shared"] == {
+    assert [shared[name] for name in names] == ["robust", "cma-es", "upright"]
+    assert papers.parameters["shared"] == {
         **shared,
-        **dict(zip(names, ("robust", "cma-es", "upright"), strict=True)),
+        **dict(zip(names, ("paper", "ea", "displacement"), strict=True)),
     }
-    assert robust.place == same.place != plain.place
+    assert plain.place == same.place != papers.place
 
 
 @pytest.mark.parametrize(
@@ -97,6 +97,7 @@ def test_the_repair_is_the_papers_unless_another_is_given_which_has_its_own_scor
         (ablated, {"repair": "robust", "bank": Path("gaits")}, "nothing is evolved"),
         (ablated, {"bank": Path("gaits")}, "quadruped-5.npz: expected a controller file"),
         (ablated, {"robots": ["a.xml", "./a.xml"], "cases": [9]}, "would have the same file names"),
+        (ablated, {"only": (0, 1)}, r"only=\(2, 8\), got \(0, 1\)"),
         (bodies, {"cases": [11]}, "unknown case of these bodies '11'"),
         (bodies, {"score": "retrn"}, "unknown score .retrn"),
         (bodies, {"comparator": "no-such"}, "unknown comparator"),
