@@ -22,7 +22,7 @@ def main(folder: Path) -> None:
         seeds=range(2),
         settings=Settings(steps=60, generations=2, trials=1).scaled(8),
     )
-    failed = study.run(workers=2, on_progress=print)
+    failed = study.run(workers=2, on_event=print)
     found = ablation_results(folder)
     for score in found.facts["scores"]:
         name, trials = score["comparator"], score["trials"]

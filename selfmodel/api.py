@@ -20,7 +20,7 @@ from selfmodel.files import path_of
 from selfmodel.logs import physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
-from selfmodel.progress import ignore
+from selfmodel.progress import Progress, ignore, timed
 from selfmodel.recovery import recover as recovery_loop
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
@@ -101,6 +101,7 @@ def calibrate(
     robot: RobotSource,
     *,
     threads: int = 0,
+    on_event: Callable[[Progress], None] = ignore,
 ) -> Calibration:
     """Returns the self-model of a robot, fitted to trials of the healthy robot.
 
@@ -119,13 +120,16 @@ def calibrate(
         trials: Trials of the healthy robot, or paths of their logs, at least one.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         threads: Threads of the physics; 0 for all processors.
+        on_event: Called with the progress of the fit.
 
     Raises:
         InputError: There are no trials, a log is unusable, or a trial lacks the signals that a fit
             needs.
     """
+    arguments.check_options(on_event)
     (healthy,), _ = arguments.trials_of(trials)
-    return calibration.calibrate(arguments.load_robot(robot), healthy, thread_count(threads))
+    threads, on_event = thread_count(threads), timed(on_event)
+    return calibration.calibrate(arguments.load_robot(robot), healthy, threads, on_event)
 
 
 def replay(
@@ -209,7 +213,7 @@ def diagnose(
     """
     seed = None if seed is None else whole_number("seed", seed, 0, least=0)
     arguments.check_options(on_event, calibrate=calibrate)
-    own = None if robot is None else arguments.load_robot(robot)
+    on_event, own = timed(on_event), None if robot is None else arguments.load_robot(robot)
     choose, searched = arguments.comparator_choice(comparator), arguments.kinds_of(kinds)
     (to_explain, reference), logs = arguments.trials_of(trials, () if healthy is None else healthy)
     if not to_explain:
@@ -304,7 +308,7 @@ def recover(
     """
     arguments.check_physical(healthy, damaged)
     arguments.check_options(on_event, calibrate=calibrate)
-    folder = path_of(folder, "a new or empty folder")
+    folder, on_event = path_of(folder, "a new or empty folder"), timed(on_event)
     robot = (entry := arguments.entry_of(robot)).robot()
     seed, count = whole_number("seed", seed, 0, least=0), thread_count(threads)
     chosen, searched = arguments.settings_of(settings), arguments.kinds_of(kinds)

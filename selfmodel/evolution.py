@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.errors import counted
+from selfmodel.progress import time_left
 from selfmodel.settings import Settings
 
 Draw = Callable[[np.random.Generator, tuple[int, ...]], FloatArray]
@@ -16,7 +18,7 @@ Draw = Callable[[np.random.Generator, tuple[int, ...]], FloatArray]
 
 @dataclass(frozen=True)
 class Generation:
-    """Progress of a search.
+    """Progress of a search, whose text is a line with the time left.
 
     Attributes:
         number: Generations evaluated so far.
@@ -31,6 +33,25 @@ class Generation:
     best: float
     evaluations: int
     seconds: float
+
+    def __str__(self) -> str:
+        if self.number < self.total:
+            line = f"generation {self.number} of {self.total}: {self.detail}"
+            left = time_left(self.number / self.total, self.seconds)
+            return ", ".join(filter(None, (line, left)))
+        every = f"{counted(self.number, 'generation')}, {counted(self.evaluations, 'evaluation')}"
+        diverged = self.best == -np.inf
+        best = "every simulation diverged" if diverged else f"best {self.best:.4f}"
+        return f"{every}, {self._rate}, {best}"
+
+    @property
+    def detail(self) -> str:
+        """The best fitness and the rate as text."""
+        return f"best {self.best:.3f}, {self._rate}"
+
+    @property
+    def _rate(self) -> str:
+        return f"{self.evaluations / self.seconds:.0f}/s" if self.seconds else "-/s"
 
 
 GenerationCallback = Callable[[Generation], None]

@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
     study = study_of(given)
-    failed = study.run(workers=given.workers, on_progress=print)
+    failed = study.run(workers=given.workers, on_event=print)
     kind = KINDS["rivals"]
     rows = sorted(
         ({name: row[name] for name in kind.columns} for row in study.rows()), key=kind.order

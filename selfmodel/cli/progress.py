@@ -14,14 +14,11 @@ from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import counted
 from selfmodel.evolution import Generation
-from selfmodel.progress import Progress
+from selfmodel.progress import Progress, time_left, timed
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.studies.grid import CellEnds, GridBegins
 from selfmodel.trials.trial import Trial
-
-_SEARCHES = {"repair": "repair", "diagnostic": "diagnostic EA"}
-"""Text of each kind of search."""
 
 QUIET = 10.0
 """Time between two lines of the progress of a stage where standard error is no terminal, s."""
@@ -74,30 +71,26 @@ class _Events(Display):
     def __init__(self, bar: bars.Progress | None, describe: Callable[[Trial], str]) -> None:
         super().__init__(bar)
         self._describe = describe
-        self._search = self._kind = self._stage = ""
-        self._start = self._told = monotonic()
+        self._search, self._stage = SearchBegins(""), timed(self._show)
+        self._told = monotonic()
 
     def __call__(self, event: Event) -> None:
         match event:
-            case SearchBegins(kind, hypothesis):
-                purpose = "" if hypothesis is None else f" for {hypothesis}"
-                # Without the hypothesis, the bar fits a narrow terminal.
-                self._kind, self._search = _SEARCHES[kind], f"{_SEARCHES[kind]}{purpose}"
-                self._show(Progress(self._kind, 0, 1))
+            case SearchBegins():
+                self._search = event
+                self._show(Progress(event.search, 0, 1))
             case Generation():
-                best = f"best {event.best:.3f}, {_rate(event)}/s"
-                self._show(Progress(self._kind, event.number, event.total), best)
+                # Without the hypothesis, the bar fits a narrow terminal.
+                now = Progress(self._search.search, event.number, event.total, event.seconds)
+                self._show(now, event.detail)
                 if event.number == event.total:
-                    self.print_lines(f"{self._search}: {_end(event)}")
+                    self.print_lines(f"{self._search}: {event}")
             case Progress():
-                self._show(event)
-            case ChosenComparator():
-                self.print_lines(f"comparator {event.comparator.name}: {event.reason}")
+                self._stage(event)
+            case ChosenComparator() | DiscriminatingTrial():
+                self.print_lines(str(event))
             case Calibration():
                 self.print_lines(*_fit_lines(event))
-            case DiscriminatingTrial():
-                apart = ", ".join(map(str, event.hypotheses))
-                self.print_lines(f"the next trial discriminates between: {apart}")
             case Trial():
                 self.print_lines(f"trial {event.plan.name}: {self._describe(event)}")
             case Diagnosis():
@@ -109,45 +102,17 @@ class _Events(Display):
 
     def _show(self, now: Progress, detail: str = "") -> None:
         """Shows a stage, on one bar for all, or by a line now and then."""
-        time, share = monotonic(), now.done / now.total
-        if now.stage != self._stage or not share:
-            self._stage, self._start = now.stage, time
-        left = time_left(share, time - self._start)
+        share = now.done / now.total
+        left = time_left(share, now.seconds)
         if self.bar:
             for task in self.bar.task_ids:
                 self.bar.remove_task(task)
             if share < 1:
                 words = ", ".join(filter(None, (detail, left)))
                 self.bar.add_task(now.stage, total=100, completed=round(100 * share), detail=words)
-        elif left and time - self._told >= QUIET:
-            self._told = time
-            self.print_lines(f"{now.stage}: {share:.0%}, {left}")
-
-
-def time_left(share: float, seconds: float) -> str:
-    """Returns the time left as text, of a stage of which a share is done; nothing if unknown.
-
-    Examples:
-        >>> time_left(0.25, 20.0)
-        'about 1 min 00 s left'
-    """
-    if not 0 < share < 1:
-        return ""
-    minutes, left = divmod(max(round(seconds * (1 - share) / share), 1), 60)
-    return f"about {minutes} min {left:02d} s left" if minutes else f"about {left} s left"
-
-
-def _rate(now: Generation) -> str:
-    return f"{now.evaluations / now.seconds:.0f}" if now.seconds else "-"
-
-
-def _end(last: Generation) -> str:
-    diverged = last.best == -math.inf
-    return (
-        f"{counted(last.number, 'generation')}, {counted(last.evaluations, 'evaluation')}, "
-        f"{_rate(last)}/s, "
-        f"{'every simulation diverged' if diverged else f'best {last.best:.4f}'}"
-    )
+        elif left and monotonic() - self._told >= QUIET:
+            self._told = monotonic()
+            self.print_lines(str(now))
 
 
 def _fit_lines(fit: Calibration) -> list[str]:
@@ -181,38 +146,19 @@ class GridDisplay(Display):
     def __init__(self, bar: bars.Progress | None) -> None:
         super().__init__(bar)
         self.done = self.total = 0
-        self._before, self._start = 0, monotonic()
 
     def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         if isinstance(event, GridBegins):
             self.done, self.total = event.finished, event.total
-            self._before, self._start = event.finished, monotonic()
             if self.bar:
                 self.bar.add_task("", total=event.total, completed=event.finished)
             elif event.finished:
-                self.print_lines(f"{event.finished} of {event.total} were done before")
+                self.print_lines(str(event))
             return
         self.done = event.number
-        seconds = monotonic() - self._start
-        speed = pace(event.number - self._before, event.total - event.number, seconds)
         if self.bar:
-            self.bar.update(self.bar.task_ids[0], completed=event.number, description=speed)
+            task = self.bar.task_ids[0]
+            self.bar.update(task, completed=event.number, description=event.pace)
         if event.error is not None or not self.bar:
-            end = f"failed: {event.error}" if event.error else f"done in {event.seconds:.1f} s"
-            line = f"[{event.number}/{event.total}] {event.name}: {end}"
-            self.print_lines("; ".join(filter(None, (line, speed))))
-
-
-def pace(done: int, left: int, seconds: float) -> str:
-    """Returns the rate of cells and the time left as text; nothing at the end.
-
-    Examples:
-        >>> pace(10, 35, 600.0)
-        '60 an hour, 0 h 35 min left'
-    """
-    if not (done and left and seconds > 0):
-        return ""
-    rate = done / seconds
-    minutes = math.ceil(left / rate / 60)
-    return f"{3600 * rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
+            self.print_lines(str(event))

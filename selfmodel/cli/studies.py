@@ -139,7 +139,7 @@ def _compute(study: Study, options: Options) -> Sequence[CellEnds]:
     workers = thread_count(options.workers)
     with opened as given, grid_display() as shown:
         try:
-            return study.run(executor=given, workers=workers, on_progress=shown)
+            return study.run(executor=given, workers=workers, on_event=shown)
         except KeyboardInterrupt as interruption:
             interruption.add_note(
                 f"{shown.done} of {shown.total} are done and kept in {study.folder}; the same "

@@ -70,6 +70,9 @@ class ChosenComparator:
     comparator: Comparator
     reason: str
 
+    def __str__(self) -> str:
+        return f"comparator {self.comparator.name}: {self.reason}"
+
 
 ComparatorChoice = Callable[[Robot, Sequence[Trial]], ChosenComparator]
 """Returns a comparator that accepts all trials of a robot, or raises ``InputError``."""

@@ -22,12 +22,23 @@ class SearchBegins:
     kind: str
     hypothesis: Hypothesis | None = None
 
+    @property
+    def search(self) -> str:
+        """Name of the kind of search as text."""
+        return "diagnostic EA" if self.kind == "diagnostic" else self.kind
+
+    def __str__(self) -> str:
+        return self.search if self.hypothesis is None else f"{self.search} for {self.hypothesis}"
+
 
 @dataclass(frozen=True)
 class DiscriminatingTrial:
     """Start of a search for the controller whose trial separates hypotheses, best first."""
 
     hypotheses: tuple[Hypothesis, ...]
+
+    def __str__(self) -> str:
+        return f"the next trial discriminates between: {', '.join(map(str, self.hypotheses))}"
 
 
 Event = (
@@ -42,7 +53,7 @@ Event = (
 )
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
 a search, the progress of another stage, the chosen comparator, the calibration, a finished trial, a
-diagnosis."""
+diagnosis. ``print`` shows each as text, those of a stage with the time left."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """A grid of cells, computed by any executor and continued after any interruption."""
 
 import asyncio
+import math
 import multiprocessing
 import os
 import signal
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from multiprocessing import resource_tracker
 from pathlib import Path
+from time import perf_counter
 from typing import ParamSpec, TypeVar
 
 from selfmodel.errors import InputError, WorkError
@@ -37,16 +39,36 @@ class GridBegins:
     total: int
     finished: int
 
+    def __str__(self) -> str:
+        return f"{self.finished} of {self.total} were done before"
+
 
 @dataclass(frozen=True)
 class CellEnds:
-    """End of a cell: its number of the total, its wall time, s, and the reason of a failure."""
+    """End of a cell: its number of the total, its wall time, s, and the reason of a failure.
+
+    ``rate`` is the number of cells per second so far. The text is a line with the time left.
+    """
 
     name: str
     number: int
     total: int
     seconds: float
     error: str | None
+    rate: float = 0.0
+
+    def __str__(self) -> str:
+        end = f"failed: {self.error}" if self.error else f"done in {self.seconds:.1f} s"
+        line = f"[{self.number}/{self.total}] {self.name}: {end}"
+        return "; ".join(filter(None, (line, self.pace)))
+
+    @property
+    def pace(self) -> str:
+        """The rate and the time left as text; nothing at the end."""
+        if not (self.rate and self.number < self.total):
+            return ""
+        minutes = math.ceil((self.total - self.number) / self.rate / 60)
+        return f"{3600 * self.rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
 
 
 def run_grid(
@@ -55,7 +77,7 @@ def run_grid(
     *,
     executor: Executor | None = None,
     workers: int = 1,
-    on_progress: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
+    on_event: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
 ) -> tuple[CellEnds, ...]:
     """Computes all cells that are not finished, and returns the failed ones.
 
@@ -68,7 +90,7 @@ def run_grid(
         cells: The cells; those that they need are computed as well, once.
         executor: Executor whose workers can import selfmodel; None for processes of this machine.
         workers: Number of these processes.
-        on_progress: Callback for the start of the grid and for every cell that ends.
+        on_event: Called with the start of the grid and the end of every cell.
 
     Raises:
         InputError: A cell in the folder is damaged or of other code, or a worker has other code.
@@ -77,16 +99,18 @@ def run_grid(
     """
     every = _with_needs(cells)
     left = _unfinished(folder, cells, every)
-    number = len(every) - len(left)
-    on_progress(GridBegins(len(every), number))
+    number = before = len(every) - len(left)
+    on_event(GridBegins(len(every), number))
+    start = perf_counter()
     failures: list[CellEnds] = []
     if left:
         make_folder(folder)
         for cell, (seconds, error) in _computed(folder, left, executor, workers):
             number += 1
-            end = CellEnds(cell.name, number, len(every), seconds, error)
+            rate = (number - before) / (perf_counter() - start)
+            end = CellEnds(cell.name, number, len(every), seconds, error, rate)
             failures += [end] if error is not None else []
-            on_progress(end)
+            on_event(end)
     with suppress(OSError):  # another command computes cells there
         (folder / UNFINISHED).rmdir()
     return tuple(failures)

@@ -83,11 +83,11 @@ class Study:
         *,
         executor: Executor | None = None,
         workers: int = 1,
-        on_progress: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
+        on_event: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
     ) -> tuple[CellEnds, ...]:
         """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
         return run_grid(
-            self.folder, self.cells(), executor=executor, workers=workers, on_progress=on_progress
+            self.folder, self.cells(), executor=executor, workers=workers, on_event=on_event
         )
 
     def rows(self, table: str | None = None) -> list[Row]:

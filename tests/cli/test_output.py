@@ -10,7 +10,7 @@ import pytest
 from mcap.records import Attachment, Channel, McapRecord, Metadata
 
 from selfmodel.cli.output import counted_warnings, print_json, print_lines, print_notes
-from selfmodel.cli.progress import grid_display, pace
+from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import WIDTH, folding, print_tables, show, text_console
 from selfmodel.logs import records
 from selfmodel.studies.grid import CellEnds, GridBegins
@@ -187,7 +187,7 @@ def test_no_command_prints_a_forged_line(folder: Path, arguments: tuple[str, ...
 def test_the_pace_of_a_study_is_that_of_this_call_and_the_time_left(
     done: int, left: int, seconds: float, text: str
 ):
-    assert pace(done, left, seconds) == text
+    assert CellEnds("run-1", done, done + left, 0.0, None, done / seconds).pace == text
 
 
 def test_off_a_terminal_every_cell_is_a_line_with_rate_and_time_left(
@@ -195,13 +195,12 @@ def test_off_a_terminal_every_cell_is_a_line_with_rate_and_time_left(
 ):
     with grid_display() as on_event:
         on_event(GridBegins(total=3, finished=1))
-        on_event(CellEnds("run-1 auto", 2, 3, 1.25, None))
-        on_event(CellEnds("run-2 auto", 3, 3, 1.25, "it diverged"))
+        on_event(CellEnds("run-1 auto", 2, 3, 1.25, None, rate=0.1))
+        on_event(CellEnds("run-2 auto", 3, 3, 1.25, "it diverged", rate=0.1))
     before, done, failed = capsys.readouterr().err.splitlines()
 
     assert before == "1 of 3 were done before"
-    assert done.startswith("[2/3] run-1 auto: done in 1.2 s; ")
-    assert done.endswith(" an hour, 0 h 01 min left")
+    assert done == "[2/3] run-1 auto: done in 1.2 s; 360 an hour, 0 h 01 min left"
     assert failed == "[3/3] run-2 auto: failed: it diverged"
 
 

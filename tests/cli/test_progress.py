@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import selfmodel
+from selfmodel import progress as times
 from selfmodel.cli import progress
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress
@@ -37,6 +38,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The time that the display reads, s."""
     now = [0.0]
     monkeypatch.setattr(progress, "monotonic", lambda: now[0])
+    monkeypatch.setattr(times, "perf_counter", lambda: now[0])
     return now
 
 
@@ -93,3 +95,20 @@ def test_calibration_refinement_and_detectable_severities_report_from_their_star
         assert shares[stage] == sorted(shares[stage]), stage
         assert shares[stage][-1] == 1.0, stage
         assert len(shares[stage]) > 2, stage
+
+
+def test_printed_events_are_lines_with_the_time_left(
+    clock: list[float], capsys: pytest.CaptureFixture[str]
+):
+    on_event = times.timed(print)
+    for clock[0], event in EVENTS[1:7]:
+        on_event(event)
+
+    assert capsys.readouterr().out.splitlines() == [
+        "calibration: 25%",  # it began unseen
+        "calibration: 50%, about 8 s left",
+        "calibration: 100%",
+        "diagnostic EA",
+        "generation 10 of 30: best -0.250, 30/s, about 20 s left",
+        "30 generations, 900 evaluations, 30/s, best -0.1250",
+    ]

@@ -116,7 +116,7 @@ def test_an_ablation_in_python_goes_on_where_it_was(tmp_path: Path):
     again = run("ablation.py", "folder", cwd=tmp_path)
 
     assert "4 rows, 0 failed: folder/results.csv" in first
-    assert "GridBegins(total=11, finished=11)" in again
+    assert "11 of 11 were done before" in again
     assert len((EXAMPLES / "ablation.py").read_text(encoding="utf-8").splitlines()) < 40
 
 

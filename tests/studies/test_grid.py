@@ -36,7 +36,7 @@ from tests.helpers.grids import cells
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    run_grid(folder / "study", cells(folder, 6, seconds=0.3), workers=2, on_progress=print)
+    run_grid(folder / "study", cells(folder, 6, seconds=0.3), workers=2, on_event=print)
 """
 
 
@@ -56,7 +56,7 @@ class Study:
     def run(self, wanted: Sequence[Cell], **options: object) -> tuple[CellEnds, ...]:
         """Computes cells, by threads unless options have another executor."""
         given = options or {"executor": self.threads}
-        return run_grid(self.folder, wanted, on_progress=self.events.append, **given)
+        return run_grid(self.folder, wanted, on_event=self.events.append, **given)
 
     def names(self) -> list[str]:
         """Names of the finished cells."""

@@ -66,7 +66,7 @@ def test_a_study_is_extended_by_points_and_refuses_other_settings_before_anythin
     study(tmp_path, points_of(factor=[1])).run(executor=threads)
     events: list = []
     more = study(tmp_path, points_of(factor=[1, 2]))
-    more.run(executor=threads, on_progress=events.append)
+    more.run(executor=threads, on_event=events.append)
     assert [event.name for event in events[1:]] == ["factor=2"]
 
     for changes, difference in (
