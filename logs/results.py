@@ -193,6 +193,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         recovery: Recovered displacement as a share of that before; None if that is not positive.
         evaluations: Number of evaluations, by the EA, and of simulations.
         settings: Parameters of the recovery, of ``result.json``.
+        repair_settings: Those of the repair, where they are others.
     """
 
     truth: str
@@ -213,10 +214,15 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
     recovery: float | None = None
     evaluations: dict[str, int] = {}
     settings: dict[str, Any] | UnsetType = UNSET
+    repair_settings: dict[str, Any] | UnsetType = UNSET
 
-    def as_file(self, settings: Settings, files: dict[str, str]) -> dict[str, Any]:
+    def as_file(
+        self, settings: Settings, files: dict[str, str], of_repair: Settings | None = None
+    ) -> dict[str, Any]:
         """Returns the content of ``result.json``, with settings and digests of the logs."""
-        return as_json(msgspec.structs.replace(self, settings=asdict(settings), files=files))
+        own = UNSET if of_repair is None else asdict(of_repair)
+        facts = {"settings": asdict(settings), "repair_settings": own, "files": files}
+        return as_json(msgspec.structs.replace(self, **facts))
 
 
 class SuspicionResult(Struct, frozen=True):

@@ -12,7 +12,7 @@ from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.errors import InputError, items_of, real_number, whole_number
+from selfmodel.errors import InputError, check_type, items_of, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
@@ -257,6 +257,7 @@ def recover(
     repair: str | None = None,
     search: str | None = None,
     repertoire: Repertoire | str | Path | None = None,
+    repair_settings: Settings | None = None,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = ignore,
@@ -297,6 +298,8 @@ def recover(
         search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair, CMA-ES or the
             paper's EA, or the repertoire if one is given.
         repertoire: Gaits from which the search begins, or the path of their file.
+        repair_settings: Parameters of the repair and of the first gait, whose runs have as many
+            steps as those of ``settings``; by default ``settings``, which are then of both.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.
         on_event: Called with the progress of the recovery.
@@ -308,6 +311,7 @@ def recover(
     """
     arguments.check_physical(healthy, damaged)
     arguments.check_options(on_event, calibrate=calibrate)
+    check_type(repair_settings, Settings | None, arguments.REPAIR_SETTINGS)
     folder, on_event = path_of(folder, "a new or empty folder"), timed(on_event)
     robot = (entry := arguments.entry_of(robot)).robot()
     seed, count = whole_number("seed", seed, 0, least=0), thread_count(threads)
@@ -340,6 +344,7 @@ def recover(
         next_trial=choice,
         score=score,
         make_repair=make_repair,
+        repair_settings=repair_settings,
     ).run(healthy, damaged)
 
 

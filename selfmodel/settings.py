@@ -93,6 +93,10 @@ class Settings:
         """Genomes that one EA evaluates: a population, then its children."""
         return self.population + (self.generations - 1) * (self.population - self.survivors)
 
+    def of_repair(self, given: "Settings | None") -> "Settings":
+        """Returns the parameters of the repair: those given for it, in runs of this length."""
+        return self if given is None else dataclasses.replace(given, steps=self.steps)
+
     def scaled(self, population: int) -> "Settings":
         """Returns these settings for another population size, in the paper's proportions.
 

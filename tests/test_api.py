@@ -1,5 +1,6 @@
 """Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -129,6 +130,31 @@ def test_a_controller_evolves_as_the_first_gait_of_a_recovery(tmp_path: Path, op
     first = recovered(tmp_path / "run", kinds="jam", **options).trials[0].plan.controller
 
     assert first == selfmodel.evolve_controller("quadruped", settings=SMALL, **options)
+
+
+def test_a_repair_may_have_another_budget_than_the_diagnosis(tmp_path: Path):
+    larger = selfmodel.Settings(generations=2).scaled(
+        6
+    )  # of another length: that of the run counts
+    same, other = (
+        recovered(tmp_path / str(number), kinds="jam", repair="paper", repair_settings=given)
+        for number, given in enumerate((None, larger))
+    )
+    gait = selfmodel.evolve_controller(
+        "quadruped", settings=dataclasses.replace(larger, steps=60), repair="paper"
+    )
+
+    assert other.trials[0].plan.controller == gait
+    assert (same.repair_evaluations, other.repair_evaluations) == (2 * 4, 2 * 9)
+    budget = ("--repair-generations", "2", "--repair-population", "6", "--json", "--out", "run")
+    small = ("--steps", "60", "--trials", "1", "--generations", "1", "--population", "4")
+    few = ("--kinds", "jam", "--comparator", "forward-displacement", "--no-calibrate")
+    named = ("recover", "quadruped", "--damage", KNEE, "--repair", "paper")
+    done = command(*named, *small, *few, *budget, cwd=tmp_path)
+    assert json.loads(done.stdout)["evaluations"]["repair"] == other.repair_evaluations
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["repair_settings"]["population"] == 6
+    assert result["settings"]["population"] == 4
 
 
 @pytest.mark.parametrize(

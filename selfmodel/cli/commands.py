@@ -4,7 +4,7 @@
 functions that they share take.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
@@ -91,6 +91,8 @@ class Repair(Command):
 
     repair: str | None = None
     search: str | None = None
+    repair_population: int | None = None
+    repair_generations: int | None = None
     score: str | None = None
     only: str = "1/1"
 
@@ -131,6 +133,8 @@ class Recover(Robot):
     trials: int = Settings.trials
     population: int = Settings.population
     generations: int = Settings.generations
+    repair_population: int | None = None
+    repair_generations: int | None = None
     out: Path | None = None
     threads: int = 0
     report: bool = False
@@ -352,3 +356,12 @@ def settings_of(options: Study | Recover, steps: int) -> Settings:
     """Returns the parameters of a recovery in trials of that many steps."""
     small = Settings(steps=steps, trials=options.trials, generations=options.generations)
     return small.scaled(options.population)
+
+
+def repair_settings_of(options: Repair | Recover, settings: Settings) -> Settings | None:
+    """Returns the parameters of the repair; None for those of the diagnosis."""
+    population, generations = options.repair_population, options.repair_generations
+    if population is None and generations is None:
+        return None
+    own = replace(settings, generations=generations or settings.generations)
+    return own.scaled(population or settings.population)

@@ -14,7 +14,7 @@ from typing import Any
 from selfmodel import arguments, plugins
 from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
-from selfmodel.cli.commands import Recover, settings_of
+from selfmodel.cli.commands import Recover, repair_settings_of, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import displacement_text, display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
@@ -61,7 +61,7 @@ def recover(options: Recover) -> None:
         results.write_searches(folder, progress.searches)
         logs = [Path(trial.path) for trial in outcome.recovery.trials]
         digests = {relpath(one, folder): file_digest(one) for one in logs}
-        content = result.as_file(experiment.settings, digests)
+        content = result.as_file(experiment.settings, digests, experiment.repair_settings)
         replace_file(folder / results.RESULT, results.result_bytes(content))
     finally:  # the result is printed even if the disk is full
         if options.as_json:
@@ -108,7 +108,7 @@ def experiment_of(options: Recover) -> Experiment:
             f"controller, a {design.name} with random weights: the {score.score.name} before the "
             f"failure is 0, except for a reality gap"
         )
-    now = datetime.now().astimezone()
+    now, settings = datetime.now().astimezone(), settings_of(options, options.steps)
     return Experiment(
         robot=robot,
         case=options.case,
@@ -116,7 +116,7 @@ def experiment_of(options: Recover) -> Experiment:
         choose_comparator=arguments.comparator_choice(options.comparator),
         kinds=kinds,
         calibrated=options.calibrate,
-        settings=settings_of(options, options.steps),
+        settings=settings,
         seed=options.seed,
         threads=thread_count(options.threads),
         # The name of a new folder does not contain the hidden failure.
@@ -130,6 +130,7 @@ def experiment_of(options: Recover) -> Experiment:
         repair=repair,
         search=options.search,
         repertoire=gaits,
+        repair_settings=repair_settings_of(options, settings),
     )
 
 

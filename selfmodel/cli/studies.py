@@ -7,7 +7,14 @@ from pathlib import Path
 import typer
 
 from selfmodel.cli import inputs
-from selfmodel.cli.commands import Ablate, RepeatPaper, RunSuite, Study as Options, settings_of
+from selfmodel.cli.commands import (
+    Ablate,
+    RepeatPaper,
+    RunSuite,
+    Study as Options,
+    repair_settings_of,
+    settings_of,
+)
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import show
@@ -40,6 +47,7 @@ def ablate(options: Ablate) -> None:
         gaps=inputs.numbers("--gap", options.gaps),
         seeds=options.every_seed,
         settings=options.settings,
+        repair_settings=repair_settings_of(options, options.settings),
         next_trial=options.next_trial,
         bank=options.bank,
         score=options.score,
@@ -62,12 +70,14 @@ def run_suite(options: RunSuite) -> None:
     bodies = plans.bodies_of(names, wanted)
     # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
     length = options.steps or (1001 if options.score == "return" else Settings.steps)
+    settings = settings_of(options, length)
     study = plans.suite(
         options.out,
         bodies=bodies,
         cases=inputs.whole_numbers("--case", options.cases, plans.known_cases(bodies)),
         seeds=options.every_seed,
-        settings=settings_of(options, length),
+        settings=settings,
+        repair_settings=repair_settings_of(options, settings),
         score=options.score,
         controller=options.controller,
         comparator=options.comparator,

@@ -41,7 +41,8 @@ def by_repair(loop: "RecoveryLoop") -> Controller:
     """Returns the best candidate of the repair that was not tried yet, or a mutant of the best."""
     candidates, tried = [each.controller for each in loop.repaired()], loop.controllers
     untried = [controller for controller in candidates if controller not in tried]
-    return (untried or repairs.untried_mutants(candidates[:1], tried, loop.settings, loop.rng))[0]
+    settings = loop.settings.of_repair(loop.repair_settings)
+    return (untried or repairs.untried_mutants(candidates[:1], tried, settings, loop.rng))[0]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -56,6 +57,7 @@ class RecoveryLoop:
             the algorithm observes of the robot.
         store_diagnosis: Stores a diagnosis after the earlier ones; ``run_trial`` stores the trials.
         settings: The paper's numbers.
+        repair_settings: Those of the repair, in runs of the same length; None for the same.
         seed: Seed of all random choices.
         on_event: Callback, called with each event as it happens.
         gait: Controller of the robot before the failure; evolved if not given. The rest of the
@@ -86,6 +88,7 @@ class RecoveryLoop:
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair
+    repair_settings: Settings | None = None
     trials: tuple[Trial, ...] = field(default=(), init=False)
     diagnoses: tuple[Diagnosis, ...] = field(default=(), init=False)
     trials_left: int = field(default=0, init=False)
@@ -140,7 +143,8 @@ class RecoveryLoop:
         return self._evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
 
     def _repair_in_simulator(self) -> repairs.Repair:
-        return self.make_repair(self.simulator, self.settings, self._design, self.score)
+        settings = self.settings.of_repair(self.repair_settings)
+        return self.make_repair(self.simulator, settings, self._design, self.score)
 
     def _evolved(
         self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
@@ -175,7 +179,8 @@ class RecoveryLoop:
                 self.simulator = Simulator(calibration.robot, nominal.threads, nominal.stats)
                 self._repairs.append(self._repair_in_simulator())
         rng = random_stream(self.seed, "posterior")
-        self._posterior = Posterior(self.simulator, healthy_trials, calibration, self.settings, rng)
+        settings = self.settings.of_repair(self.repair_settings)
+        self._posterior = Posterior(self.simulator, healthy_trials, calibration, settings, rng)
         return calibration
 
     def _diagnose(self, search: DiagnosticSearch) -> None:

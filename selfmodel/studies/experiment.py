@@ -72,6 +72,7 @@ class Experiment:
         repair: Name of the repair, ``robust`` or ``paper``.
         search: Name of the search of the repair; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
+        repair_settings: Parameters of the repair; None for ``settings``.
     """
 
     robot: Robot
@@ -93,6 +94,7 @@ class Experiment:
     repair: str = plugins.ROBUST
     search: str | None = None
     repertoire: Repertoire | None = None
+    repair_settings: Settings | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +144,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         next_trial=plugins.NEXT_TRIAL[experiment.next_trial],
         score=experiment.score,
         make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),
+        repair_settings=experiment.repair_settings,
     ).run(healthy, damaged)
     seconds = perf_counter() - start
     judge = Simulator(robot, threads)  # scoring is no cost of the recovery

@@ -98,6 +98,7 @@ def ablation(
     score: str | Score | None = None,
     repair: str | None = None,
     search: str | None = None,
+    repair_settings: Settings | None = None,
     only: Share | str = ALL,
 ) -> Study:
     """Returns a study in which every comparator diagnoses the same trials.
@@ -124,6 +125,7 @@ def ablation(
         repair: Name of the repair that evolves gaits and recoveries, ``robust``, the default, or
             ``paper``.
         search: Name of its search; None for that of the repair.
+        repair_settings: Parameters of the repair, in runs as long; None for ``settings``.
         only: Share of the runs, such as ``(2, 8)`` or ``2/8``.
     """
     robots = names_of(robots, ROBOT)
@@ -133,7 +135,7 @@ def ablation(
     damages = names_of(damages, "failures in notation", Hypothesis)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
-    chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
+    chosen, by_bank = repair_parameters(repair, search, score, repair_settings), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
     _check(lists, cases, damages, next_trial, trials)
@@ -196,6 +198,7 @@ def suite(
     score: str | Score | None = None,
     repair: str | None = None,
     search: str | None = None,
+    repair_settings: Settings | None = None,
     only: Share | str = ALL,
 ) -> Study:
     """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.
@@ -211,7 +214,7 @@ def suite(
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     comparator_choice(comparator)
     plugins.kinds(kinds)
-    chosen = repair_parameters(repair, search, score)
+    chosen = repair_parameters(repair, search, score, repair_settings)
     entries = {body: robot_entry(body) for body in bodies}
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
     _check_cases("case of these bodies", cases, known_cases(bodies))

@@ -15,13 +15,19 @@ from time import perf_counter
 from typing import Any
 
 from selfmodel import plugins
-from selfmodel.arguments import comparator_choice, is_model, read_controller, robot_entry
+from selfmodel.arguments import (
+    REPAIR_SETTINGS,
+    comparator_choice,
+    is_model,
+    read_controller,
+    robot_entry,
+)
 from selfmodel.arrays import finite_or_none
 from selfmodel.controllers.controller import Controller, check_silent_neurons
 from selfmodel.diagnosis.choice import chosen_comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, check_type
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -57,6 +63,9 @@ HEALTHY_TRIALS = 2
 
 ON_ROBOT = "evolution-on-robot"
 """In place of a comparator: the paper's control, the repair EA on the damaged robot."""
+
+REPAIR = "repair_settings"
+"""Parameter with the settings of the repair, where they are others."""
 
 DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
 """Names of the settings that do not affect a gait."""
@@ -94,9 +103,16 @@ def robot_key(robot: str) -> str:
 
 
 def repair_parameters(
-    repair: str | None, search: str | None, score: Score | str | None
-) -> dict[str, str]:
-    """Returns the names that determine a repair, the robust one by default, with its defaults."""
+    repair: str | None,
+    search: str | None,
+    score: Score | str | None,
+    settings: Settings | None = None,
+) -> dict[str, Any]:
+    """Returns what determines a repair, the robust one by default, with its defaults.
+
+    Its settings are left out unless they are given.
+    """
+    check_type(settings, Settings | None, REPAIR_SETTINGS)
     repair = plugins.ROBUST if repair is None else repair
     if search == plugins.REPERTOIRE:
         raise InputError(
@@ -114,7 +130,14 @@ def repair_parameters(
         "repair": repair,
         "search": plugins.search_name(repair, search, None),
         "score": plugins.score_named(score) or plugins.DEFAULT_SCORES[repair],
+        **({} if settings is None else {REPAIR: dataclasses.asdict(settings)}),
     }
+
+
+def settings_of(shared: Parameters) -> tuple[Settings, Settings | None]:
+    """Returns the settings of recoveries, and those of their repair; None for the same."""
+    own = shared.get(REPAIR)
+    return Settings(**shared["settings"]), None if own is None else Settings(**own)
 
 
 def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
@@ -125,7 +148,8 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
         shared: Parameters of the recoveries, of which some determine the gait.
         seed: Seed of all random numbers.
     """
-    settings = shared["settings"].items()
+    own, of_repair = settings_of(shared)
+    settings = dataclasses.asdict(own.of_repair(of_repair)).items()
     parameters = {
         **robot,
         "seed": seed,
@@ -241,7 +265,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     if parameters["comparator"] == ON_ROBOT:
         return _evolve_on_robot(parameters, needs)
     shared, entry = parameters["shared"], planned_entry(parameters)
-    robot, settings = entry.robot(), Settings(**shared["settings"])
+    robot, (settings, of_repair) = entry.robot(), settings_of(shared)
     design = plugins.design(shared["controller"], robot, shared["neurons"])
     truth, gait = truth_of(parameters, robot), read_controller(needs["gait"] / GAIT, robot)
     check_silent_neurons(design, silent_neurons(truth))
@@ -268,6 +292,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         physical=entry.physical,
         repair=shared["repair"],
         search=shared["search"],
+        repair_settings=of_repair,
     )
     watch = _DiagnosisWatch()
     outcome = experiments.run(experiment, watch)

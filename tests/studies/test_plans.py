@@ -81,6 +81,13 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         **dict(zip(names, ("paper", "ea", "displacement"), strict=True)),
     }
     assert plain.place == same.place != papers.place
+    (larger,) = made(tmp_path, repair_settings=Settings(generations=9)).cells()
+    (gait, *_), (own, *_) = (
+        list((one.needs.get("trials") or one).needs.values()) for one in (plain, larger)
+    )
+    assert own.parameters["settings"]["generations"] == 9
+    assert own.parameters["settings"]["steps"] == gait.parameters["settings"]["steps"]
+    assert "repair_settings" not in shared
 
 
 @pytest.mark.parametrize(
