@@ -65,6 +65,7 @@ app = group(
         "ablate": ("Compare comparators on the same trials.", "studies:ablate", "Ablate"),
         "suite": ("Recover the bodies of dm_control's suite.", SUITE),
         "paper": ("Repeat the paper's experiment on its robots.", "studies:paper", "RepeatPaper"),
+        "study": ("Run the study that a TOML file defines.", "studies:run_file", "RunStudy"),
         "compare": ("Compare the methods of a study by pairs.", "compare:compare", "Compare"),
         "repertoire": ("Make a repertoire of a robot's gaits.", REPERTOIRE),
         "logs": ("Inspect, verify, salvage and import trial logs.", LOGS),

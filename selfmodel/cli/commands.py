@@ -59,8 +59,17 @@ class FromLogs(Command):
     threads: int = 0
 
 
-class Study(Command):
-    """A study: its folder, its size, and where it is computed."""
+class Computed(Command):
+    """Where a study is computed, and how its tables are written."""
+
+    workers: int = 0
+    executor: str = "processes"
+    scheduler: str | None = None
+    table: str | None = None
+
+
+class Study(Computed):
+    """A study: its folder and its size."""
 
     out: Path
     cases: str = "all"
@@ -70,10 +79,6 @@ class Study(Command):
     trials: int = Settings.trials
     population: int = Settings.population
     generations: int = Settings.generations
-    workers: int = 0
-    executor: str = "processes"
-    scheduler: str | None = None
-    table: str | None = None
 
     @property
     def settings(self) -> Settings:
@@ -306,6 +311,17 @@ class Ablate(Study, Repair):
     gaps: str = "0"
     next_trial: str = "bank"
     bank: Path | None = None
+
+
+class RunStudy(Computed):
+    """Run the study that a TOML file defines: an ablation, recoveries of bodies, or the paper's.
+
+    The keys are `study` (ablation, suite or paper), `folder`, and the arguments of that function
+    in Python. The file is kept in the folder; an interrupted study is continued by the same
+    command.
+    """
+
+    file: Path
 
 
 class ListSuite(Command):

@@ -1,6 +1,6 @@
-"""Commands that run studies: ``ablate``, ``suite run`` and ``paper``."""
+"""Commands that run studies: ``ablate``, ``suite run``, ``paper`` and ``study``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -9,9 +9,10 @@ import typer
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import (
     Ablate,
+    Computed,
     RepeatPaper,
+    RunStudy,
     RunSuite,
-    Study as Options,
     repair_settings_of,
     settings_of,
 )
@@ -24,9 +25,17 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import paper_page, plans, tables as formats
+from selfmodel.studies.definition import read_study
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
 from selfmodel.tasks import ROBOTS
+
+RESULTS: Mapping[str, Callable[[Path], formats.Results]] = {
+    "ablate": formats.ablation_results,
+    "suite": formats.suite_results,
+    "paper": paper_page.results_of,
+}
+"""Functions of the folder of a study to its results, by the name of the study."""
 
 PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 """What may compute the cells of a study: processes of this machine, or a Dask cluster's workers."""
@@ -55,7 +64,7 @@ def ablate(options: Ablate) -> None:
         search=options.search,
         only=options.only,
     )
-    _run(study, options, formats.ablation_results)
+    _run(study, options)
 
 
 def run_suite(options: RunSuite) -> None:
@@ -88,7 +97,7 @@ def run_suite(options: RunSuite) -> None:
         search=options.search,
         only=options.only,
     )
-    _run(study, options, formats.suite_results)
+    _run(study, options)
 
 
 def paper(options: RepeatPaper) -> None:
@@ -102,13 +111,19 @@ def paper(options: RepeatPaper) -> None:
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         settings=options.settings,
     )
-    _run(study, options, paper_page.results_of)
+    _run(study, options)
 
 
-def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Results]) -> None:
+def run_file(options: RunStudy) -> None:
+    """Run the study that a TOML file defines: an ablation, recoveries of bodies, or the paper's."""
+    formats.check_format(options.table)
+    _run(read_study(options.file), options)
+
+
+def _run(study: Study, options: Computed) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
     failed = _compute(study, options)
-    found = results_of(study.folder)
+    found = RESULTS[study.name](study.folder)
     files = dict(found.files)
     if options.table is not None:
         content = formats.table_files(found.tables, options.table)
@@ -132,7 +147,7 @@ def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Re
         raise typer.Exit(1)
 
 
-def _compute(study: Study, options: Options) -> Sequence[CellEnds]:
+def _compute(study: Study, options: Computed) -> Sequence[CellEnds]:
     """Computes the cells of a study with a progress display; returns the failed ones.
 
     Ctrl-C and the other stop signals end the command with a line on how to continue.

@@ -20,6 +20,7 @@ from selfmodel.errors import (
     names_of,
     real_numbers,
     unknown_name,
+    whole_number,
     whole_numbers,
 )
 from selfmodel.faults.hypothesis import Hypothesis
@@ -212,6 +213,7 @@ def suite(
     seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
+    neurons = None if neurons is None else whole_number("neurons", neurons, 3)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score, repair_settings)

@@ -11,11 +11,15 @@ from urllib.parse import quote
 
 from selfmodel.errors import InputError
 from selfmodel.files import path_of
+from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.studies.cells import REMEDY, Cell, finished, made_with
 from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
 
 RUNS = "runs"
 """Kind of the cells at the points of a study; those that they need have kinds of their own."""
+
+DEFINITION = "study.toml"
+"""File of the definition of a study in its folder."""
 
 SHARED = "shared"
 """Parameter of each cell with what all points of a study share."""
@@ -52,6 +56,7 @@ class Study:
         points: The points by name, in the order in which they are computed.
         shared: Parameters of all points, as JSON: a folder has one set of them.
         needs: Function of a point to the cells whose files it reads, by name.
+        definition: The file that defines the study, which is kept in the folder; none if empty.
     """
 
     name: str
@@ -60,6 +65,7 @@ class Study:
     points: Mapping[str, Point]
     shared: Mapping[str, Any] = field(default_factory=dict)
     needs: Callable[[Point], Mapping[str, Cell]] = lambda _point: {}
+    definition: bytes = b""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", path_of(self.folder, "the folder of a study"))
@@ -86,9 +92,11 @@ class Study:
         on_event: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
     ) -> tuple[CellEnds, ...]:
         """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
-        return run_grid(
-            self.folder, self.cells(), executor=executor, workers=workers, on_event=on_event
-        )
+        cells = self.cells()
+        if self.definition:
+            make_folder(self.folder)
+            replace_file(self.folder / DEFINITION, self.definition)
+        return run_grid(self.folder, cells, executor=executor, workers=workers, on_event=on_event)
 
     def rows(self, table: str | None = None) -> list[Row]:
         """Returns the rows of all finished runs in the folder; see ``rows_in``."""

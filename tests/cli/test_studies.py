@@ -30,6 +30,20 @@ class Picky(ForwardDisplacement):
 PICKY = Picky(name="picky")
 """
 
+SAME = """# the ablation below, without the comparator that fails
+study = "ablation"
+folder = "out"
+robots = "quadruped"
+cases = 3
+comparators = "forward-displacement"
+
+[settings]
+steps = 60
+trials = 1
+population = 8
+generations = 2
+"""
+
 BIPED = """
 <mujoco>
   <worldbody>
@@ -104,6 +118,12 @@ def test_a_failure_ends_with_status_one_and_one_json_object(
     drawn = {"out/figures/gap.png", "out/figures/cases-quadruped-1.svg"}
     assert drawn < set(found["files"])
     assert "Traceback" not in told.stderr
+    mine = tmp_path / "mine.toml"
+    mine.write_text(SAME, encoding="utf-8")
+    same = succeeds("study", "mine.toml", "--workers", "1", "--json", cwd=tmp_path)
+    assert json.loads(same.stdout)["rows"] == found["rows"]
+    assert "of 4 were done before" in same.stderr
+    assert (tmp_path / "out" / "study.toml").read_bytes() == mine.read_bytes()
 
 
 @pytest.mark.process
