@@ -16,6 +16,9 @@ from .logs.reader import read_log as read_log
 from .physical.environment import EnvironmentRobot as EnvironmentRobot
 from .physical.interface import PhysicalRobot as PhysicalRobot
 from .recording import (
+    Episode as Episode,
+    evaluate as evaluate,
+    record as record,
     run_trial as run_trial,
     simulated_robot as simulated_robot,
     write_log as write_log,
@@ -24,6 +27,8 @@ from .recovery.result import Recovery as Recovery
 from .robot.robot import Robot as Robot
 from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator
+from .studies.rows import load as load
+from .studies.study import Study as Study
 from .testing import check_comparator as check_comparator, check_fault_kind as check_fault_kind
 from .trials.trajectory import Trajectory as Trajectory
 from .trials.trial import Trial as Trial

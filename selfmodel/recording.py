@@ -1,22 +1,31 @@
 """Physical trials: a robot that runs and is logged, a trial as a log, a robot in simulation."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from selfmodel import arguments
+import numpy as np
+
+from selfmodel import arguments, plugins
 from selfmodel.arguments import RobotSource, TrialSource
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import Playback
-from selfmodel.errors import real_number, whole_number
+from selfmodel.errors import TrialError, check_type, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.files import path_of
 from selfmodel.logs import physical_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
+from selfmodel.physical.environment import Observe
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.settings import Settings
+from selfmodel.physical.stepped import Policy, Stepped
+from selfmodel.recovery.falls import fall_of
+from selfmodel.recovery.scores import UPRIGHT, Score
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import MAX_SETTINGS, Settings
 from selfmodel.studies.experiment import draw_reality
-from selfmodel.trials.trajectory import samples_of
+from selfmodel.trials.trajectory import Sample, collect, samples_of
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
 
@@ -64,6 +73,138 @@ def run_trial(
         controller = arguments.controller_of(controller, robot)
     plan = TrialPlan(path.stem, stage, controller, whole_number("steps", steps, 1000), seed)
     return physical_trial.run_trial(physical, plan, path, robot, header)
+
+
+def record(
+    env: Any,  # noqa: ANN401  # of either interface
+    policy: CommandSource | Policy | str | Path,
+    path: str | Path,
+    *,
+    robot: RobotSource,
+    observe: Observe | None = None,
+    steps: int = 1000,
+    stage: Stage = "single",
+    seed: int = 0,
+) -> Trial:
+    """Runs a policy in a simulated environment, logs it, and returns the trial.
+
+    Example:
+        >>> import selfmodel
+        >>> from selfmodel import tasks
+        >>> env = tasks.load("quadruped", "walk", {"hypothesis": "break:front_left_knee"})
+        >>> given = {"robot": "quadruped", "steps": 60}
+        >>> trial = selfmodel.record(env, lambda _: [0.1] * 8, "new.mcap", **given)
+        >>> trial.plan.controller.summary
+        'other software; its commands are played back'
+
+    Args:
+        env: A ``dm_env`` or Gymnasium environment, whose actions are the motor targets in the order
+            of the model's motors. For hardware, use ``EnvironmentRobot`` and ``run_trial``.
+        policy: A controller, or the path of its file; or a function of an observation of ``env`` to
+            an action, such as ``lambda seen: model.predict(seen)[0]``, of which the log has the
+            commands.
+        path: Name of the log, ``NAME.mcap``; the trial is called NAME.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+        observe: Function of an observation to signals, as for ``EnvironmentRobot``; None for those
+            in it by name, and the others of MuJoCo's state if ``env`` has it.
+        steps: Control steps of the trial.
+        stage: Stage of the trial within a recovery.
+        seed: Seed of the trial, for the record.
+
+    Raises:
+        InputError: The log exists, or an argument is invalid or does not fit the robot.
+        TrialError: The environment failed, or ended its episode early; the log is then complete.
+    """
+    robot = arguments.load_robot(robot)
+    source, function = _policy_of(policy, robot)
+    physical = Stepped(env, robot).driven(observe, function)
+    return run_trial(physical, source, path, robot=robot, steps=steps, stage=stage, seed=seed)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """An episode of ``evaluate``.
+
+    Attributes:
+        steps: Observations, the first included.
+        score: Its score.
+        episode_return: Sum of the rewards.
+        displacement: Forward displacement, m; NaN if the base was not observed.
+        fell_at_step: Step at which the robot fell; None if it did not.
+    """
+
+    steps: int
+    score: float
+    episode_return: float
+    displacement: float
+    fell_at_step: int | None
+
+
+def evaluate(
+    env: Any,  # noqa: ANN401  # of either interface
+    policy: CommandSource | Policy | str | Path,
+    *,
+    robot: RobotSource,
+    observe: Observe | None = None,
+    episodes: int = 1,
+    steps: int | None = None,
+    score: Score | str = UPRIGHT,
+) -> tuple[Episode, ...]:
+    """Returns how a policy does in episodes of a simulated environment, without a log.
+
+    Example:
+        >>> import selfmodel
+        >>> from selfmodel import tasks
+        >>> env = tasks.load("quadruped", "walk", {"time_limit": 1.0})
+        >>> (episode,) = selfmodel.evaluate(env, lambda _: [0.1] * 8, robot="quadruped")
+        >>> episode.steps, episode.fell_at_step
+        (101, None)
+
+    Args:
+        env: The environment, as for ``record``.
+        policy: A controller, or the path of its file; or a function, as for ``record``.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+        observe: Function of an observation to signals, as for ``record``.
+        episodes: Number of episodes.
+        steps: Largest number of control steps of an episode; None for whole ones.
+        score: Score of an episode, its name, or ``package.module:object``.
+
+    Raises:
+        InputError: An argument is invalid, or does not fit the robot.
+        TrialError: The environment failed.
+    """
+    robot = (entry := arguments.entry_of(robot)).robot()
+    check_type(score, Score | str, 'a Score or its name, such as "energy"')
+    chosen = score if isinstance(score, Score) else plugins.score(str(score), robot.name, entry)
+    most = MAX_SETTINGS["steps"] if steps is None else whole_number("steps", steps, 1000, 2)
+    stepped, (source, function) = Stepped(env, robot), _policy_of(policy, robot)
+    physical, found = stepped.driven(observe, function), []
+    for _ in range(whole_number("episodes", episodes, 10, 1)):
+        samples: list[Sample] = []
+        try:
+            for sample in physical.run(source, most):
+                samples.append(sample)  # noqa: PERF402  # those before an error remain
+        except TrialError:
+            if not stepped.is_over:
+                raise
+        plan = TrialPlan("episode", "single", source, len(samples), 0)
+        trial = Trial(plan, robot.name, collect(robot.anatomy.names, samples), plan.name)
+        value, fall = chosen.of_trial(robot, INTACT, trial), fall_of(robot, INTACT, trial)
+        rewards = sum(stepped.rewards)
+        found.append(Episode(plan.steps, value, rewards, trial.displacement, fall))
+    return tuple(found)
+
+
+def _policy_of(
+    policy: CommandSource | Policy | str | Path, robot: Robot
+) -> tuple[CommandSource, Policy | None]:
+    """Returns the source of the commands of a trial, and the function that is in its place."""
+    if callable(policy):
+        motors = robot.anatomy.motors
+        return Playback(motors, np.zeros((1, len(motors)))), policy
+    if isinstance(policy, Playback):
+        return policy, None
+    return arguments.controller_of(policy, robot), None
 
 
 def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:

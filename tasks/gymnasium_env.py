@@ -116,7 +116,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
         """Starts an episode; a seed is that of all that is random. Options are ignored."""
         super().reset(seed=seed, options=options)
         if seed is not None:
-            self._environment.physics.free()
+            self.physics.free()
             self._environment = self._made()
         self._is_over = False
         return _observation(self._environment.reset()), {}
@@ -147,7 +147,12 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
 
     def close(self) -> None:
         """Frees the memory of MuJoCo and of pictures."""
-        self._environment.physics.free()
+        self.physics.free()
+
+    @property
+    def physics(self) -> Any:  # noqa: ANN401  # dm_control has no types
+        """dm_control's physics of the episode."""
+        return self._environment.physics
 
 
 def _box(spec: dm_env.specs.Array) -> spaces.Box:

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 import selfmodel
 from selfmodel import arguments
@@ -99,6 +100,23 @@ def test_a_recovery_is_readable_serialisable_and_a_table(recovery: selfmodel.Rec
     table = recovery.to_pandas().astype(object)
     assert table.where(table.notna(), None).to_dict("records") == values["trials"]
     assert all(Path(row["log"]).is_file() for row in values["trials"])
+
+
+def labels(figure: Figure) -> list[str]:
+    """The names in a figure of values by name."""
+    (axes,) = figure.axes
+    return [label.get_text() for label in axes.get_yticklabels()]
+
+
+def test_results_have_figures_of_their_tables(
+    recovery: selfmodel.Recovery, reference: selfmodel.Diagnosis
+):
+    assert labels(reference.plot()) == list(reference.to_pandas()["hypothesis"])
+    (axes,) = recovery.plot().axes
+    assert labels(recovery.plot()) == list(recovery.to_pandas()["trial"])
+    assert [bar.get_width() for bar in axes.patches] == list(recovery.scores)
+    fit = selfmodel.calibrate(BEFORE, "quadruped")
+    assert [one.strip("()") for one in labels(fit.plot())] == list(fit.to_pandas()["name"])
 
 
 def test_a_trial_runs_and_replays_to_the_bit(tmp_path: Path):

@@ -20,7 +20,7 @@ PUBLIC = {
     *("load_robot", "Robot", "Hypothesis", "FaultKind", "ALL_KINDS", "PAPER_KINDS"),
     *("parse_hypothesis", "Simulator", "simulated_robot", "EnvironmentRobot", "PhysicalRobot"),
     *("Controller", "Trial", "Trajectory", "evolve_controller", "run_trial", "read_log"),
-    "write_log",
+    *("write_log", "record", "evaluate", "Episode", "Study", "load"),
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "__version__"),
 }
@@ -31,6 +31,8 @@ WITHOUT_EXAMPLE = {
     **dict.fromkeys(("ALL_KINDS", "PAPER_KINDS", "__version__"), "a constant"),
     **dict.fromkeys(("Comparator", "PhysicalRobot"), "a protocol, implemented by the user"),
     **dict.fromkeys(("Controller", "Diagnosis", "Recovery", "Robot", "Trial"), "a returned record"),
+    "Episode": "a returned record",
+    **dict.fromkeys(("Study", "load"), "a module or a folder is needed: docs have one"),
     "EnvironmentRobot": "an environment is needed: docs and tests/end_to_end drive one",
     "FaultKind": "an example is a whole plug-in: docs have one",
 }

@@ -269,6 +269,15 @@ class Diagnosis:
         """Returns the ranking as a ``pandas.DataFrame``: hypothesis and distance, best first."""
         return data_frame([to_json(candidate) for candidate in self.ranked])
 
+    def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
+        """Returns the ranking as a ``matplotlib.figure.Figure``: distances, best first."""
+        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+
+        title = f"{self.best}, {self.verdict}"
+        names = [str(candidate.hypothesis) for candidate in self.ranked]
+        distances = [candidate.distance for candidate in self.ranked]
+        return values_by_name(title, "distance", names, distances, reference=self.intact_distance)
+
 
 def output_of(diagnosis: Diagnosis) -> dict[str, Any]:
     """Returns the values of a diagnosis in ``--json`` output, where the ranking is ``diagnosis``.

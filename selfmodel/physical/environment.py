@@ -19,6 +19,7 @@ from typing import Any
 
 import dm_env
 import numpy as np
+from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
@@ -101,6 +102,9 @@ class EnvironmentRobot:
         env: The environment. Its actions are the motor targets, in the order of the model's motors.
         robot: The robot as its model describes it.
         observe: Converts an observation to signals.
+        policy: Function of an observation, as it is, to the motor targets, ``(motors,)``, which
+            drives the robot in place of a trial's controller: give a ``Playback`` as that, whose
+            commands are then those of the policy in the log.
         signals: Signals that its observations have. By default, without ``observe``, those in
             ``env.observation_spec()``; if none is known, all are taken to be observed.
         stop: Stops the robot safely, at any time and repeatedly. The default is ``env.step(safe)``.
@@ -130,6 +134,7 @@ class EnvironmentRobot:
     robot: Robot
     _: KW_ONLY
     observe: Observe = signals_by_name
+    policy: Callable[[Any], ArrayLike] | None = None
     signals: Collection[Signal] = ()
     stop: Callable[[], object] | None = None
     safe: FloatArray | None = None
@@ -281,10 +286,26 @@ class EnvironmentRobot:
                         )
                     np.copyto(controllers.observed[signal][0], value, where=~np.isnan(value))
             controllers.step(commands)
+            if self.policy is not None and result is not None and observation is not None:
+                commands[0] = self._targets(self.policy(result.observation))
             if not np.isfinite(commands).all():  # of a network that divides by 0, for example
                 raise TrialError(f"the controller's commands are not finite at step {k}")
             values["commands"] = commands[0].copy()
             yield Sample(k * timestep, values, timing)
+
+    def _targets(self, action: ArrayLike) -> FloatArray:
+        """Returns the action of a policy as motor targets, or raises ``InputError``."""
+        motors = self.robot.anatomy.motors
+        try:
+            targets = np.asarray(action, dtype=np.float64).ravel()
+        except (ValueError, TypeError) as error:
+            raise InputError(f"expected numbers as an action of the policy: {error}") from error
+        if targets.shape != (len(motors),):
+            raise InputError(
+                f"expected targets of the {len(motors)} motors of {self.robot.name} "
+                f"({', '.join(motors)}) as an action of the policy, got {len(targets)}"
+            )
+        return targets
 
     def _step_environment(self, call: Call, targets: FloatArray | None) -> dm_env.TimeStep | None:
         """Returns the result of a step, or of a reset without targets; None after a timeout."""

@@ -156,6 +156,15 @@ class Recovery:
         """Returns the physical trials as a ``pandas.DataFrame``, one row per trial."""
         return data_frame(self._rows())
 
+    def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
+        """Returns the scores of the trials, and those predicted, as a ``matplotlib`` figure."""
+        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+
+        names = [trial.plan.name for trial in self.trials]
+        predicted = ("predicted by the self-model", self.predicted)
+        title, label = str(self.diagnosis.best), f"{self.score.name} {self.score.unit}".strip()
+        return values_by_name(title, label, names, self.scores, others=predicted)
+
     def _rows(self) -> list[dict[str, Any]]:
         columns = zip(self.trials, self.tried, self.scores, self.predicted, strict=True)
         return [

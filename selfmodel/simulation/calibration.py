@@ -114,6 +114,17 @@ class Calibration:
         """Returns the factors as a ``pandas.DataFrame``: name, factor, deviation, determined."""
         return data_frame(self.rows())
 
+    def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
+        """Returns the factors with intervals of two deviations as a ``matplotlib`` figure."""
+        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+
+        rows, title = self.rows(), f"calibration of {self.robot.name}"
+        factors, spread = self.parameters.factors, np.exp(2 * self.deviations)
+        ends = list(zip(factors / spread, factors * spread, strict=True))
+        names = [row["name"] if row["determined"] else f"({row['name']})" for row in rows]
+        label = "factor (in brackets: not determined)"
+        return values_by_name(title, label, names, list(factors), ends=ends, reference=1.0)
+
     @property
     def contacts(self) -> tuple[str, ...]:
         """A line on the contacts, if the fit changed them."""

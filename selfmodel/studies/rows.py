@@ -15,6 +15,7 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, counted
 from selfmodel.files import read_file
 from selfmodel.studies import comparisons
+from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, rows_in, shared_in
 
 INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
@@ -162,7 +163,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 """Kinds of studies by their name; the columns of a row determine it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LoadedStudy:
     """Rows of a study, one per diagnosis or recovery, with what they compare.
 
@@ -173,6 +174,38 @@ class LoadedStudy:
     path: Path
     rows: pd.DataFrame
     outcomes: pd.DataFrame
+
+    def __repr__(self) -> str:
+        shares = [f"\n  {name}: {right} of {runs} right" for name, right, runs in self._right()]
+        return f"<LoadedStudy {self.kind}, {counted(len(self.rows), 'row')}{''.join(shares)}>"
+
+    def _right(self) -> list[tuple[str, int, int]]:
+        """Returns the right diagnoses of all and their number, by robot and comparator."""
+        axes = [name for name in ("robot", "comparator") if name in self.rows]
+        groups = self.rows.groupby(axes) if "correct" in self.rows else ()
+        return [(", ".join(key), int(own["correct"].sum()), len(own)) for key, own in groups]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Returns the rows."""
+        return self.rows
+
+    def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
+        """Returns right diagnoses with 95 % intervals by robot and comparator, as a figure.
+
+        For rows without diagnoses, the marginal means of their methods.
+        """
+        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+
+        right, means = self._right(), whole(self.marginal_means())
+        if not right:
+            names = [f"{', '.join(row.table)}: {row.method}" for row in means.itertuples()]
+            ends = list(zip(means["mean_low"], means["mean_high"], strict=True))
+            return values_by_name(self.kind, "mean", names, list(means["mean"]), ends=ends)
+        shares = [proportion(number, runs) for _, number, runs in right]
+        names = [f"{name} (n = {runs})" for name, _, runs in right]
+        values, ends = [one.estimate for one in shares], [(one.low, one.high) for one in shares]
+        label = "right diagnoses (95 % interval)"
+        return values_by_name(self.kind, label, names, values, ends=ends)
 
     def comparisons(self) -> pd.DataFrame:
         """Returns the paired comparisons of all methods; see ``comparisons.compare``."""

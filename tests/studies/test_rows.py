@@ -47,7 +47,16 @@ def test_rows_of_a_file_are_those_that_were_written(name: str, tmp_path: Path):
 def test_published_tables_are_read(kind: str, name: str):
     (path,) = DATA.glob(f"{name}.*")
 
-    assert load(path).kind == kind
+    study = load(path)
+    lines = repr(study).removesuffix(">").splitlines()[1:]
+    (axes,) = study.plot().axes
+
+    assert study.kind == kind
+    if "correct" in study.rows:
+        assert sum(int(line.split()[-4]) for line in lines) == study.rows["correct"].sum()
+        assert len(lines) == len(axes.get_yticklabels())
+    else:
+        assert len(axes.get_yticklabels()) == len(whole(study.marginal_means()))
 
 
 @pytest.mark.parametrize(
