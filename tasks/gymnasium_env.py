@@ -20,6 +20,7 @@ from gymnasium.utils import EzPickle
 
 from selfmodel import tasks
 from selfmodel.arrays import FloatArray
+from selfmodel.opengl import prepare_dm_control
 from selfmodel.tasks.arguments import check_names
 
 NAMESPACE = "selfmodel"
@@ -140,6 +141,7 @@ class TaskEnv(gymnasium.Env[Any, Any], EzPickle):
         """Returns a picture, ``(height, width, 3)``, or None without a render mode."""
         if self.render_mode is None:
             return None
+        prepare_dm_control()
         picture: np.ndarray[Any, np.dtype[np.uint8]] = self._environment.physics.render(
             **self._view
         )

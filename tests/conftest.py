@@ -13,8 +13,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-from selfmodel.cli.render import WITHOUT_SCREEN, draws
 from selfmodel.isolation import run_isolated
+from selfmodel.opengl import WITHOUT_SCREEN, draws
 from selfmodel.robot.mjcf import load
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import ROBOTS

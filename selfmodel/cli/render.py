@@ -4,7 +4,6 @@ import importlib
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
@@ -23,6 +22,7 @@ from selfmodel.cli.tables import text_console
 from selfmodel.errors import InputError, WorkError, counted
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.results import best_hypothesis
+from selfmodel.opengl import GL, choose_gl
 
 STRIPS, FILMS = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 """File extensions of a strip of pictures, and of a film."""
@@ -33,23 +33,8 @@ RATE = 25
 MAX_FRAMES = 50_000
 """Largest number of frames of a film, over half an hour: a GIF of these has some 500 MB."""
 
-GL = "MUJOCO_GL"
-"""Environment variable with the OpenGL library, which MuJoCo reads as it is imported."""
-
-WITHOUT_SCREEN = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""Values that are tried, in this order; other systems than Linux use MuJoCo's default."""
-
-PICTURE = (
-    "import mujoco\n"
-    "model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><light/></worldbody></mujoco>')\n"
-    "with mujoco.Renderer(model, 8, 8) as renderer:\n"
-    "    renderer.update_scene(mujoco.MjData(model))\n"
-    "    renderer.render()\n"
-)
-"""Program that draws one picture."""
-
-PICTURE_SECONDS = 60
-"""Time limit of that program."""
+INSTEAD = "draw stick figures, with --stick or -o NAME.png"
+"""What can be done without OpenGL."""
 
 Frames = Iterator[NDArray[np.uint8]]
 
@@ -58,7 +43,7 @@ def render(options: Render) -> None:
     """Draw a logged trial beside a simulation of the same controller."""
     out = _out(options)
     kind = out.suffix.lower()
-    library = None if options.stick or kind in STRIPS else choose_gl()
+    library = None if options.stick or kind in STRIPS else choose_gl(INSTEAD)
     os.environ[GL] = "disable" if library is None else library
     # MuJoCo reads MUJOCO_GL as it is imported, so the library is chosen before.
     from selfmodel.cli.film import evenly, film_of, filmed  # noqa: PLC0415
@@ -142,41 +127,6 @@ def _shown(frames: Frames, total: int) -> Frames:
     console = text_console(stderr=True)
     hidden = not console.is_terminal
     yield from track(frames, "drawing", total, console=console, disable=hidden, transient=True)
-
-
-def choose_gl() -> str:
-    """Returns a value of ``MUJOCO_GL`` that works: of the environment, or else EGL or OSMesa.
-
-    Each is tried in a process of its own, because a failed initialisation cannot always be undone.
-
-    Raises:
-        WorkError: No library works.
-    """
-    wanted = os.environ.get(GL, "")
-    for library in (wanted,) if wanted else WITHOUT_SCREEN:
-        if draws(library):
-            return library
-    instead = "draw stick figures, with --stick or -o NAME.png"
-    if wanted:
-        raise WorkError(
-            f"MuJoCo cannot draw with {GL}={wanted}: unset it, so that EGL and OSMesa are tried, "
-            f"or {instead}"
-        )
-    raise WorkError(
-        f"MuJoCo found no library to draw with, neither EGL nor OSMesa: install one (on Debian and "
-        f"Ubuntu: apt-get install libegl1 libgl1-mesa-dri, or libosmesa6), or {instead}"
-    )
-
-
-def draws(library: str) -> bool:
-    """Returns whether MuJoCo renders a picture with that value of ``MUJOCO_GL``."""
-    command, environment = [sys.executable, "-P", "-c", PICTURE], {**os.environ, GL: library}
-    with suppress(subprocess.SubprocessError):
-        subprocess.run(  # noqa: S603  # this Python, and a text from above
-            command, env=environment, capture_output=True, check=True, timeout=PICTURE_SECONDS
-        )
-        return True
-    return False
 
 
 def gif(frames: Frames) -> bytes:

@@ -14,6 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
+from selfmodel import opengl
 from selfmodel.cli import render
 from selfmodel.cli.film import Film, film_of, painted
 from selfmodel.cli.sticks import draw_ground, stick_frames, strip
@@ -110,13 +111,13 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
     works: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("MUJOCO_GL", "")
-    monkeypatch.setattr(render, "draws", lambda name: name in works)
-    monkeypatch.setattr(render, "WITHOUT_SCREEN", ("egl", "osmesa"))
+    monkeypatch.setattr(opengl, "draws", lambda name: name in works)
+    monkeypatch.setattr(opengl, "WITHOUT_SCREEN", ("egl", "osmesa"))
     if works:
-        assert render.choose_gl() == works[0]
+        assert opengl.choose_gl(render.INSTEAD) == works[0]
     else:
         with pytest.raises(WorkError, match=r"neither EGL nor OSMesa.*libosmesa6.*-o NAME\.png"):
-            render.choose_gl()
+            opengl.choose_gl(render.INSTEAD)
 
 
 @pytest.mark.parametrize(

@@ -163,8 +163,9 @@ os._exit(0)  # skips OpenGL's cleanup at exit, whose order is undefined
 
 
 @pytest.mark.opengl
-def test_pictures_pass_gymnasiums_checks(gl: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MUJOCO_GL", gl)
+@pytest.mark.parametrize("chosen", [True, False], ids=["chosen", "as after load_robot"])
+def test_pictures_pass_gymnasiums_checks(gl: str, monkeypatch: pytest.MonkeyPatch, *, chosen: bool):
+    monkeypatch.setenv("MUJOCO_GL", gl if chosen else "disable")
     done = subprocess.run(
         [sys.executable, "-c", DRAWN], capture_output=True, text=True, check=False, timeout=300
     )
