@@ -15,7 +15,7 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.choice import ComparatorChoice, chosen_comparator
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
-from selfmodel.errors import InputError, check_type, items_of
+from selfmodel.errors import InputError, check_function, check_type, items_of
 from selfmodel.faults import KINDS, FaultKind
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
@@ -213,8 +213,7 @@ def controller_of(source: object, robot: Robot) -> Controller:
 
 def check_options(on_event: object, *, calibrate: object = True) -> None:
     """Raises ``InputError`` for an observer that cannot be called, or no bool."""
-    if not callable(on_event):
-        raise InputError(f"expected a function as on_event, got {on_event!r:.80}: leave it out")
+    check_function("on_event", on_event)
     check_type(calibrate, bool | int | np.bool_, "True or False as calibrate")
 
 

@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence, Set as AbstractSet
+from collections.abc import Callable, Iterable, Sequence, Set as AbstractSet
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
@@ -51,14 +51,21 @@ def check_type(got: object, known: type | UnionType, expected: str) -> None:
         raise InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
 
 
+def check_function(name: str, given: object) -> None:
+    """Raises ``InputError`` for an argument that cannot be called."""
+    if not callable(given):
+        raise InputError(f"expected a function as {name}, got {given!r:.80}: leave it out")
+
+
 def real_number(
     name: str, value: object, example: float, least: float = -math.inf, kind: str = "finite"
 ) -> float:
-    """Returns an argument as a float; a bool is no number.
+    """Returns an argument as a float; a bool is no number, and an array without axes is one.
 
     Raises:
         InputError: It is no number of the kind, finite, whole or real, or less than the least.
     """
+    value = scalar_of(value)
     if isinstance(value, Real) and not isinstance(value, bool):
         try:
             number = float(value)
@@ -76,9 +83,16 @@ def real_number(
 
 def whole_number(name: str, value: object, example: int, least: float = -math.inf) -> int:
     """Returns an argument as an int, where that is exact, as of 1e3; see ``real_number``."""
+    value = scalar_of(value)
     if isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least:
         return int(value)
     return int(real_number(name, value, example, least, "whole"))
+
+
+def scalar_of(value: object) -> object:
+    """Returns the number of a numpy scalar or of an array without axes; others as they are."""
+    item: Callable[[], object] | None = getattr(value, "item", None)
+    return item() if item is not None and getattr(value, "shape", None) == () else value
 
 
 def items_of(source: object) -> list[object]:
@@ -86,6 +100,7 @@ def items_of(source: object) -> list[object]:
 
     Anything else, such as a text, is one item.
     """
+    source = scalar_of(source)
     if isinstance(source, str) or not isinstance(source, Iterable):
         return [source]
     return sorted(source, key=str) if isinstance(source, AbstractSet) else list(source)

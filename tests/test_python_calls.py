@@ -116,6 +116,11 @@ def planned(**options: object) -> list[tuple[str, str]]:
     return [(cell.name, cell.place) for cell in study.cells()]
 
 
+def run_study(**options: object) -> object:
+    study = studies.ablation("never", robots="quadruped", cases=1, comparators="sensor-series")
+    return study.run(**options)
+
+
 def filled(place: Place, **options: object) -> object:
     given = {"robot": place.robot, "design": place.walk.design, "evaluate": lambda _: None}
     return make_repertoire(**{**given, "steps": 20, "seed": 0, **options})
@@ -220,6 +225,18 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda _: planned(robots={"quadruped", "hexapod"}, gaps=0),
         lambda _: planned(robots=["hexapod", "quadruped"]),
     ),
+    "numbers in arrays without axes": (
+        lambda _: (planned(gaps=np.array(0.0), seeds=np.array(0)), Settings(steps=np.array(20))),
+        lambda _: (planned(), Settings(steps=20)),
+    ),
+    "a share as on the command line": (
+        lambda _: planned(seeds=range(4), only="2/3"),
+        lambda _: planned(seeds=[1]),
+    ),
+    "the defaults of a study": (
+        lambda _: planned(seeds=np.arange(1), cases=1, gaps=0.0, repair="robust"),
+        lambda _: planned(),
+    ),
     "a large seed": (
         lambda p: evolved(p, seed=10**400 + 1) != evolved(p, seed=10**400),
         lambda _: True,
@@ -278,6 +295,43 @@ REFUSED: dict[str, tuple[Call, str]] = {
     "a batch": (lambda p: filled(p, batch=0), "of 1 or above as batch, got 0"),
     "a signal": (lambda p: driven(p, signals=["sensor"]), "unknown signal 'sensor': did you mean"),
     "patience": (lambda p: driven(p, patience=1.5), "as patience, got 1.5"),
+    "an array": (lambda _: Settings(steps=np.array([20])), r"as steps, got array\(\[20\]\)"),
+    "a truth in an array": (lambda _: Settings(trials=np.array(True)), "as trials, got True"),
+    "a share of none": (lambda _: planned(only=(0, 1)), r"only=\(2, 8\), got \(0, 1\)"),
+    "a share of three": (lambda _: planned(only=3), "such as 2/8, in Python .* got 3"),
+    "settings of a repair": (
+        lambda _: planned(repair_settings=60),
+        r"settings of the repair such as selfmodel.Settings\(generations=60\), got .* int",
+    ),
+    "the budget of a repair": (
+        lambda p: recovered(p, repair_settings={"generations": 60}),
+        "settings of the repair such as .* dict",
+    ),
+    "a repair": (lambda p: evolved(p, repair="robst"), "unknown repair 'robst': did you mean"),
+    "a layer around nothing": (lambda p: evolved(p, repair="compensate"), "needs a controller"),
+    "a search": (lambda p: evolved(p, search="cma"), "unknown search 'cma': did you mean cma-es"),
+    "no repertoire": (lambda p: evolved(p, search="repertoire"), "got the search repertoire"),
+    "an observer of a fit": (
+        lambda p: selfmodel.calibrate(p.trial, p.robot, on_event="print"),
+        "expected a function as on_event, got 'print': leave it out",
+    ),
+    "an observer of a study": (lambda _: run_study(on_event=5), "a function as on_event, got 5"),
+    "no workers": (lambda _: run_study(workers=-1), "of 1 or above as workers, got -1"),
+    "an executor": (lambda _: run_study(executor="dask"), "an Executor of .* type str"),
+    "a study to load": (lambda _: selfmodel.load(5), "the path of a study, got .* int"),
+    "a definition": (lambda _: studies.read_study(5), "the path of a study, such .* int"),
+    "cases": (lambda _: planned(cases="one"), "expected a whole number as cases, got 'one'"),
+    "no robots": (lambda _: planned(robots=[]), "at least one of the robots of an ablation"),
+    "no failures": (lambda _: planned(damages=5, cases=[]), "failures in notation, got .* int"),
+    "a bank": (lambda _: planned(bank=5), "the path of a folder of gaits, got .* int"),
+    "neurons": (
+        lambda _: studies.suite("study", bodies="quadruped", cases=9, neurons="3"),
+        "whole number as neurons, got '3'",
+    ),
+    "a function of observations": (
+        lambda p: driven(p, observe=5),
+        "expected a function as observe, got 5",
+    ),
     "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
 }
 

@@ -27,6 +27,7 @@ from selfmodel.controllers.playback import Playback
 from selfmodel.errors import (
     InputError,
     TrialError,
+    check_function,
     check_type,
     items_of,
     real_number,
@@ -153,6 +154,9 @@ class EnvironmentRobot:
             raise InputError(
                 f"expected a dm_env.Environment that drives the robot, got {self.env!r:.80}"
             )
+        check_function("observe", self.observe)
+        if self.policy is not None:
+            check_function("policy", self.policy)
         self.patience = whole_number("patience", self.patience, 5, least=0)
         self.tolerance = real_number("tolerance", self.tolerance, 0.25, 0.0, "real")
         self.signals, self.critical = _signals(self.signals), _signals(self.critical)
@@ -267,6 +271,8 @@ class EnvironmentRobot:
             result = self._step_environment(call, commands[0] if k else None)
             ended = result is not None and result.last()
             observation = self.observe(result.observation) if result is not None else None
+            expected = "a mapping of signals by name, or None, from observe"
+            check_type(observation, Mapping | None, expected)
             timing = timer.update(self.clock(), observation)
             values = _rows(names, {} if timing.missing or observation is None else observation)
             for signal, counts in missing_steps.items():

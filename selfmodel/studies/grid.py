@@ -17,7 +17,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import ParamSpec, TypeVar
 
-from selfmodel.errors import InputError, WorkError
+from selfmodel.errors import InputError, WorkError, check_function, check_type, whole_number
 from selfmodel.logs.files import make_folder
 from selfmodel.studies import cells as cell_files
 from selfmodel.studies.cells import CELL, UNFINISHED, Answer, Cell, listed, made_with, read_cell
@@ -97,7 +97,9 @@ def run_grid(
         OSError: The folder cannot be written; all finished cells are kept.
         WorkError: The executor ended; all finished cells are kept.
     """
-    every = _with_needs(cells)
+    check_function("on_event", on_event)
+    check_type(executor, Executor | None, "an Executor of concurrent.futures, or None")
+    workers, every = whole_number("workers", workers, 2, least=1), _with_needs(cells)
     left = _unfinished(folder, cells, every)
     number = before = len(every) - len(left)
     on_event(GridBegins(len(every), number))

@@ -13,7 +13,7 @@ import pandas as pd
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, counted
-from selfmodel.files import read_file
+from selfmodel.files import path_of, read_file
 from selfmodel.studies import comparisons
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, rows_in, shared_in
@@ -235,7 +235,7 @@ def load(path: str | Path) -> LoadedStudy:
     Raises:
         InputError: There is no study, it has no finished run, or a file is damaged.
     """
-    place = Path(path)
+    place = path_of(path, "a study")
     if place.is_dir():
         name = str(shared_in(place).get("study"))
         if name not in KINDS:
