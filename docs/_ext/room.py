@@ -17,7 +17,8 @@ class Room(SphinxDirective):
     """Documents the modules of one package.
 
     A package with ``__all__`` documents those names only. Each name is documented under the module
-    that defines it, because the docstring of a constant is in that module's source only.
+    that defines it, because the docstring of a constant is in that module's source only; instances
+    without a docstring, such as fault kinds, are listed.
     """
 
     required_arguments = 1
@@ -30,16 +31,20 @@ class Room(SphinxDirective):
 
 def _lines(package: ModuleType) -> Iterator[str]:
     public = set(getattr(package, "__all__", ()))
+    instances = set(public)
     for module in (package, *_modules(package)):
         names = [name for name in _defined(module) if not name.startswith("_")]
         if public:
             names = [name for name in names if name in public]
+            instances -= set(names)
         if names:
             yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
             yield from (f".. automodule:: {module.__name__}", f"   :members: {', '.join(names)}")
             if module is not package and module.__name__.rpartition(".")[2] in public:
                 yield "   :no-index:"  # the package has a function with the name of its module
             yield from ("```", "")
+    if instances:
+        yield from ("", f"Instances: {', '.join(f'`{name}`' for name in sorted(instances))}.")
 
 
 def _modules(package: ModuleType) -> Iterator[ModuleType]:

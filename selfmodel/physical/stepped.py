@@ -52,10 +52,12 @@ class Stepped:
             try:
                 self._fields = signal_fields(robot, state[0])
             except (KeyError, IndexError) as error:
-                raise InputError(
-                    f"the environment has another body than {robot.name} ({error}): give the robot "
-                    f"of this body"
-                ) from error
+                if _layout(state[0]) != _layout(robot.model):
+                    raise InputError(
+                        f"the environment has another body than {robot.name} ({error}): give the "
+                        f"robot of this body"
+                    ) from error
+                self._fields = signal_fields(robot)  # its motors have no names
 
     def driven(self, observe: Observe | None, policy: Policy | None) -> EnvironmentRobot:
         """Returns the robot that is stepped through the environment, by a policy if given."""
@@ -111,3 +113,8 @@ class Stepped:
             return physics.model.ptr, physics.data.ptr
         model = getattr(self._inner, "model", None)
         return (model, self._inner.data) if isinstance(model, mujoco.MjModel) else None
+
+
+def _layout(model: mujoco.MjModel) -> tuple[list[str], int]:
+    """Returns the names of the joints, in order, and the number of motors."""
+    return [model.joint(joint).name for joint in range(model.njnt)], model.nu
