@@ -166,20 +166,20 @@ def repair(
         raise InputError(
             f"expected a repertoire with the search {REPERTOIRE}, and with no other; got the "
             f"search {chosen} {'with' if repertoire is not None else 'without'} a repertoire: "
-            f"give --search {REPERTOIRE} --repertoire FILE, or neither"
+            f"give --search {REPERTOIRE} --repertoire FILE, in Python repertoire=, or neither"
         )
     if name == PAPER:
         if chosen != "ea":
             raise InputError(
-                f"the paper's repair has its own EA, got the search {chosen}: leave --search and "
-                f"--repertoire out, or give --repair {ROBUST}"
+                f"the paper's repair has its own EA, got the search {chosen}: leave search and "
+                f"repertoire out, or give the repair {ROBUST}"
             )
         return RepairSearch
     if name == COMPENSATE:
         if chosen != "cma-es":
             raise InputError(
                 f"the repair {COMPENSATE} has CMA-ES from the known controller, got the search "
-                f"{chosen}: leave --search and --repertoire out, or give --repair {ROBUST}"
+                f"{chosen}: leave search and repertoire out, or give the repair {ROBUST}"
             )
         return partial(
             RobustRepair,

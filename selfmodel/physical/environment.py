@@ -304,12 +304,12 @@ class EnvironmentRobot:
         motors = self.robot.anatomy.motors
         try:
             targets = np.asarray(action, dtype=np.float64).ravel()
-        except (ValueError, TypeError) as error:
-            raise InputError(f"expected numbers as an action of the policy: {error}") from error
+        except (ValueError, TypeError):
+            targets = np.empty(0)
         if targets.shape != (len(motors),):
             raise InputError(
                 f"expected targets of the {len(motors)} motors of {self.robot.name} "
-                f"({', '.join(motors)}) as an action of the policy, got {len(targets)}"
+                f"({', '.join(motors)}) as an action of the policy, got {action!r:.80}"
             )
         return targets
 

@@ -140,10 +140,10 @@ def ablation(
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
     _check(lists, cases, damages, next_trial, trials)
-    if bank is not None and by_bank and repair is not None:
+    if bank is not None and by_bank and (repair, repair_settings) != (None, None):
         raise InputError(
-            f"with --bank and --next-trial bank all gaits are given and nothing is evolved, got "
-            f"--repair {repair}: leave one of them out, or give --next-trial repair"
+            "with a bank and its next trials all gaits are given and nothing is evolved, got a "
+            "repair or its settings: leave it or the bank out, or choose the next trial by repair"
         )
     entries = {robot: robot_entry(robot) for robot in robots}
     models = {robot: recoveries.planned(robot, entry) for robot, entry in entries.items()}
@@ -353,7 +353,7 @@ def _check(
     plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
     if next_trial != BANK and trials < 2:
         raise InputError(
-            f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "
+            f"expected at least 2 trials with the next trial by {next_trial}, got 1: the first "
             f"diagnosis chooses the second trial"
         )
     if next_trial == BANK and trials > GAITS and 0 in lists["gaps"]:

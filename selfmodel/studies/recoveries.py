@@ -116,14 +116,14 @@ def repair_parameters(
     repair = plugins.ROBUST if repair is None else repair
     if search == plugins.REPERTOIRE:
         raise InputError(
-            f"a repertoire is of one robot, and a study of many has none, got --search {search}: "
-            f"give --search {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
+            f"a repertoire is of one robot, and a study of many has none, got the search {search}: "
+            f"give {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
             f"recover --repertoire FILE`"
         )
     if repair == plugins.COMPENSATE:
         raise InputError(
-            f"a study evolves its gaits, and has no controller to begin from, got --repair "
-            f"{repair}: give --repair {plugins.ROBUST} or {plugins.PAPER}"
+            f"a study evolves its gaits, and has no controller to begin from, got the repair "
+            f"{repair}: give {plugins.ROBUST} or {plugins.PAPER}"
         )
     plugins.repair(repair, search)
     return {

@@ -102,6 +102,7 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         (ablated, {"settings": Settings(trials=7)}, "at most 6 trials, got 7"),
         (ablated, {"repair": "papers"}, "unknown repair 'papers'"),
         (ablated, {"repair": "robust", "bank": Path("gaits")}, "nothing is evolved"),
+        (ablated, {"repair_settings": Settings(), "bank": Path("gaits")}, "nothing is evolved"),
         (ablated, {"bank": Path("gaits")}, "quadruped-5.npz: expected a controller file"),
         (ablated, {"robots": ["a.xml", "./a.xml"], "cases": [9]}, "would have the same file names"),
         (ablated, {"only": (0, 1)}, r"only=\(2, 8\), got \(0, 1\)"),
