@@ -186,6 +186,8 @@ class GridDisplay(Display):
     def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         if isinstance(event, GridBegins):
+            if event.earlier:
+                self.print_lines(event.earlier)
             self.done, self.total = event.finished, event.total
             self._before, self._start = event.finished, monotonic()
             if self.bar:

@@ -12,6 +12,7 @@ from urllib.parse import quote
 from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
 from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, names_of, real_numbers, unknown_name, whole_numbers
 from selfmodel.faults.hypothesis import Hypothesis
@@ -20,14 +21,17 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import kind_names, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import path_of
+from selfmodel.recovery.recover import NextTrial
+from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import Score
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import check_score
 from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, repair_parameters, robot_key
-from selfmodel.studies.study import Point, Study
+from selfmodel.studies.study import SHARED, Point, Study
 from selfmodel.tasks import ROBOTS, Entry, suite_bodies
 
 BANK = "bank"
@@ -85,11 +89,11 @@ def ablation(
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
-    next_trial: str = BANK,
+    next_trial: str | NextTrial = BANK,
     bank: str | Path | None = None,
     score: str | Score | None = None,
     repair: str = plugins.PAPER,
-    search: str | None = None,
+    search: str | MakeSearch | None = None,
     only: Share = ALL,
 ) -> Study:
     """Returns a study in which every comparator diagnoses the same trials.
@@ -110,7 +114,7 @@ def ablation(
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
-        next_trial: One of ``NEXT_TRIAL``.
+        next_trial: One of ``NEXT_TRIAL``, a function as for ``selfmodel.recover``, or its name.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: The fitness, or its name; None for that of the repair.
         repair: Name of the repair that evolves gaits and recoveries, ``robust`` or ``paper``.
@@ -122,6 +126,7 @@ def ablation(
     comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
     gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds, 0, 0)
     damages = names_of(damages, "failures in notation", Hypothesis)
+    next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings = arguments.settings_of(settings)
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
@@ -165,7 +170,13 @@ def ablation(
         gaits = {f"gait-{number}": gait(robot, (seed + number) % GAITS) for number in range(count)}
         run = {name: value for name, value in point.items() if name != "comparator"}
         function = f"{recoveries.__name__}:run_trials"
-        return {"trials": Cell(function, _name(run), {**run, "shared": shared}, gaits, "trials")}
+        # Of the kinds, only those of the failure determine its trials.
+        parameters = {**run, SHARED: shared}
+        faults = recoveries.truth_of(parameters, entries[robot].robot()).faults
+        own = {fault.kind for fault in faults}
+        used = (name for name in shared["kinds"].split(",") if own & {*plugins.kinds(name)})
+        modules = plugins.modules_of({"kinds": ",".join(used)})
+        return {"trials": Cell(function, _name(run), parameters, gaits, "trials", modules)}
 
     points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
     function = "diagnose" if by_bank else "recover"
@@ -180,13 +191,13 @@ def suite(
     seeds: int | Iterable[int],
     settings: Settings,
     comparator: str | Comparator,
-    controller: str = "network",
+    controller: str | Callable[[Robot, int | None], Design] = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
     gap: float = 0.0,
     score: str | Score | None = None,
     repair: str = plugins.PAPER,
-    search: str | None = None,
+    search: str | MakeSearch | None = None,
     only: Share = ALL,
 ) -> Study:
     """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.
@@ -199,6 +210,7 @@ def suite(
     seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings = arguments.settings_of(settings)
+    controller = plugins.name_of("controller", controller)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score)
@@ -289,7 +301,12 @@ def _study(
                 f"files"
             )
     place = path_of(folder, "the folder of a study")
-    return Study(name, place, f"{recoveries.__name__}:{function}", named, shared, needs)
+    work = f"{recoveries.__name__}:{function}"
+
+    def modules(point: Point) -> tuple[str, ...]:
+        return plugins.modules_of({**shared, **point})
+
+    return Study(name, place, work, named, shared, needs, modules)
 
 
 def _point(
@@ -335,7 +352,10 @@ def _check(
         raise InputError("expected at least one case or one damage of an ablation, got neither")
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
-    plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial not in NEXT_TRIAL and ":" not in next_trial:
+        plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial != BANK:
+        plugins.next_trial(next_trial)
     if next_trial != BANK and trials < 2:
         raise InputError(
             f"expected at least 2 trials with --next-trial {next_trial}, got 1: the first "

@@ -34,7 +34,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.recover import diagnose_trials, random_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair import MakeSearch, RepairSearch
 from selfmodel.recovery.repertoire import model_digest
 from selfmodel.recovery.result import Event, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
@@ -93,7 +93,9 @@ def robot_key(robot: str) -> str:
     return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII).lstrip(".-") or "_"
 
 
-def repair_parameters(repair: str, search: str | None, score: Score | str | None) -> dict[str, str]:
+def repair_parameters(
+    repair: str, search: str | MakeSearch | None, score: Score | str | None
+) -> dict[str, str]:
     """Returns the names that determine a repair, with the defaults of the repair for None."""
     if search == plugins.REPERTOIRE:
         raise InputError(
@@ -106,6 +108,7 @@ def repair_parameters(repair: str, search: str | None, score: Score | str | None
             f"a study evolves its gaits, and has no controller to begin from, got --repair "
             f"{repair}: give --repair {plugins.ROBUST} or {plugins.PAPER}"
         )
+    search = None if search is None else plugins.name_of("search", search)
     plugins.repair(repair, search)
     return {
         "repair": repair,
@@ -130,7 +133,8 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
         **{name: shared[name] for name in ("controller", "neurons", "repair", "search", "score")},
     }
     name = f"{robot_key(robot['robot'])}-seed{seed:03d}"
-    return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits")
+    modules = plugins.modules_of(parameters)
+    return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits", modules=modules)
 
 
 def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
