@@ -222,16 +222,19 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     trials = logged[HEALTHY_TRIALS:]
     robot, given = planned_entry(parameters).robot(), plugins.comparator(parameters["comparator"])
     mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
+    # It refuses all trials at once.
+    chosen = chosen_comparator((), robot, trials, given=given).comparator
     search = DiagnosticSearch(
         Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
-        chosen_comparator((), robot, trials, given=given).comparator,  # it refuses all at once
+        chosen,
         Settings(**shared["settings"]),
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],
     )
     watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
     diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
-    return {"diagnoses": watch.rows(shared, robot, truth_of(parameters, robot), trials)}
+    rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
+    return {"diagnoses": [{**row, "compared_by": chosen.name} for row in rows]}
 
 
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
@@ -282,6 +285,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
         row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
+        row["compared_by"] = recovery.comparator.comparator.name
     diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
     own = {
         "robot": robot.name,
