@@ -49,6 +49,9 @@ from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
 
+MakeDesign = Callable[[Robot, int | None], Design]
+"""Function from a robot and a number of hidden neurons, None for the default, to a design."""
+
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
 )
@@ -339,6 +342,11 @@ def kinds(names: str) -> tuple[FaultKind, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
+def search(source: MakeSearch | str) -> MakeSearch:
+    """Returns a function that makes a search, given as itself or by its name."""
+    return _function("search", source)
+
+
 def next_trial(source: NextTrial | str) -> NextTrial:
     """Returns a choice of the next trial, given as a function or by its name."""
     return _function("next_trial", source)
@@ -412,12 +420,12 @@ def _path_of(registry: Registry, name: str) -> str:
     return paths.pop() if paths else name
 
 
-def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
+def design(name: str | MakeDesign, robot: Robot, neurons: int | None = None) -> Design:
     """Returns a controller design for a robot, with a number of hidden neurons.
 
     Args:
-        name: One of ``DESIGNS``, name of an entry point in the group ``selfmodel.controllers``, or
-            ``package.module:function`` of a function like those of ``DESIGNS``.
+        name: A function like those of ``DESIGNS``, or the name of one: of these, of an entry point
+            in the group ``selfmodel.controllers``, or ``package.module:function``.
         robot: The robot.
         neurons: Number of hidden neurons; None for that of the design.
 

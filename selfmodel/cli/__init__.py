@@ -66,6 +66,7 @@ app = group(
         "suite": ("Recover the bodies of dm_control's suite.", SUITE),
         "paper": ("Repeat the paper's experiment on its robots.", "studies:paper", "RepeatPaper"),
         "compare": ("Compare the methods of a study by pairs.", "compare:compare", "Compare"),
+        "check": ("Check a plug-in of your own.", "check:check", "Check"),
         "repertoire": ("Make a repertoire of a robot's gaits.", REPERTOIRE),
         "logs": ("Inspect, verify, salvage and import trial logs.", LOGS),
     },

@@ -12,7 +12,6 @@ from urllib.parse import quote
 from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.controllers.controller import Design
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import InputError, names_of, real_numbers, unknown_name, whole_numbers
 from selfmodel.faults.hypothesis import Hypothesis
@@ -24,7 +23,6 @@ from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import Score
-from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
@@ -191,7 +189,7 @@ def suite(
     seeds: int | Iterable[int],
     settings: Settings,
     comparator: str | Comparator,
-    controller: str | Callable[[Robot, int | None], Design] = "network",
+    controller: str | plugins.MakeDesign = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
     gap: float = 0.0,
