@@ -27,7 +27,6 @@ from selfmodel.files import read_file, sync_folder
 from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
 from selfmodel.logs.results import digest_of, versions
-from selfmodel.studies.sources import sources_of
 
 CELL, UNFINISHED, ERRORS, EARLIER = "cell.json", "unfinished", "errors", "earlier"
 """File of a finished cell; folders of the cells that are being computed, of the failures, and of
@@ -98,6 +97,8 @@ class Cell:
         It is the versions of selfmodel, MuJoCo and numpy, the digest of all modules and models of
         selfmodel as ``code``, and the digest of each file of other code; see ``sources_of``.
         """
+        from selfmodel.studies.sources import sources_of  # noqa: PLC0415  # a recovery has no cells
+
         return {**package_versions(), **sources_of(self.every_module)}
 
 
@@ -170,10 +171,11 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
     """
     here = cell.made_with()
     if here != made:
+        own, wanted = difference(here, made)
         raise InputError(
-            f"the worker on {os.uname().nodename} has {listed(here)}, the command has "
-            f"{listed(made)}: a study is of one version of each; install the same there, and start "
-            f"again what began before a file changed"
+            f"the worker on {os.uname().nodename} has {own}, the command has {wanted}: a study is "
+            f"of one version of each; install the same there, and start again what began before a "
+            f"file changed"
         )
     begin, place = time.perf_counter(), folder / cell.place
     if _is_complete(place):
@@ -311,6 +313,10 @@ def _folder_name(definition: Mapping[str, Any], made: Mapping[str, str]) -> str:
     return f"{definition['name'][:150]}-{digest_of([definition, made])[:16]}"
 
 
-def listed(made: Mapping[str, str]) -> str:
-    """Returns versions and the digest of the code as text."""
-    return ", ".join(f"{name} {value}" for name, value in made.items())[:300]
+def difference(one: Mapping[str, str], other: Mapping[str, str]) -> tuple[str, str]:
+    """Returns what differs in the versions and digests of two, as texts."""
+    names = [name for name in {**one, **other} if one.get(name) != other.get(name)]
+    first, second = (
+        ", ".join(f"{name} {made.get(name, 'absent')}" for name in names) for made in (one, other)
+    )
+    return first, second

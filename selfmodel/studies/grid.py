@@ -27,8 +27,8 @@ from selfmodel.studies.cells import (
     Answer,
     Cell,
     changed,
+    difference,
     is_source,
-    listed,
     read_cell,
     versions_of,
 )
@@ -148,10 +148,10 @@ def _unfinished(
         cell, place = read_cell(path), path.parent.relative_to(folder).as_posix()
         names = changed(cell.made_with, here)
         if not all(map(is_source, names)):
+            own, installed = difference(cell.made_with, {**cell.made_with, **here})
             raise InputError(
-                f"{path.parent} was made with {listed(cell.made_with)}, installed are "
-                f"{listed(here)}: a study is of one version of each; install those versions, "
-                f"or choose another folder"
+                f"{path.parent} was made with {own}, installed are {installed}: a study is of one "
+                f"version of each; install those versions, or choose another folder"
             )
         if names:
             cell_files.move(folder, place, aside=True)

@@ -10,6 +10,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.studies import cells as cell_files
+from selfmodel.studies.cells import Cell
 from selfmodel.studies.sources import sources_of
 
 ROOT = Path(__file__).parents[2]
@@ -85,6 +86,15 @@ def test_code_that_cannot_be_read_is_refused(folder: Path, text: str | None, rea
     write(folder, **({} if text is None else {"wrong_2": text}))
     with pytest.raises(InputError, match=reason):
         sources_of(("wrong_1" if text is None else "wrong_2",))
+
+
+def test_a_worker_with_another_source_of_a_plug_in_is_refused(folder: Path):
+    write(folder, worked="")
+    cell = Cell("tests.helpers.grids:work", "run", {}, modules=("worked",))
+    theirs = {**cell.made_with(), "worked.py": "another"}
+
+    with pytest.raises(InputError, match=r"the worker on .* has .*worked.py .*worked.py another"):
+        cell_files.compute(folder, cell, theirs)
 
 
 def study_in(folder: Path) -> tuple[str, str, str]:
