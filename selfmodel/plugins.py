@@ -88,9 +88,7 @@ def comparator(name: str) -> Comparator:
     Raises:
         InputError: The name is unknown, or the object is no comparator.
     """
-    if name in COMPARATORS:
-        return COMPARATORS[name]
-    return as_comparator(_plug_in("comparator", name), name)
+    return as_comparator(_found("comparator", name), name)
 
 
 @dataclass(frozen=True)
@@ -358,9 +356,8 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
     Raises:
         InputError: The name is unknown, or its object is no function.
     """
-    registry, found = REGISTRIES[parameter], source
-    if isinstance(source, str):
-        found = registry.known[source] if source in registry.known else _plug_in(parameter, source)
+    registry = REGISTRIES[parameter]
+    found = _found(parameter, source) if isinstance(source, str) else source
     try:
         signature(found).bind(*registry.takes)  # type: ignore[arg-type]  # it raises TypeError
     except (TypeError, ValueError) as error:
@@ -372,10 +369,7 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
 
 
 def _kind(name: str) -> FaultKind:
-    own = {kind.name: kind for kind in ALL_KINDS}
-    if name in own:
-        return own[name]
-    found = _plug_in("kinds", name)
+    found = _found("kinds", name)
     if not isinstance(found, FaultKind):
         raise InputError(
             f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"
@@ -383,16 +377,17 @@ def _kind(name: str) -> FaultKind:
     return found
 
 
-def _plug_in(parameter: str, name: str) -> object:
-    """Returns the object of an entry point, or of ``package.module:object``.
+def _found(parameter: str, name: str) -> object:
+    """Returns an object of selfmodel's, of an entry point, or of ``package.module:object``.
 
     Raises:
         InputError: The name is unknown (the message has the nearest names), its object cannot be
             imported, or two packages have an entry point of that name.
     """
     registry = REGISTRIES[parameter]
-    known = [*registry.known, *sorted(entry_points(group=registry.group).names)]
-    known = list(dict.fromkeys(known))
+    if (own := registry.known.get(name)) is not None:
+        return own
+    known = dict.fromkeys([*registry.known, *sorted(entry_points(group=registry.group).names)])
     module, colon, attribute = _path_of(registry, name).partition(":")
     if not colon:
         raise unknown_name(registry.what, name, known)
@@ -456,15 +451,13 @@ def score(name: str, robot: str, entry: Entry) -> Score:
             robot has no task with rewards. The function of a plug-in's score raises it if it
             returns other than one number per run.
     """
-    if name in SCORES:
-        return SCORES[name]
     if name != RETURN:
-        found = _plug_in("score", name)
+        found = _found("score", name)
         if not isinstance(found, Score):
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"
             )
-        return checked(found, name)
+        return found if name in SCORES else checked(found, name)
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"
