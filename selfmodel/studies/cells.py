@@ -141,8 +141,9 @@ def finished(folder: Path) -> Iterator[FinishedCell]:
             if other != version:
                 raise InputError(
                     f"{cell.path.parent} was made with {name} {version}, {first} with {other}: a "
-                    f"table is of one version of each; the command of the study moves the cells "
-                    f"of earlier plug-ins aside; move those of another selfmodel"
+                    f"table is of one version of each; run the study again, which moves the cells "
+                    f"of an earlier plug-in aside; those of another selfmodel need a folder of "
+                    f"their own"
                 )
         yield cell
 
