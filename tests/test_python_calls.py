@@ -208,7 +208,7 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
     ),
     "a search of a module": (
         lambda p: recovered(p, repair="robust", search="calls_plugins:CmaEs"),
-        lambda p: recovered(p, repair="robust", search="cma-es"),
+        lambda p: recovered(p, repair="robust", search=mine("CmaEs")),
     ),
     "one comparator in a study": (
         lambda _: planned(comparators=SENSOR_SERIES),
