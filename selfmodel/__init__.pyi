@@ -29,7 +29,14 @@ from .settings import Settings as Settings
 from .simulation.simulator import Simulator as Simulator
 from .studies.rows import load as load
 from .studies.study import Study as Study
-from .testing import check_comparator as check_comparator, check_fault_kind as check_fault_kind
+from .testing import (
+    check_comparator as check_comparator,
+    check_design as check_design,
+    check_fault_kind as check_fault_kind,
+    check_next_trial as check_next_trial,
+    check_score as check_score,
+    check_search as check_search,
+)
 from .trials.trajectory import Trajectory as Trajectory
 from .trials.trial import Trial as Trial
 from .version import __version__ as __version__

@@ -22,6 +22,7 @@ from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
 from selfmodel.recovery import recover as recovery_loop
+from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import Score, check_measurable, observed_of
@@ -255,7 +256,7 @@ def recover(
     next_trial: recovery_loop.NextTrial | str = recovery_loop.by_repair,
     score: Score | str | None = None,
     repair: str | None = None,
-    search: str | None = None,
+    search: str | MakeSearch | None = None,
     repertoire: Repertoire | str | Path | None = None,
     repair_settings: Settings | None = None,
     seed: int = 0,
@@ -295,8 +296,8 @@ def recover(
             displacement until the first fall, or the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; ``paper``, in one exact
             simulation; or ``compensate``, of a layer around ``gait``, the default with one.
-        search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair, CMA-ES or the
-            paper's EA, or the repertoire if one is given.
+        search: ``cma-es``, ``ea``, ``repertoire`` or a function that makes one; by default that of
+            the repair, CMA-ES or the paper's EA, or the repertoire if one is given.
         repertoire: Gaits from which the search begins, or the path of their file.
         repair_settings: Parameters of the repair and of the first gait, whose runs have as many
             steps as those of ``settings``; by default ``settings``, which are then of both.

@@ -5,6 +5,7 @@ import os
 import re
 import secrets
 import stat
+import sys
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -19,6 +20,15 @@ def path_of(source: object, what: str) -> Path:
     path = os.fspath(source) if isinstance(source, os.PathLike) else source
     check_type(path, str, f"the path of {what}")
     return Path(str(path))
+
+
+def search_here() -> None:
+    """Lets Python import modules of the current folder, as with ``python -m selfmodel``.
+
+    An installed command has no current folder in its path.
+    """
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)
 
 
 def read_file(path: Path, what: str, limit: int) -> bytes:

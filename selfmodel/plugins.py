@@ -1,15 +1,17 @@
-"""Objects by name: comparators, fault kinds, designs and scores, built in or from plug-ins.
+"""Objects by name: those of selfmodel, and plug-ins, in the ``REGISTRIES``.
 
 A plug-in is an entry point of an installed package, or ``package.module:object``.
 """
 
 import importlib
 import sys
-from collections.abc import Collection, Iterable, Mapping
-from functools import partial
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
 from importlib.metadata import entry_points
-from pathlib import Path
+from inspect import signature
 from types import MappingProxyType
+from typing import Any, cast
 
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
@@ -18,6 +20,7 @@ from selfmodel.errors import InputError, check_type, items_of, unknown_name
 from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
+from selfmodel.files import search_here
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
@@ -45,6 +48,9 @@ from selfmodel.recovery.scores import (
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
 from selfmodel.tasks import Entry
+
+MakeDesign = Callable[[Robot, int | None], Design]
+"""Function from a robot and a number of hidden neurons, None for the default, to a design."""
 
 NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
     {"repair": by_repair, "disagreement": by_disagreement}
@@ -82,30 +88,109 @@ def comparator(name: str) -> Comparator:
     Raises:
         InputError: The name is unknown, or the object is no comparator.
     """
-    if name in COMPARATORS:
-        return COMPARATORS[name]
-    return as_comparator(_plug_in("comparator", name, "selfmodel.comparators", COMPARATORS), name)
+    return as_comparator(_found("comparator", name), name)
 
 
-def _name_of(what: str, found: object, home: str, known: Mapping[str, object]) -> str:
-    """Returns the name by which another process finds an object.
+@dataclass(frozen=True)
+class Registry:
+    """Objects that the values of a parameter name.
+
+    Attributes:
+        what: What one of them is called.
+        group: Group of the entry points of installed plug-ins.
+        known: Selfmodel's own by name; None for a name that stands for no single object.
+        takes: Arguments of the objects, if they are functions.
+    """
+
+    what: str
+    group: str
+    known: Mapping[str, object]
+    takes: tuple[str, ...] = ()
+
+
+REGISTRIES: Mapping[str, Registry] = MappingProxyType(
+    {
+        "comparator": Registry("comparator", "selfmodel.comparators", COMPARATORS),
+        "kinds": Registry(
+            "kind",
+            "selfmodel.fault_kinds",
+            {**{kind.name: kind for kind in ALL_KINDS}, **dict.fromkeys(KIND_SETS)},
+        ),
+        "score": Registry(
+            "score",
+            "selfmodel.scores",
+            {**SCORES, **dict.fromkeys((RETURN, TRACKING, VELOCITY))},
+        ),
+        "next_trial": Registry(
+            "choice of the next trial", "selfmodel.next_trials", NEXT_TRIAL, ("loop",)
+        ),
+        "controller": Registry(
+            "kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")
+        ),
+        "search": Registry(
+            *("search", "selfmodel.searches", {**SEARCHES, REPERTOIRE: None}),
+            takes=("length", "settings", "rng", "seeds"),
+        ),
+    }
+)
+"""What plug-ins may be, by the name of the parameter that names them."""
+
+
+def name_of(parameter: str, found: object, home: str = "") -> str:
+    """Returns the name by which another process finds an object; a text is a name.
+
+    Of several modules with such a variable, it is that which defines the object's class, or the
+    function; or else the innermost, as a package imports from its modules, and the first by name.
+
+    Args:
+        parameter: One of ``REGISTRIES``.
+        found: The object.
+        home: The first module to look into; that of the object's class if not given.
 
     Raises:
-        InputError: It is none of the known objects by name, nor a variable of the module ``home``.
+        InputError: It is none of selfmodel's, nor a variable of an imported module.
     """
+    registry = REGISTRIES[parameter]
     if isinstance(found, str):
         return found
-    names = [name for name, one in known.items() if one is found]
-    if home in sys.modules and home != "__main__":
-        own = vars(sys.modules[home]).items()
-        names += [f"{home}:{name}" for name, one in own if one is found]
-    if not names:
+    names = [name for name, one in registry.known.items() if one is found]
+    if names:
+        return names[0]
+    places = [
+        (module != (home or found.__module__), -module.count("."), module, name)
+        for module, loaded in list(sys.modules.items())
+        if module not in ("__main__", "__mp_main__")
+        for name, one in list(getattr(loaded, "__dict__", {}).items())
+        if one is found and getattr(loaded, "__spec__", None) is not None
+    ]
+    if not places:
         raise InputError(
-            f"expected a {what} that other processes find by name, got the object {found!r:.200}, "
-            f"which is no variable of the module {home or 'that defines it'}: give "
-            f"package.module:object, a variable of a file that can be imported"
+            f"expected a {registry.what} that other processes find by name, got the object "
+            f"{found!r:.200}, which is no variable of an imported module: write it in a file that "
+            f"can be imported, and give it from there, or as package.module:object"
         )
-    return names[0]
+    _, _, module, name = min(places)
+    return f"{module}:{name}"
+
+
+def modules_of(parameters: Mapping[str, Any]) -> tuple[str, ...]:
+    """Returns the modules of the plug-ins that parameters name, those of ``REGISTRIES``."""
+    named = [
+        _module_of(parameter, name)
+        for parameter in REGISTRIES
+        if isinstance(names := parameters.get(parameter), str)
+        for name in names.split(",")
+    ]
+    return tuple(sorted(set(filter(None, named))))
+
+
+@cache
+def _module_of(parameter: str, name: str) -> str:
+    """Returns the module of a plug-in; "" for what is none."""
+    if name in REGISTRIES[parameter].known:
+        return ""
+    module, colon, _ = _path_of(REGISTRIES[parameter], name).partition(":")
+    return module if colon else ""
 
 
 def comparator_names(source: object) -> tuple[str, ...]:
@@ -114,21 +199,15 @@ def comparator_names(source: object) -> tuple[str, ...]:
     Raises:
         InputError: An item is no comparator, or other processes do not find it by name.
     """
-    names = []
-    for one in items_of(source):
-        found = one if isinstance(one, str) else as_comparator(one)
-        names.append(_name_of("comparator", found, type(one).__module__, COMPARATORS))
-    return tuple(names)
+    found = (one if isinstance(one, str) else as_comparator(one) for one in items_of(source))
+    return tuple(name_of("comparator", one) for one in found)
 
 
 def kinds_named(source: object) -> str:
     """Returns the names of fault kinds, separated by commas; see ``comparator_names``."""
-    known = {kind.name: kind for kind in ALL_KINDS}
-    names = []
-    for one in items_of(source):
+    for one in (found := items_of(source)):
         check_type(one, str | FaultKind, "a FaultKind or its name")
-        names.append(_name_of("kind", one, type(one).__module__, known))
-    return ",".join(names)
+    return ",".join(name_of("kinds", one) for one in found)
 
 
 def score_named(source: Score | str | None) -> str | None:
@@ -136,7 +215,7 @@ def score_named(source: Score | str | None) -> str | None:
     check_type(source, Score | str | None, 'a Score or its name, such as "energy"')
     if not isinstance(source, Score):
         return source
-    return _name_of("score", source, getattr(source.of, "__module__", ""), SCORES)
+    return name_of("score", source, getattr(source.of, "__module__", ""))
 
 
 def check_known(what: str, name: str, known: Collection[str]) -> None:
@@ -146,13 +225,17 @@ def check_known(what: str, name: str, known: Collection[str]) -> None:
 
 
 def repair(
-    name: str = ROBUST, search: str | None = None, repertoire: Repertoire | None = None
+    name: str = ROBUST,
+    search: str | MakeSearch | None = None,
+    repertoire: Repertoire | None = None,
 ) -> MakeRepair:
     """Returns a function that makes a repair.
 
     Args:
         name: ``robust``, ``paper`` or ``compensate``.
-        search: Name of one of ``SEARCHES``, or ``repertoire``; None as for ``search_name``.
+        search: A ``MakeSearch``, or the name of one: of ``SEARCHES``, ``repertoire``, of an entry
+            point in the group ``selfmodel.searches``, or ``package.module:object``; None as for
+            ``search_name``.
         repertoire: Gaits from which the search ``repertoire`` begins.
 
     Raises:
@@ -160,8 +243,9 @@ def repair(
             a repertoire is given without the search that needs it, or that without a repertoire.
     """
     check_known("repair", name, DEFAULT_SCORES)
-    chosen = search_name(name, search, repertoire)
-    check_known("search", chosen, (*SEARCHES, REPERTOIRE))
+    chosen = search_name(name, None, repertoire) if search is None else search
+    if chosen != REPERTOIRE:
+        make_search = _function("search", chosen)
     if (chosen == REPERTOIRE) != (repertoire is not None):
         raise InputError(
             f"expected a repertoire with the search {REPERTOIRE}, and with no other; got the "
@@ -187,7 +271,8 @@ def repair(
             conditions=LAYER_CONDITIONS,
             cost=LAYER_COST,
         )
-    make_search = SEARCHES[chosen] if repertoire is None else from_repertoire(repertoire)
+    if repertoire is not None:
+        make_search = from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
 
 
@@ -255,19 +340,36 @@ def kinds(names: str) -> tuple[FaultKind, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
+def search(source: MakeSearch | str) -> MakeSearch:
+    """Returns a function that makes a search, given as itself or by its name."""
+    return _function("search", source)
+
+
 def next_trial(source: NextTrial | str) -> NextTrial:
-    """Returns a choice of the next trial, given as a function or by its name in ``NEXT_TRIAL``."""
-    if callable(source):
-        return source
-    check_known("choice of the next trial", source, NEXT_TRIAL)
-    return NEXT_TRIAL[source]
+    """Returns a choice of the next trial, given as a function or by its name."""
+    return _function("next_trial", source)
+
+
+def _function(parameter: str, source: object) -> Callable[..., Any]:
+    """Returns a function, given as itself or by its name.
+
+    Raises:
+        InputError: The name is unknown, or its object is no function.
+    """
+    registry = REGISTRIES[parameter]
+    found = _found(parameter, source) if isinstance(source, str) else source
+    try:
+        signature(found).bind(*registry.takes)  # type: ignore[arg-type]  # it raises TypeError
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{source!r:.200} is no {registry.what}: expected a function of the arguments "
+            f"{', '.join(registry.takes)}, got {found!r:.200} ({error})"
+        ) from error
+    return cast("Callable[..., Any]", found)
 
 
 def _kind(name: str) -> FaultKind:
-    own = {kind.name: kind for kind in ALL_KINDS}
-    if name in own:
-        return own[name]
-    found = _plug_in("kind", name, "selfmodel.fault_kinds", (*own, *KIND_SETS))
+    found = _found("kinds", name)
     if not isinstance(found, FaultKind):
         raise InputError(
             f"{name!r} is no kind: expected a selfmodel.faults.FaultKind, got {found!r}"
@@ -275,48 +377,64 @@ def _kind(name: str) -> FaultKind:
     return found
 
 
-def _plug_in(what: str, name: str, group: str, built_in: Iterable[str]) -> object:
-    """Returns the object of an entry point of a group, or of ``package.module:object``.
+def _found(parameter: str, name: str) -> object:
+    """Returns an object of selfmodel's, of an entry point, or of ``package.module:object``.
 
     Raises:
         InputError: The name is unknown (the message has the nearest names), its object cannot be
             imported, or two packages have an entry point of that name.
     """
-    installed = entry_points(group=group)
-    known = dict.fromkeys([*built_in, *sorted(installed.names)])
-    paths = {point.value for point in installed if point.name == name}
-    if len(paths) > 1:
-        raise InputError(
-            f"two installed packages have the {what} {name!r}: {', '.join(sorted(paths))}; give "
-            f"one as package.module:object"
-        )
-    path = paths.pop() if paths else name
-    module, colon, attribute = path.partition(":")
+    registry = REGISTRIES[parameter]
+    if (own := registry.known.get(name)) is not None:
+        return own
+    known = dict.fromkeys([*registry.known, *sorted(entry_points(group=registry.group).names)])
+    module, colon, attribute = _path_of(registry, name).partition(":")
     if not colon:
-        raise unknown_name(what, name, known)
-    # As with ``python -m selfmodel``; an installed command has no current folder in its path.
-    if (here := str(Path.cwd())) not in sys.path:
-        sys.path.append(here)
+        raise unknown_name(registry.what, name, known)
+    search_here()
     try:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
         moved = isinstance(error, ImportError) and (error.name or "").startswith("selfmodel")
         hint = "; it was written for selfmodel 0.1, whose modules have moved: see the changelog"
         raise InputError(
-            f"cannot find the {what} {name!r}: {error}{hint if moved else ''}; expected "
+            f"cannot find the {registry.what} {name!r}: {error}{hint if moved else ''}; expected "
             f"package.module:object, importable from here, or one of {', '.join(known)}"
         ) from error
 
 
-def design(name: str, robot: Robot, neurons: int | None = None) -> Design:
-    """Returns a controller design of ``DESIGNS`` for a robot, with a number of hidden neurons.
+def _path_of(registry: Registry, name: str) -> str:
+    """Returns the ``package.module:object`` of an entry point; any other name as it is."""
+    installed = entry_points(group=registry.group)
+    paths = {point.value for point in installed if point.name == name}
+    if len(paths) > 1:
+        raise InputError(
+            f"two installed packages have the {registry.what} {name!r}: "
+            f"{', '.join(sorted(paths))}; give one as package.module:object"
+        )
+    return paths.pop() if paths else name
+
+
+def design(name: str | MakeDesign, robot: Robot, neurons: int | None = None) -> Design:
+    """Returns a controller design for a robot, with a number of hidden neurons.
+
+    Args:
+        name: A function like those of ``DESIGNS``, or the name of one: of these, of an entry point
+            in the group ``selfmodel.controllers``, or ``package.module:function``.
+        robot: The robot.
+        neurons: Number of hidden neurons; None for that of the design.
 
     Raises:
         InputError: The design is unknown, it cannot have that many hidden neurons, or a motor
             has no command range.
     """
-    check_known("kind of controller", name, DESIGNS)
-    return DESIGNS[name](robot, neurons)
+    made = _function("controller", name)(robot, neurons)
+    if not isinstance(made, Design):
+        raise InputError(
+            f"{name!r} is no kind of controller: expected a function that returns a Design, and "
+            f"it returned {made!r:.200}"
+        )
+    return made
 
 
 def score(name: str, robot: str, entry: Entry) -> Score:
@@ -333,15 +451,13 @@ def score(name: str, robot: str, entry: Entry) -> Score:
             robot has no task with rewards. The function of a plug-in's score raises it if it
             returns other than one number per run.
     """
-    if name in SCORES:
-        return SCORES[name]
     if name != RETURN:
-        found = _plug_in("score", name, "selfmodel.scores", (*SCORES, RETURN, TRACKING, VELOCITY))
+        found = _found("score", name)
         if not isinstance(found, Score):
             raise InputError(
                 f"{name!r} is no score: expected a selfmodel.recovery.Score, got {found!r}"
             )
-        return checked(found, name)
+        return found if name in SCORES else checked(found, name)
     if entry.episode_return is None:
         raise InputError(
             f"{robot} has no task of dm_control, so no rewards: give --score {DISPLACEMENT.name}"

@@ -21,6 +21,9 @@ from selfmodel.faults import KINDS
 MINE = replace(FORWARD_DISPLACEMENT, name="mine")
 LIMP = replace(KINDS["jam"], name="limp", keyword="limp")
 NUMBER = 7
+
+def choice(loop):
+    return loop.controllers[0]
 """
 
 ENTRY_POINTS = """
@@ -32,6 +35,9 @@ gone = entry_module:GONE
 
 [selfmodel.fault_kinds]
 limp = entry_module:LIMP
+
+[selfmodel.next_trials]
+theirs = entry_module:choice
 """
 
 
@@ -54,6 +60,27 @@ def _installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_comparator_and_a_fault_kind_are_found_by_their_entry_points():
     assert plugins.comparator("displacement-of-theirs").name == "mine"
     assert [kind.name for kind in plugins.kinds("break,limp")] == ["break", "limp"]
+
+
+def test_a_choice_of_the_next_trial_is_found_by_its_entry_point_whose_module_is_that_of_a_study():
+    assert plugins.next_trial("theirs").__name__ == "choice"
+    given = {"next_trial": "theirs", "kinds": "jam,limp", "score": "energy", "seed": 3}
+    assert plugins.modules_of(given) == ("entry_module",)
+    assert plugins.modules_of({**given, "next_trial": "bank", "kinds": "jam"}) == ()
+
+
+def test_an_object_that_a_package_imports_from_its_module_has_the_name_of_the_module(
+    tmp_path: Path,
+):
+    (tmp_path / "outer").mkdir()
+    (tmp_path / "outer" / "__init__.py").write_text("from outer.inner import MINE\n")
+    (tmp_path / "outer" / "inner.py").write_text(MODULE)
+    found = plugins.comparator("outer:MINE")
+
+    assert plugins.comparator_names([found, FORWARD_DISPLACEMENT]) == (
+        "outer.inner:MINE",
+        "forward-displacement",
+    )
 
 
 def test_a_name_of_selfmodel_has_precedence_over_an_entry_point():

@@ -22,7 +22,8 @@ PUBLIC = {
     *("Controller", "Trial", "Trajectory", "evolve_controller", "run_trial", "read_log"),
     *("write_log", "record", "evaluate", "Episode", "Study", "load"),
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
-    *("Comparator", "check_comparator", "check_fault_kind", "__version__"),
+    *("Comparator", "check_comparator", "check_fault_kind", "check_score", "check_next_trial"),
+    *("check_design", "check_search", "__version__"),
 }
 
 LOGS = ROOT / "tests" / "data" / "logs-0.1" / "recovery" / "trials"

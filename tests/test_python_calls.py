@@ -27,12 +27,14 @@ from selfmodel.testing import check_comparator, check_fault_kind
 from selfmodel.trials.trial import Trial
 
 SMALL = Settings(steps=60, generations=1, trials=1).scaled(4)
+TWO = dataclasses.replace(SMALL, trials=2)
 
 MINE = """
 import dataclasses
 from selfmodel.comparators import SENSOR_SERIES
 from selfmodel.faults.joints import Jammed
 from selfmodel.recovery import DISPLACEMENT
+from selfmodel.recovery.cma_es import CmaEs
 
 class Dtw:
     name = "dtw"
@@ -42,6 +44,20 @@ class Dtw:
 
 DTW = Dtw()
 SCORE = dataclasses.replace(DISPLACEMENT, name="mine", of=lambda *_: DISPLACEMENT.of(*_))
+"""
+
+MADE = """
+import calls_plugins
+from selfmodel.recovery.next_trial import by_disagreement
+from selfmodel.robot.designs import network_for
+
+OTHER = calls_plugins.Dtw()
+
+def choice(loop):
+    return by_disagreement(loop)
+
+def wide(robot, hidden):
+    return network_for(robot, 5)
 """
 
 
@@ -60,6 +76,7 @@ class Place(NamedTuple):
 def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
     folder = tmp_path_factory.mktemp("calls")
     (folder / "calls_plugins.py").write_text(MINE, encoding="utf-8")
+    (folder / "calls_made.py").write_text(MADE, encoding="utf-8")
     robot = selfmodel.load_robot("quadruped")
     design = network_for(robot)
     walk = Controller(design, np.linspace(-1, 1, design.weights))
@@ -77,8 +94,8 @@ def here(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(folder))
 
 
-def mine(name: str) -> object:
-    return getattr(__import__("calls_plugins"), name)
+def mine(name: str, module: str = "calls_plugins") -> object:
+    return getattr(__import__(module), name)
 
 
 def ran(place: Place, **options: object) -> tuple[object, ...]:
@@ -182,6 +199,22 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda _: planned(comparators=[mine("DTW")]),
         lambda _: planned(comparators=["calls_plugins:DTW"]),
     ),
+    "a comparator of a class of another module": (
+        lambda _: planned(comparators=[mine("OTHER", "calls_made")]),
+        lambda _: planned(comparators=["calls_made:OTHER"]),
+    ),
+    "a choice of the next trial in a study": (
+        lambda _: planned(next_trial=mine("choice", "calls_made"), settings=TWO),
+        lambda _: planned(next_trial="calls_made:choice", settings=TWO),
+    ),
+    "a design of a module": (
+        lambda p: evolved(p, design="calls_made:wide"),
+        lambda p: evolved(p, design=network_for(p.robot, 5)),
+    ),
+    "a search of a module": (
+        lambda p: recovered(p, repair="robust", search="calls_plugins:CmaEs"),
+        lambda p: recovered(p, repair="robust", search=mine("CmaEs")),
+    ),
     "one comparator in a study": (
         lambda _: planned(comparators=SENSOR_SERIES),
         lambda _: planned(),
@@ -245,8 +278,6 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
     "the name of a kind": (lambda _: check_fault_kind("jam", "quadruped"), lambda _: None),
 }
 
-STRANGER = dataclasses.replace(ENERGY, name="stranger")
-
 REFUSED: dict[str, tuple[Call, str]] = {
     "a fraction": (lambda _: Settings(steps=10.5), "whole number as steps, got 10.5: give one"),
     "a bool": (lambda _: Settings(trials=True), "whole number as trials, got True"),
@@ -290,7 +321,10 @@ REFUSED: dict[str, tuple[Call, str]] = {
     "a gap": (lambda _: planned(gaps=["0.1"]), "real number as gaps, got '0.1': .* gaps=0.05"),
     "a seed": (lambda _: planned(seeds=[-1]), "of 0 or above as seeds, got -1"),
     "a robot in a study": (lambda p: planned(robots=[p.robot]), "names of robots .* got .* Robot"),
-    "a score without a name": (lambda _: planned(score=STRANGER), "give package.module:object"),
+    "a score without a name": (
+        lambda _: planned(score=dataclasses.replace(ENERGY, name="stranger")),
+        "no variable of an imported module: .* or as package.module:object",
+    ),
     "a repertoire": (lambda p: filled(p, robot="quadruped"), "selfmodel.load_robot.*got .* str"),
     "a batch": (lambda p: filled(p, batch=0), "of 1 or above as batch, got 0"),
     "a signal": (lambda p: driven(p, signals=["sensor"]), "unknown signal 'sensor': did you mean"),
@@ -332,6 +366,14 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda p: driven(p, observe=5),
         "expected a function as observe, got 5",
     ),
+    "a number as a choice": (
+        lambda p: recovered(p, next_trial=3),
+        "3 is no choice of the next trial: expected a function",
+    ),
+    "a class as a design": (
+        lambda p: evolved(p, design="calls_plugins:Dtw"),
+        "no kind of controller: expected a function of the arguments robot, hidden, got .*Dtw",
+    ),
     "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
 }
 
@@ -362,11 +404,10 @@ def test_a_refused_recovery_leaves_no_folder(place: Place, wrong: dict[str, str]
 def test_a_comparator_of_a_script_is_no_comparator_of_other_processes(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    dtw = mine("DTW")
-    monkeypatch.setattr(type(dtw), "__module__", "__main__")
+    dtw = mine("Dtw")()
     monkeypatch.setattr(sys.modules["__main__"], "DTW", dtw, raising=False)
 
-    with pytest.raises(InputError, match=r"which is no variable of the module __main__: give"):
+    with pytest.raises(InputError, match=r"which is no variable of an imported module: write it"):
         planned(comparators=[dtw])
 
 

@@ -67,6 +67,7 @@ app = group(
         "paper": ("Repeat the paper's experiment on its robots.", "studies:paper", "RepeatPaper"),
         "study": ("Run the study that a TOML file defines.", "studies:run_file", "RunStudy"),
         "compare": ("Compare the methods of a study by pairs.", "compare:compare", "Compare"),
+        "check": ("Check a plug-in of your own.", "check:check", "Check"),
         "repertoire": ("Make a repertoire of a robot's gaits.", REPERTOIRE),
         "logs": ("Inspect, verify, salvage and import trial logs.", LOGS),
     },

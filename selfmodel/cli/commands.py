@@ -368,6 +368,17 @@ class Compare(Command):
     table: str = "csv"
 
 
+class Check(Command):
+    """Check that a plug-in fulfils its contract, on simulations that the check makes.
+
+    The exit status is 0 if every rule holds, otherwise 1.
+    """
+
+    what: str
+    plug_in: str
+    self_model: str | None = None
+
+
 def settings_of(options: Study | Recover, steps: int) -> Settings:
     """Returns the parameters of a recovery in trials of that many steps."""
     small = Settings(steps=steps, trials=options.trials, generations=options.generations)

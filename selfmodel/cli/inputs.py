@@ -80,6 +80,12 @@ def check_new_file(path: Path, *endings: str) -> None:
     refuse_existing(path)
 
 
+def is_file(name: str) -> bool:
+    """Returns whether a text is a path with an ending, rather than ``package.module:object``."""
+    ending = Path(name).suffix
+    return bool(ending) and ":" not in ending
+
+
 def check_log_name(path: Path) -> None:
     """Raises ``InputError`` if the name of a log to be written does not end in ``.mcap``."""
     if path.suffix != ".mcap":

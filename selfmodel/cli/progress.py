@@ -150,6 +150,8 @@ class GridDisplay(Display):
     def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         if isinstance(event, GridBegins):
+            if event.earlier:
+                self.print_lines(event.earlier)
             self.done, self.total = event.finished, event.total
             if self.bar:
                 self.bar.add_task("", total=event.total, completed=event.finished)

@@ -81,7 +81,7 @@ def experiment_of(options: Recover) -> Experiment:
     damage = inputs.case_notation(entry.cases, options.case, options.damage)
     robot = entry.robot()
     gait, neurons = None, options.neurons
-    if Path(options.controller).suffix:
+    if inputs.is_file(options.controller):
         gait = arguments.read_controller(Path(options.controller), robot, neurons)
     design = gait.design if gait else plugins.design(options.controller, robot, neurons)
     repair, design, gait = plugins.repaired_around(options.repair, design, gait)
@@ -89,7 +89,7 @@ def experiment_of(options: Recover) -> Experiment:
     check_silent_neurons(design, silent_neurons(truth))
     gaits = arguments.repertoire_of(options.repertoire, robot, design)
     plugins.repair(repair, options.search, gaits)
-    plugins.check_known("choice of the next trial", options.next_trial, plugins.NEXT_TRIAL)
+    plugins.next_trial(options.next_trial)
     score = choose_score(
         options.score or plugins.DEFAULT_SCORES[repair],
         entry,

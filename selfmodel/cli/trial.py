@@ -16,7 +16,6 @@ from selfmodel.logs.files import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trial import TrialPlan, stage_of
@@ -29,12 +28,12 @@ def trial(options: RunTrial) -> None:
     space = HypothesisSpace(robot.anatomy, plugins.kinds(options.kinds))
     hidden = space.parse("intact" if options.damage is None else options.damage)
     gap = draw_reality(robot, options.seed, options.gap)
-    if options.controller in DESIGNS:
+    if inputs.is_file(options.controller):
+        driver = arguments.read_controller(Path(options.controller), robot, options.neurons)
+    else:
         design = plugins.design(options.controller, robot, options.neurons)
         weights = draw_genomes(np.random.default_rng(options.seed), (design.weights,))
         driver = Controller(design, weights)
-    else:
-        driver = arguments.read_controller(Path(options.controller), robot, options.neurons)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
     plan = TrialPlan("trial", stage_of(options.stage), driver, settings.steps, options.seed)

@@ -2,12 +2,12 @@
 
 The folder of a cell, FOLDER/KIND/NAME-DIGEST, is named by the digest of these and of the code that
 computes it. It is filled under a random name and renamed when it is complete: a cell is finished if
-its ``cell.json`` stands there.
+its ``cell.json`` stands there. One of an earlier source of a plug-in moves to FOLDER/earlier.
 """
 
 import errno
 import hashlib
-import importlib.util
+import importlib
 import json
 import os
 import re
@@ -16,7 +16,7 @@ import shutil
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -28,8 +28,9 @@ from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
 from selfmodel.logs.results import digest_of, versions
 
-CELL, UNFINISHED, ERRORS = "cell.json", "unfinished", "errors"
-"""File of a finished cell; folders of the cells that are being computed, and of the failures."""
+CELL, UNFINISHED, ERRORS, EARLIER = "cell.json", "unfinished", "errors", "earlier"
+"""File of a finished cell; folders of the cells that are being computed, of the failures, and of
+finished cells that earlier sources of a plug-in made."""
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of the code that determines the bits of every cell."""
@@ -57,6 +58,8 @@ class Cell:
         parameters: All inputs of the function, as JSON, the seed of its random numbers included.
         needs: Cells whose files the function reads, each by a name of its own.
         kind: Folder of the study for cells of this kind.
+        modules: Modules of the plug-ins that the function calls; their source determines the
+            result, as that of the function's own module does.
     """
 
     function: str
@@ -64,6 +67,7 @@ class Cell:
     parameters: Mapping[str, Any]
     needs: Mapping[str, "Cell"] = field(default_factory=dict)
     kind: str = "runs"
+    modules: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"\w[\w.=%-]*", self.name, re.ASCII):
@@ -79,7 +83,23 @@ class Cell:
     @cached_property
     def place(self) -> str:
         """Folder of the cell, relative to that of the study."""
-        return f"{self.kind}/{_folder_name(self.definition, made_with(self.function))}"
+        return f"{self.kind}/{_folder_name(self.definition, self.made_with())}"
+
+    @cached_property
+    def every_module(self) -> tuple[str, ...]:
+        """Modules of the function and of its plug-ins, and those of the cells that it needs."""
+        own = {self.function.partition(":")[0], *self.modules}
+        return tuple(sorted(own.union(*(need.every_module for need in self.needs.values()))))
+
+    def made_with(self) -> dict[str, str]:
+        """Returns what determines the bits of the cell here, besides its definition.
+
+        It is the versions of selfmodel, MuJoCo and numpy, the digest of all modules and models of
+        selfmodel as ``code``, and the digest of each file of other code; see ``sources_of``.
+        """
+        from selfmodel.studies.sources import sources_of  # noqa: PLC0415  # a recovery has no cells
+
+        return {**package_versions(), **sources_of(self.every_module)}
 
 
 @dataclass(frozen=True)
@@ -91,7 +111,8 @@ class FinishedCell:
         parameters: Inputs.
         result: The result, as JSON.
         path: ``cell.json``.
-        made_with: Versions, and the digest of the code, that computed the cell.
+        made_with: Versions, and digests of the code, that computed the cell; see
+            ``Cell.made_with``.
         files: Paths of its other files, relative to the folder.
     """
 
@@ -113,17 +134,33 @@ def finished(folder: Path) -> Iterator[FinishedCell]:
 
     All are verified, and made by the same code.
     """
-    first: FinishedCell | None = None
-    for path in sorted(folder.glob(f"*/{CELL}")):
-        cell = read_cell(path)
-        first = first or cell
-        if cell.made_with != first.made_with:
-            raise InputError(
-                f"{path.parent} was made with {listed(cell.made_with)}, {first.path.parent} with "
-                f"{listed(first.made_with)}: a table is of one version of each; move the cells of "
-                f"other versions into a folder of their own"
-            )
+    known: dict[str, tuple[str, Path]] = {}
+    for cell in read_cells(folder):
+        for name, version in cell.made_with.items():
+            other, first = known.setdefault(name, (version, cell.path.parent))
+            if other != version:
+                raise InputError(
+                    f"{cell.path.parent} was made with {name} {version}, {first} with {other}: a "
+                    f"table is of one version of each; run the study again, which moves the cells "
+                    f"of an earlier plug-in aside; those of another selfmodel need a folder of "
+                    f"their own"
+                )
         yield cell
+
+
+def read_cells(folder: Path) -> Iterator[FinishedCell]:
+    """Yields every finished cell in a folder of cells, verified, in the order of the names."""
+    yield from map(read_cell, sorted(folder.glob(f"*/{CELL}")))
+
+
+def versions_of(cells: Iterable[Cell]) -> dict[str, str]:
+    """Returns what cells are made with here, all of them together."""
+    return {name: version for cell in cells for name, version in cell.made_with().items()}
+
+
+def changed(made: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
+    """Returns the names of what made a cell and has another version here."""
+    return [name for name, version in made.items() if here.get(name, version) != version]
 
 
 def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
@@ -133,11 +170,13 @@ def compute(folder: Path, cell: Cell, made: Mapping[str, str]) -> Answer:
         InputError: The worker has other code than the command.
         OSError: The disk is full or not writable.
     """
-    here = made_with(cell.function)
+    here = cell.made_with()
     if here != made:
+        own, wanted = difference(here, made)
         raise InputError(
-            f"the worker on {os.uname().nodename} has {listed(here)}, the command has "
-            f"{listed(made)}: a study is of one version of each; install the same there"
+            f"the worker on {os.uname().nodename} has {own}, the command has {wanted}: a study is "
+            f"of one version of each; install the same there, and start again what began before a "
+            f"file changed"
         )
     begin, place = time.perf_counter(), folder / cell.place
     if _is_complete(place):
@@ -176,7 +215,7 @@ def _perform(folder: Path, cell: Cell, unfinished: Path, begin: float) -> str | 
             "result": result,
             "files": [path.relative_to(unfinished).as_posix() for path in paths],
             "seconds": time.perf_counter() - begin,
-            "made_with": made_with(cell.function),
+            "made_with": cell.made_with(),
         }
         text = json.dumps({**content, "sha256": digest_of(content)}, indent=1, allow_nan=False)
     except (OSError, InputError, WorkError, MemoryError) as cause:
@@ -191,6 +230,19 @@ def _perform(folder: Path, cell: Cell, unfinished: Path, begin: float) -> str | 
         return f"an unexpected error, {line}; its traceback is in {folder / ERRORS}"
     replace_file(unfinished / CELL, f"{text}\n".encode())
     return None
+
+
+def move(folder: Path, place: str, *, aside: bool) -> None:
+    """Moves the folder of a cell of an earlier source to FOLDER/earlier, or from there."""
+    known = folder / place, folder / EARLIER / place
+    source, target = known if aside else known[::-1]
+    make_folder(target.parent, folder)
+    try:
+        shutil.rmtree(target, ignore_errors=True)  # of the same digest, or without its result
+        source.rename(target)
+    except OSError as error:
+        raise not_written(target, error) from error
+    sync_folder(target.parent)
 
 
 def keep_error(folder: Path, place: str, text: str) -> None:
@@ -239,13 +291,14 @@ def read_cell(path: Path) -> FinishedCell:
     return finished_cell
 
 
-@cache
-def made_with(function: str) -> dict[str, str]:
-    """Returns what determines the bits of a cell besides its definition.
+def is_source(name: str) -> bool:
+    """Returns whether what made a cell is a file of code outside of selfmodel, and no version."""
+    return bool(Path(name).suffix)
 
-    It is the versions of selfmodel, MuJoCo and numpy, and the digest of the code: of all modules
-    and models of selfmodel, and of the function's module.
-    """
+
+@cache
+def package_versions() -> dict[str, str]:
+    """Returns the versions, and the digest of the code of selfmodel."""
     files = [
         Path(folder, name)
         for folder, _, names in os.walk(PACKAGE, followlinks=True)
@@ -253,9 +306,6 @@ def made_with(function: str) -> dict[str, str]:
         if name.endswith((".py", ".xml"))
     ]
     code = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in files}
-    module = importlib.util.find_spec(function.partition(":")[0])
-    if module is not None and module.origin and not module.name.startswith("selfmodel."):
-        code[""] = Path(module.origin).read_bytes()
     digests = {name: hashlib.sha256(content).hexdigest() for name, content in code.items()}
     return {**versions(), "code": digest_of(digests)[:16]}
 
@@ -264,6 +314,10 @@ def _folder_name(definition: Mapping[str, Any], made: Mapping[str, str]) -> str:
     return f"{definition['name'][:150]}-{digest_of([definition, made])[:16]}"
 
 
-def listed(made: Mapping[str, str]) -> str:
-    """Returns versions and the digest of the code as text."""
-    return ", ".join(f"{name} {value}" for name, value in made.items())[:300]
+def difference(one: Mapping[str, str], other: Mapping[str, str]) -> tuple[str, str]:
+    """Returns what differs in the versions and digests of two, as texts."""
+    names = [name for name in {**one, **other} if one.get(name) != other.get(name)]
+    first, second = (
+        ", ".join(f"{name} {made.get(name, 'absent')}" for name in names) for made in (one, other)
+    )
+    return first, second

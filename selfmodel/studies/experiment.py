@@ -66,7 +66,8 @@ class Experiment:
         folder: Folder of the run.
         gap: Level of the reality gap.
         calibrated: Whether the self-model is fitted to the trials before the failure.
-        next_trial: Choice of each trial after the failing one, one of ``NEXT_TRIAL``.
+        next_trial: Choice of each trial after the failing one, by name; see
+            ``plugins.next_trial``.
         physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
             the model; unused with a reality gap.
         repair: Name of the repair, ``robust`` or ``paper``.
@@ -141,7 +142,7 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
         calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
         if experiment.calibrated
         else None,
-        next_trial=plugins.NEXT_TRIAL[experiment.next_trial],
+        next_trial=plugins.next_trial(experiment.next_trial),
         score=experiment.score,
         make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),
         repair_settings=experiment.repair_settings,

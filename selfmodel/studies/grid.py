@@ -6,6 +6,8 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent import futures
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -17,10 +19,28 @@ from pathlib import Path
 from time import perf_counter
 from typing import ParamSpec, TypeVar
 
-from selfmodel.errors import InputError, WorkError, check_function, check_type, whole_number
+from selfmodel.errors import (
+    InputError,
+    WorkError,
+    check_function,
+    check_type,
+    counted,
+    whole_number,
+)
 from selfmodel.logs.files import make_folder
 from selfmodel.studies import cells as cell_files
-from selfmodel.studies.cells import CELL, UNFINISHED, Answer, Cell, listed, made_with, read_cell
+from selfmodel.studies.cells import (
+    CELL,
+    EARLIER,
+    UNFINISHED,
+    Answer,
+    Cell,
+    changed,
+    difference,
+    is_source,
+    read_cell,
+    versions_of,
+)
 
 ATTEMPTS = 2
 """Attempts to compute a cell whose process ends."""
@@ -34,10 +54,14 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class GridBegins:
-    """Start of a grid: the number of all cells, and of those that need not be computed."""
+    """Start of a grid: the number of all cells, and of those that need not be computed.
+
+    ``earlier`` is a sentence on cells of an earlier source of a plug-in; "" without any.
+    """
 
     total: int
     finished: int
+    earlier: str = ""
 
     def __str__(self) -> str:
         return f"{self.finished} of {self.total} were done before"
@@ -71,26 +95,34 @@ class CellEnds:
         return f"{3600 * self.rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
 
 
+def warn_of_earlier(event: GridBegins | CellEnds) -> None:
+    """Warns of cells of an earlier source of a plug-in, and tells nothing else of a grid."""
+    if isinstance(event, GridBegins) and event.earlier:
+        warnings.warn(event.earlier, stacklevel=4)
+
+
 def run_grid(
     folder: Path,
     cells: Sequence[Cell],
     *,
     executor: Executor | None = None,
     workers: int = 1,
-    on_event: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
+    on_event: Callable[[GridBegins | CellEnds], None] = warn_of_earlier,
 ) -> tuple[CellEnds, ...]:
     """Computes all cells that are not finished, and returns the failed ones.
 
     A failure is written into the folder ``errors``, an unexpected one with its traceback, and stops
     no cell that does not need the failed one. Where files cannot be written, as on a full disk, the
-    grid ends.
+    grid ends. Cells of an earlier source of a plug-in are moved to the folder ``earlier``, and from
+    there if that source is restored.
 
     Args:
         folder: Folder of the study, which all workers know by the same path.
         cells: The cells; those that they need are computed as well, once.
         executor: Executor whose workers can import selfmodel; None for processes of this machine.
         workers: Number of these processes.
-        on_event: Called with the start of the grid and the end of every cell.
+        on_event: Called with the start of the grid and the end of every cell; without it, a Python
+            warning tells of cells of an earlier source.
 
     Raises:
         InputError: A cell in the folder is damaged or of other code, or a worker has other code.
@@ -100,9 +132,9 @@ def run_grid(
     check_function("on_event", on_event)
     check_type(executor, Executor | None, "an Executor of concurrent.futures, or None")
     workers, every = whole_number("workers", workers, 2, least=1), _with_needs(cells)
-    left = _unfinished(folder, cells, every)
+    left, earlier = _unfinished(folder, cells, every)
     number = before = len(every) - len(left)
-    on_event(GridBegins(len(every), number))
+    on_event(GridBegins(len(every), number, earlier))
     start = perf_counter()
     failures: list[CellEnds] = []
     if left:
@@ -128,25 +160,37 @@ def _with_needs(cells: Iterable[Cell]) -> dict[str, Cell]:
     return ordered
 
 
-def _unfinished(folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]) -> dict[str, Cell]:
-    """Returns the cells to compute by their place; a needed cell that lacks files is among them.
+def _unfinished(
+    folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]
+) -> tuple[dict[str, Cell], str]:
+    """Returns the cells to compute by their place, and a sentence on cells of an earlier source.
+
+    A needed cell that lacks files is among them.
 
     Raises:
         InputError: A cell in the folder is damaged, or was made by other code than this.
     """
-    made = [made_with(function) for function in {cell.function for cell in every.values()}]
+    here, earlier = versions_of(every.values()), Counter[str]()
+    for place in every:
+        if (folder / EARLIER / place / CELL).exists() and not (folder / place / CELL).exists():
+            cell_files.move(folder, place, aside=False)
     known: dict[str, cell_files.FinishedCell] = {}
     for path in sorted(folder.glob(f"*/*/{CELL}")):
         if path.parts[-3] == UNFINISHED:  # what a killed worker left
             continue
-        cell = read_cell(path)
-        if made and cell.made_with not in made:
+        cell, place = read_cell(path), path.parent.relative_to(folder).as_posix()
+        names = changed(cell.made_with, here)
+        if not all(map(is_source, names)):
+            own, installed = difference(cell.made_with, {**cell.made_with, **here})
             raise InputError(
-                f"{path.parent} was made with {listed(cell.made_with)}, installed are "
-                f"{listed(made[0])}: a study is of one version of each; install those versions, "
-                f"or choose another folder"
+                f"{path.parent} was made with {own}, installed are {installed}: a study is of one "
+                f"version of each; install those versions, or choose another folder"
             )
-        known[path.parent.relative_to(folder).as_posix()] = cell
+        if names:
+            cell_files.move(folder, place, aside=True)
+            earlier[", ".join(names)] += 1
+        else:
+            known[place] = cell
     places: set[str] = set()
     todo = [cell for cell in cells if cell.place not in known]
     while todo:
@@ -154,7 +198,15 @@ def _unfinished(folder: Path, cells: Iterable[Cell], every: Mapping[str, Cell]) 
         if place not in places and not (place in known and known[place].has_files):
             places.add(place)
             todo += wanted.needs.values()
-    return {place: cell for place, cell in every.items() if place in places}
+    moved = [
+        f"{counted(count, 'cell')} {'was' if count == 1 else 'were'} made by an earlier {names}"
+        for names, count in earlier.items()
+    ]
+    tells = (
+        f"{'; '.join(moved)}: computed again, as far as this study has them; the old ones are in "
+        f"{folder / EARLIER}"
+    )
+    return {place: every[place] for place in every if place in places}, tells if moved else ""
 
 
 def _computed(
@@ -211,7 +263,7 @@ def _until_all_end(executor: Executor, running: Iterable["Future[Answer]"]) -> I
 
 def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]":
     try:
-        return executor.submit(cell_files.compute, folder, cell, dict(made_with(cell.function)))
+        return executor.submit(cell_files.compute, folder, cell, cell.made_with())
     except RuntimeError as error:  # of an executor that has ended
         raise WorkError(
             f"the executor takes no more cells ({error}): finished cells are kept; the same "

@@ -29,6 +29,8 @@ from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import kind_names, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import path_of
+from selfmodel.recovery.recover import NextTrial
+from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import Score
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
@@ -36,7 +38,7 @@ from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import check_score
 from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, repair_parameters, robot_key
-from selfmodel.studies.study import Point, Study
+from selfmodel.studies.study import SHARED, Point, Study
 from selfmodel.tasks import ROBOTS, Entry, suite_bodies
 
 BANK = "bank"
@@ -94,11 +96,11 @@ def ablation(
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
-    next_trial: str = BANK,
+    next_trial: str | NextTrial = BANK,
     bank: str | Path | None = None,
     score: str | Score | None = None,
     repair: str | None = None,
-    search: str | None = None,
+    search: str | MakeSearch | None = None,
     repair_settings: Settings | None = None,
     only: Share | str = ALL,
 ) -> Study:
@@ -120,7 +122,7 @@ def ablation(
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
-        next_trial: One of ``NEXT_TRIAL``.
+        next_trial: One of ``NEXT_TRIAL``, a function as for ``selfmodel.recover``, or its name.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: The fitness, or its name; None for that of the repair.
         repair: Name of the repair that evolves gaits and recoveries, ``robust``, the default, or
@@ -134,6 +136,7 @@ def ablation(
     comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
     gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds, 0, 0)
     damages = names_of(damages, "failures in notation", Hypothesis)
+    next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     chosen, by_bank = repair_parameters(repair, search, score, repair_settings), next_trial == BANK
@@ -177,7 +180,13 @@ def ablation(
         gaits = {f"gait-{number}": gait(robot, (seed + number) % GAITS) for number in range(count)}
         run = {name: value for name, value in point.items() if name != "comparator"}
         function = f"{recoveries.__name__}:run_trials"
-        return {"trials": Cell(function, _name(run), {**run, "shared": shared}, gaits, "trials")}
+        # Of the kinds, only those of the failure determine its trials.
+        parameters = {**run, SHARED: shared}
+        faults = recoveries.truth_of(parameters, entries[robot].robot()).faults
+        own = {fault.kind for fault in faults}
+        used = (name for name in shared["kinds"].split(",") if own & {*plugins.kinds(name)})
+        modules = plugins.modules_of({"kinds": ",".join(used)})
+        return {"trials": Cell(function, _name(run), parameters, gaits, "trials", modules)}
 
     points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
     function = "diagnose" if by_bank else "recover"
@@ -192,13 +201,13 @@ def suite(
     seeds: int | Iterable[int] = range(1),
     settings: Settings = Settings(),  # noqa: B008  # frozen
     comparator: str | Comparator = SEGMENT_PREDICTION.name,
-    controller: str = "network",
+    controller: str | plugins.MakeDesign = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
     gap: float = 0.0,
     score: str | Score | None = None,
     repair: str | None = None,
-    search: str | None = None,
+    search: str | MakeSearch | None = None,
     repair_settings: Settings | None = None,
     only: Share | str = ALL,
 ) -> Study:
@@ -214,6 +223,7 @@ def suite(
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     neurons = None if neurons is None else whole_number("neurons", neurons, 3)
+    controller = plugins.name_of("controller", controller)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     chosen = repair_parameters(repair, search, score, repair_settings)
@@ -304,7 +314,12 @@ def _study(
                 f"files"
             )
     place = path_of(folder, "the folder of a study")
-    return Study(name, place, f"{recoveries.__name__}:{function}", named, shared, needs)
+    work = f"{recoveries.__name__}:{function}"
+
+    def modules(point: Point) -> tuple[str, ...]:
+        return plugins.modules_of({**shared, **point})
+
+    return Study(name, place, work, named, shared, needs, modules=modules)
 
 
 def _point(
@@ -350,7 +365,10 @@ def _check(
         raise InputError("expected at least one case or one damage of an ablation, got neither")
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
-    plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial not in NEXT_TRIAL and ":" not in next_trial:
+        plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
+    if next_trial != BANK:
+        plugins.next_trial(next_trial)
     if next_trial != BANK and trials < 2:
         raise InputError(
             f"expected at least 2 trials with the next trial by {next_trial}, got 1: the first "

@@ -40,7 +40,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.recover import diagnose_trials, random_stream
-from selfmodel.recovery.repair import RepairSearch
+from selfmodel.recovery.repair import MakeSearch, RepairSearch
 from selfmodel.recovery.repertoire import model_digest
 from selfmodel.recovery.result import Event, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
@@ -104,7 +104,7 @@ def robot_key(robot: str) -> str:
 
 def repair_parameters(
     repair: str | None,
-    search: str | None,
+    search: str | MakeSearch | None,
     score: Score | str | None,
     settings: Settings | None = None,
 ) -> dict[str, Any]:
@@ -125,6 +125,7 @@ def repair_parameters(
             f"a study evolves its gaits, and has no controller to begin from, got the repair "
             f"{repair}: give {plugins.ROBUST} or {plugins.PAPER}"
         )
+    search = None if search is None else plugins.name_of("search", search)
     plugins.repair(repair, search)
     return {
         "repair": repair,
@@ -157,7 +158,8 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
         **{name: shared[name] for name in ("controller", "neurons", "repair", "search", "score")},
     }
     name = f"{robot_key(robot['robot'])}-seed{seed:03d}"
-    return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits")
+    modules = plugins.modules_of(parameters)
+    return Cell(f"{__name__}:evolve_gait", name, parameters, kind="gaits", modules=modules)
 
 
 def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
@@ -245,16 +247,19 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     trials = logged[HEALTHY_TRIALS:]
     robot, given = planned_entry(parameters).robot(), plugins.comparator(parameters["comparator"])
     mjcf = (folder / CALIBRATED).read_text(encoding="utf-8")
+    # It refuses all trials at once.
+    chosen = chosen_comparator((), robot, trials, given=given).comparator
     search = DiagnosticSearch(
         Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
-        chosen_comparator((), robot, trials, given=given).comparator,  # it refuses all at once
+        chosen,
         Settings(**shared["settings"]),
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],
     )
     watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
     diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
-    return {"diagnoses": watch.rows(shared, robot, truth_of(parameters, robot), trials)}
+    rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
+    return {"diagnoses": [{**row, "compared_by": chosen.name} for row in rows]}
 
 
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
@@ -306,6 +311,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
         row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
+        row["compared_by"] = recovery.comparator.comparator.name
     diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
     own = {
         "robot": robot.name,

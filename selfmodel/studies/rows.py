@@ -129,8 +129,8 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "diagnoses",
             "robot case truth gap seed next_trial comparator trials best correct distance "
             "intact_distance verdict rivals evaluations distinct_hypotheses seconds before after "
-            "recovered repair search",
-            "repair search",
+            "recovered repair search compared_by",
+            "repair search compared_by",
             "robot truth gap seed comparator trials",
             _of_ablation,
         ),

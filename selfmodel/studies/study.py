@@ -12,8 +12,8 @@ from urllib.parse import quote
 from selfmodel.errors import InputError
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
-from selfmodel.studies.cells import REMEDY, Cell, finished, made_with
-from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
+from selfmodel.studies.cells import REMEDY, Cell, changed, finished, read_cells, versions_of
+from selfmodel.studies.grid import CellEnds, GridBegins, run_grid, warn_of_earlier
 
 RUNS = "runs"
 """Kind of the cells at the points of a study; those that they need have kinds of their own."""
@@ -57,6 +57,8 @@ class Study:
         shared: Parameters of all points, as JSON: a folder has one set of them.
         needs: Function of a point to the cells whose files it reads, by name.
         definition: The file that defines the study, which is kept in the folder; none if empty.
+        modules: Function of a point to the modules of the plug-ins that are called there. Where
+            their source, or that of the function, changes, the cells are computed again.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Study:
     shared: Mapping[str, Any] = field(default_factory=dict)
     needs: Callable[[Point], Mapping[str, Cell]] = lambda _point: {}
     definition: bytes = b""
+    modules: Callable[[Point], Sequence[str]] = lambda _point: ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", path_of(self.folder, "the folder of a study"))
@@ -78,7 +81,14 @@ class Study:
         """
         shared = {"study": self.name, **self.shared}
         cells = [
-            Cell(self.function, name, {**point, SHARED: shared}, self.needs(point), RUNS)
+            Cell(
+                function=self.function,
+                name=name,
+                parameters={**point, SHARED: shared},
+                needs=self.needs(point),
+                kind=RUNS,
+                modules=self.modules(point),
+            )
             for name, point in self.points.items()
         ]
         self._check(cells, shared)
@@ -89,7 +99,7 @@ class Study:
         *,
         executor: Executor | None = None,
         workers: int = 1,
-        on_event: Callable[[GridBegins | CellEnds], None] = lambda _event: None,
+        on_event: Callable[[GridBegins | CellEnds], None] = warn_of_earlier,
     ) -> tuple[CellEnds, ...]:
         """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
         cells = self.cells()
@@ -106,7 +116,8 @@ class Study:
         """Checks that the runs in the folder and the cells to compute make one table."""
         places = {cell.name: cell.place for cell in cells}
         models = {cell.parameters.get("robot"): cell.parameters.get("model") for cell in cells}
-        for run in finished(self.folder / RUNS) if cells else ():
+        here = versions_of(cells)
+        for run in read_cells(self.folder / RUNS) if cells else ():
             robot, model = run.parameters.get("robot"), run.parameters.get("model")
             of_model = f"the model of {robot}"
             there = {**run.parameters.get(SHARED, {}), of_model: model}
@@ -116,7 +127,7 @@ class Study:
                     f"folder"
                 )
             place = f"{RUNS}/{run.path.parent.name}"
-            same_code = run.made_with == made_with(self.function)
+            same_code = not changed(run.made_with, here)
             if same_code and places.get(run.name, place) != place:
                 raise InputError(
                     f"{self.folder} contains {run.name}, made with other inputs, such as another "

@@ -187,29 +187,26 @@ def test_other_inputs_and_other_code_are_other_cells(
     (one,), (other,) = cells(tmp_path, 1), cells(tmp_path, 1, more=1)
     assert one.place == cells(tmp_path, 1)[0].place != other.place
 
-    monkeypatch.syspath_prepend(str(tmp_path))
     made = []
-    for text, package in (("", ROOT / "comparators"), ("pass", None), ("pass", tmp_path)):
-        (tmp_path / "theirs.py").write_text(text)
-        monkeypatch.setattr(cell_files, "PACKAGE", package or ROOT / "comparators")
-        made.append(cell_files.made_with.__wrapped__("theirs:work")["code"])
-    assert len(set(made)) == 3
+    for package in (ROOT / "comparators", tmp_path):
+        monkeypatch.setattr(cell_files, "PACKAGE", package)
+        made.append(cell_files.package_versions.__wrapped__()["code"])
+    assert len(set(made)) == 2
 
 
 def test_a_study_of_other_code_is_neither_continued_nor_mixed_nor_computed_by_a_worker(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ):
     study.run(cells(study.notes, 1))
-    made = {**cell_files.made_with("tests.helpers.grids:work"), "code": "other"}
-    later, other = cells(study.notes, 2)[1:], study.notes / "other"
-    monkeypatch.setattr(grid, "made_with", lambda _function: made)
-    with pytest.raises(InputError, match=r"run-00.* was made with .*code.*, installed are .*other"):
-        study.run(later)
+    (later,), other = cells(study.notes, 2)[1:], study.notes / "other"
+    made = {**cell_files.package_versions(), "code": "other"}
     with pytest.raises(InputError, match=r"the worker on .* has .*, the command has .*code other"):
-        run_grid(other, later, executor=study.threads)
+        cell_files.compute(other, later, {**later.made_with(), **made})
+    monkeypatch.setattr(cell_files, "package_versions", lambda: made)
+    with pytest.raises(InputError, match=r"run-00.* was made with .*code.*, installed are .*other"):
+        study.run([later])
     assert calls(study.notes) == {"run-00": 1}
 
-    monkeypatch.setattr(cell_files, "made_with", lambda _function: made)
     later = cells(study.notes, 2)[1:]
     run_grid(other, later, executor=study.threads)
     shutil.copytree(other / later[0].place, study.folder / later[0].place)

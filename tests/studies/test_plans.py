@@ -44,6 +44,37 @@ def test_the_diagnoses_of_a_run_need_its_trials_which_need_gaits_of_the_bank(tmp
     assert alone.parameters["shared"]["settings"]["trials"] == 1
 
 
+PLUG_INS = """
+from dataclasses import replace
+from selfmodel.comparators import FORWARD_DISPLACEMENT
+from selfmodel.faults import KINDS
+from selfmodel.recovery import DISPLACEMENT
+
+WAY = replace(FORWARD_DISPLACEMENT, name="mine")
+LIMP = replace(KINDS["jam"], name="limp", keyword="limp")
+SCORE = replace(DISPLACEMENT, name="mine", of=lambda *_: DISPLACEMENT.of(*_))
+"""
+
+
+def test_the_cells_of_a_plug_in_are_those_that_call_it_and_those_that_need_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in ("plan_way", "plan_kind", "plan_score"):
+        (tmp_path / f"{name}.py").write_text(PLUG_INS)
+    ways, kinds = ["forward-displacement", "plan_way:WAY"], "break,plan_kind:LIMP"
+    study = ablated(tmp_path, comparators=ways, kinds=kinds, damages=["limp:front_left_knee"])
+    runs = [(cell, cell.needs["trials"]) for cell in study.cells()]
+
+    assert [cell.modules for cell, _ in runs] == [("plan_kind",), ("plan_kind", "plan_way")] * 2
+    assert [trials.modules for _, trials in runs] == [(), (), ("plan_kind",), ("plan_kind",)]
+    assert {gait.modules for _, trials in runs for gait in trials.needs.values()} == {()}
+    (scored,) = ablated(tmp_path, score="plan_score:SCORE").cells()
+    gait = scored.needs["trials"].needs["gait-0"]
+    assert gait.modules == ("plan_score",)
+    assert list(gait.made_with())[-1] == list(scored.made_with())[-1] == "plan_score.py"
+
+
 def test_a_damage_that_is_given_twice_is_one(tmp_path: Path):
     one, other = "friction=0.4+break:back_left_knee", "break:back_left_knee+friction=0.40"
     study = ablated(tmp_path, cases=[], damages=[one, "intact", other, "intact"])

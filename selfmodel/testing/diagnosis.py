@@ -1,4 +1,4 @@
-"""Contract checks of plug-ins: of a comparator, and of a fault kind."""
+"""Contract checks of plug-ins of a diagnosis: of a comparator, and of a fault kind."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -48,7 +48,7 @@ BATCH_STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""
 
 
-def _require(holds: object, breach: str) -> None:
+def require(holds: object, breach: str) -> None:
     """Raises ``ValueError``, as every breach of a contract does, unless a rule holds."""
     if not holds:
         raise ValueError(breach)
@@ -95,17 +95,17 @@ def check_comparator(
     if trial is None or simulated is None:
         trial, simulated = _walk(comparator)
     name = comparator.name
-    _require(name and name == name.strip(), f"a comparator needs a name, got {name!r}")
+    require(name and name == name.strip(), f"a comparator needs a name, got {name!r}")
     logged = _bits(trial.trajectory.signals)
     prepared, again = comparator.prepare(trial), comparator.prepare(trial)
     for one in (prepared, again):
-        _require(
+        require(
             isinstance(one, PreparedTrial | PiecewiseTrial),
             f"prepare must return an object with request and losses or distances, got {one!r}",
         )
     request = prepared.request
     _check_request(request, trial)
-    _require(
+    require(
         _content(request) == _content(again.request),
         "the same trial must be prepared with the same request",
     )
@@ -114,7 +114,7 @@ def check_comparator(
             [] if (steps := piece_steps_of(one)) is None else steps.tolist()
             for one in (prepared, *sections)
         ]
-        _require(
+        require(
             pieces == list(chain(*of_sections)) and all(of_sections),
             "the sections of a trial must have its piece_steps, in their order",
         )
@@ -128,13 +128,13 @@ def check_comparator(
         repeated = _parts(other, requested)
         for what, values in parts.items():
             same = what in repeated and np.array_equal(repeated[what], values, equal_nan=True)
-            _require(same, f"the same trial and arguments must give the same {what}")
+            require(same, f"the same trial and arguments must give the same {what}")
     for run in range(runs):
         for what, values in _parts(prepared, _only(requested, run)).items():
             alone = np.array_equal(values, parts[what][run : run + 1], equal_nan=True)
-            _require(alone, f"the {what} of run {run} {DEPENDS_ON_BATCH}")
-    _require(before == _bits(requested.signals), "a comparator must not change its arguments")
-    _require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
+            require(alone, f"the {what} of run {run} {DEPENDS_ON_BATCH}")
+    require(before == _bits(requested.signals), "a comparator must not change its arguments")
+    require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
 
 
 def _walk(comparator: Comparator) -> tuple[Trial, Trajectory]:
@@ -193,16 +193,16 @@ def _only(simulated: Trajectory, run: int) -> Trajectory:
 def _check_numbers(what: str, values: FloatArray, runs: int) -> None:
     sizes = ("n", "1 or more pieces", "hinges")
     shape = sizes[: {"distances": 1, "losses of hinges": 3}.get(what, 2)]
-    _require(
+    require(
         values.ndim == len(shape) and len(values) == runs and 0 not in values.shape[1:2],
         f"{what} must have shape ({', '.join(shape)}) with n = {runs}, got {values.shape}",
     )
     of_known = ~np.isnan(values) if what == "losses of hinges" else np.full(values.shape, True)
-    _require(
+    require(
         (np.isfinite(values[of_known]) & (values[of_known] >= 0)).all(),
         f"{what} must be finite and at least 0, got {values}",
     )
-    _require(
+    require(
         (values[0][of_known[0]] == 0).all(),
         f"{what} of a run that reproduces the trial must be 0, got {values[0]}",
     )
@@ -234,18 +234,18 @@ def shown(request: Request, trial: Trial) -> Trajectory:
 
 
 def _check_request(request: Request, trial: Trial) -> None:
-    _require(
+    require(
         isinstance(request, ClosedLoop | Segments | Ensemble),
         f"a request must be a ClosedLoop, Segments or an Ensemble, got {request!r}",
     )
     possible = recordable(request)
-    _require(
+    require(
         request.record and set(request.record) <= set(possible),
         f"a request of {type(request).__name__} must record some of {possible}, got "
         f"{request.record}",
     )
     if isinstance(request, Ensemble):
-        _require(
+        require(
             request.members >= 1 and request.level >= 0,
             f"an ensemble needs at least one member and a level of at least 0, got "
             f"{request.members} members at level {request.level}",
@@ -256,30 +256,30 @@ def _check_request(request: Request, trial: Trial) -> None:
 
 def _check_segments(request: Segments, logged: Trajectory) -> None:
     starts, horizon, commands = request.starts, request.horizon, request.commands
-    _require(
+    require(
         commands.shape == logged["commands"].shape,
         f"the commands of segments must be those of the trial, of shape (steps, motors) = "
         f"{logged['commands'].shape}, got {commands.shape}",
     )
     last = logged.steps - 1 - horizon
-    _require(
+    require(
         horizon >= 1 and starts.size and ((starts >= 0) & (starts <= last)).all(),
         f"segments need a horizon of at least 1 step, got {horizon}, and at least one start, "
         f"from 0 to {last}, got {starts.tolist()}",
     )
-    _require(
+    require(
         np.isfinite(commands[starts[:, np.newaxis] + np.arange(horizon)]).all(),
         "the commands of segments must be finite",
     )
     for signal, values in request.states.items():
         expected = (len(starts), logged.names.width(signal))
-        _require(
+        require(
             values.shape == expected,
             f"the states of {signal} must have shape (segments, width) = {expected}, got "
             f"{values.shape}",
         )
         wrong = np.isinf(values) if signal in JOINTS else ~np.isfinite(values)
-        _require(
+        require(
             not wrong.any(),
             f"the states of {signal} must be finite; only those of joints may be NaN, where a "
             f"hinge is unknown",
@@ -295,7 +295,7 @@ def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Traj
         lengths = (request.members, *lengths)
     signals = {signal: simulated[signal] for signal in request.record}
     for signal, values in signals.items():
-        _require(
+        require(
             values.shape[1:-1] == lengths,
             f"for a request of {type(request).__name__}, {signal} must have shape "
             f"(n, {', '.join(map(str, lengths))}, width), got {values.shape}",
@@ -325,17 +325,17 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
         raise InputError(f"expected one kind, got {len(kinds)}: check each of them")
     (kind,) = kinds
     for what, text in (("name", kind.name), ("keyword", kind.keyword)):
-        _require(
+        require(
             text and not set(text) & set(" ,:+="),
             f"a kind needs a {what} without spaces and without any of ,:+=, got {text!r}",
         )
     candidates = kind.candidates(robot.anatomy)
-    _require(candidates, f"{kind.name} has no part or no level: nothing can be proposed")
+    require(candidates, f"{kind.name} has no part or no level: nothing can be proposed")
     for fault in candidates:
         _check_candidate(fault, robot)
     _check_words(kind, candidates)
     for other in kind.degenerate_kinds:
-        _require(
+        require(
             0.0 in (other.bounds or (0.0,)) and (other.searchable or not kind.searchable),
             f"{kind.name} degenerates to {other.name}, which must be a searchable kind without "
             f"severities, or with 0 as the least or largest",
@@ -346,7 +346,7 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
         _check_contacts(kind, candidates, robot)
     joints = {joint.name for joint in robot.anatomy.joints}
     others = sorted({fault.part for fault in candidates} - joints)
-    _require(
+    require(
         not (kind.is_of_joint and others),
         f"{kind.name} is of joints, and {', '.join(others)} is no joint",
     )
@@ -357,25 +357,25 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
 def _check_candidate(fault: Fault, robot: Robot) -> None:
     """Checks the level of a fault, and that notation and genome give the fault again."""
     bounds = fault.kind.bounds_at(robot.anatomy, fault.part)
-    _require(
+    require(
         bounds or fault.severity == 0,
         f"{fault} has the level {fault.severity}, but its kind has no bounds",
     )
     lowest, highest = bounds or (0, 0)
-    _require(
+    require(
         lowest <= fault.severity <= highest,
         f"the level of {fault} is not between {lowest} and {highest}",
     )
     space = HypothesisSpace(robot.anatomy, (fault.kind,))
     alone = space.canonical([fault])
-    _require(
+    require(
         alone == Hypothesis((fault,)),
         f"{fault} is a candidate, but its canonical form is {alone}",
     )
     parsed, decoded = space.parse(str(alone)), space.decode(space.encode(alone, 1))
-    _require(parsed == alone, f"{alone} is parsed as {parsed}")
-    _require(decoded == alone, f"{alone} is decoded from its genome as {decoded}")
-    _require(
+    require(parsed == alone, f"{alone} is parsed as {parsed}")
+    require(decoded == alone, f"{alone} is decoded from its genome as {decoded}")
+    require(
         not fault.kind.absorbs(fault, fault, robot.anatomy),
         f"{fault} absorbs itself, so no hypothesis can contain it",
     )
@@ -390,7 +390,7 @@ def _check_words(kind: FaultKind, candidates: tuple[Fault, ...]) -> None:
             f"expected words of {kind.name} with part, severity, amount, degrees, side and at, got "
             f"{kind.words!r}: {error!r}"
         ) from error
-    _require(
+    require(
         len(set(words.values())) == len(words),
         f"the words of {kind.name} are the same at two parts: {kind.words!r}",
     )
@@ -401,13 +401,13 @@ def _check_edits(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot) -
     changed = False
     for fault in candidates:
         built, again = (_contents(build(robot, Hypothesis((fault,)))) for _ in range(2))
-        _require(built == again, f"{fault} does not make the same robot every time")
+        require(built == again, f"{fault} does not make the same robot every time")
         changed |= built != nominal
-    _require(
+    require(
         _saved(robot.model) == before,
         f"{kind.name} changes the robot itself instead of its variant",
     )
-    _require(changed, f"{kind.name} changes nothing about a robot")
+    require(changed, f"{kind.name} changes nothing about a robot")
 
 
 def _check_batch(candidates: tuple[Fault, ...], robot: Robot) -> None:
@@ -421,7 +421,7 @@ def _check_batch(candidates: tuple[Fault, ...], robot: Robot) -> None:
     together = simulator.run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, run in enumerate(runs):
         alone = simulator.run([run], BATCH_STEPS, SIGNALS).trajectory
-        _require(
+        require(
             all(np.array_equal(alone[signal][0], together[signal][row]) for signal in SIGNALS),
             f"a robot with {run[0]} moves differently in a batch and alone",
         )
@@ -435,7 +435,7 @@ def _check_contacts(kind: FaultKind, candidates: tuple[Fault, ...], robot: Robot
             before, own = points.copy(), build(robot, Hypothesis((fault,)))
             size = mujoco.mj_sizeModel(own.model)
             kind.adapt_to_contacts(own, fault, points)
-            _require(
+            require(
                 mujoco.mj_sizeModel(own.model) == size and np.array_equal(points, before),
                 f"{kind.name} changes the contact points, or a model's layout",
             )
@@ -449,11 +449,11 @@ def _check_contradictions(kind: FaultKind, candidates: tuple[Fault, ...], robot:
     simulated = Simulator(robot, 1).run(runs, BATCH_STEPS, SIGNALS).trajectory
     for row, fault in enumerate(candidates):
         mask = kind.contradicted(fault, simulated.run(row))
-        _require(
+        require(
             np.shape(mask) == (BATCH_STEPS,) and np.asarray(mask).dtype == np.bool_,
             f"{kind.name} must return a mask of the {BATCH_STEPS} steps of a log",
         )
-        _require(not np.any(mask), f"the log of a robot with {fault} contradicts the fault")
+        require(not np.any(mask), f"the log of a robot with {fault} contradicts the fault")
 
 
 def _contents(variant: ModelVariant) -> tuple[bytes, ...]:
