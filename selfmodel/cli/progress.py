@@ -15,6 +15,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import counted
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress
+from selfmodel.recovery.falls import fall_text
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins, TrialScore
 from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
@@ -26,11 +27,6 @@ _SEARCHES = {"repair": "repair", "diagnostic": "diagnostic EA"}
 
 QUIET = 10.0
 """Time between two lines of the progress of a stage where standard error is no terminal, s."""
-
-
-def fall_text(step: int | None) -> str:
-    """Returns the fall of a robot at a step as a clause; nothing without one."""
-    return "" if step is None else f", fell at step {step}"
 
 
 class Display:

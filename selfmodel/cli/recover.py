@@ -15,7 +15,7 @@ from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import Recover, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.cli.progress import display, fall_text
+from selfmodel.cli.progress import display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
@@ -26,6 +26,7 @@ from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
 from selfmodel.logs import results
 from selfmodel.logs.files import replace_file
+from selfmodel.recovery.falls import fall_text
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.report.charts import REPORT, html_of

@@ -14,12 +14,14 @@ from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.plugins import RETURN
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import paper_page, plans, tables as formats
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
 from selfmodel.tasks import ROBOTS
+from selfmodel.tasks.suite_bodies import EPISODE
 
 PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 """What may compute the cells of a study: processes of this machine, or a Dask cluster's workers."""
@@ -28,13 +30,12 @@ PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 def ablate(options: Ablate) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds."""
     formats.check_format(options.table)
-    cases = options.cases.strip()
-    numbers = () if cases in ("all", "none") else inputs.whole_numbers("--case", cases, ())
+    is_every = options.cases.strip() == "all"
     study = plans.ablation(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
-        cases=None if cases == "all" else numbers,
-        damages=[damage.strip() for damage in options.damages.split(",") if damage.strip()],
+        cases=None if is_every else _cases(options, ()),
+        damages=_damages(options),
         kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", options.gaps),
@@ -60,12 +61,13 @@ def run_suite(options: RunSuite) -> None:
         else inputs.texts("--tasks", options.tasks, plans.tasks_of(names))
     )
     bodies = plans.bodies_of(names, wanted)
-    # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
-    length = options.steps or (1001 if options.score == "return" else Settings.steps)
+    # The last sample of a trial has no reward.
+    length = options.steps or (EPISODE + 1 if options.score == RETURN else Settings.steps)
     study = plans.suite(
         options.out,
         bodies=bodies,
-        cases=inputs.whole_numbers("--case", options.cases, plans.known_cases(bodies)),
+        cases=_cases(options, plans.known_cases(bodies)),
+        damages=_damages(options),
         seeds=options.every_seed,
         settings=settings_of(options, length),
         score=options.score,
@@ -95,6 +97,15 @@ def paper(options: RepeatPaper) -> None:
     _run(study, options, paper_page.results_of)
 
 
+def _cases(options: Options, every: Sequence[int]) -> tuple[int, ...]:
+    is_none = options.cases.strip() == "none"
+    return () if is_none else inputs.whole_numbers("--case", options.cases, every)
+
+
+def _damages(options: Ablate | RunSuite) -> list[str]:
+    return [damage.strip() for damage in options.damages.split(",") if damage.strip()]
+
+
 def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Results]) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
     failed = _compute(study, options)
@@ -111,7 +122,7 @@ def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Re
     else:
         if len(rows := found.shown.shown):
             show(list(rows.columns), rows.to_numpy().tolist(), texts=found.shown.texts)
-            print_lines(found.legend)
+        print_lines(*found.legend.splitlines())
         print_notes(*found.notes)
         print_lines(*paths)
     if failed:

@@ -9,7 +9,6 @@ from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import RunTrial
 from selfmodel.cli.output import print_json, print_lines
-from selfmodel.cli.progress import fall_text
 from selfmodel.controllers.controller import Controller, check_silent_neurons, draw_genomes
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
@@ -17,7 +16,7 @@ from selfmodel.logs.files import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.falls import fall_of
+from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality

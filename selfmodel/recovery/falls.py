@@ -69,6 +69,11 @@ def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
     return fall if fall < logged.steps else None
 
 
+def fall_text(step: int | None) -> str:
+    """Returns the fall of a robot at a step as a clause; nothing without one."""
+    return "" if step is None else f", fell at step {step}"
+
+
 def held_at_the_end(trajectory: Trajectory) -> Trajectory:
     """Returns the signals of a run that ended early as if the last ones remained.
 

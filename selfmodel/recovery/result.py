@@ -11,6 +11,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
 from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
@@ -107,6 +108,13 @@ class Recovery:
     def falls(self) -> tuple[int | None, ...]:
         """Step at which the robot fell in each trial; None if it did not."""
         return tuple(one.fall for one in self.scored)
+
+    def scores_by(self, score: Score, robot: Robot) -> tuple[float, ...]:
+        """Returns any score of each trial, by the same hypotheses; ``robot`` is the nominal one."""
+        if score == self.score:
+            return self.scores
+        model = self.calibration.robot if self.calibration else robot
+        return tuple(score.of_trial(model, one.hypothesis, one.trial) for one in self.scored)
 
     @property
     def best_trial(self) -> int:
