@@ -1,5 +1,6 @@
 """Falls of a robot: the first step at which its base lies or is turned over, and stays so."""
 
+import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
@@ -25,8 +26,12 @@ the measurements. A low stride or a wrong measurement is shorter."""
 def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> IndexArray:
     """Returns the first step at which each run has fallen; see ``first_falls``.
 
-    The hypothesis matters because a slope tilts the ground.
+    The hypothesis matters because a slope tilts the ground. A robot without gravity, as a fish of
+    dm_control, turns over and does not fall.
     """
+    options = robot.model.opt
+    if options.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY or not options.gravity.any():
+        return np.full(trajectory["base_position"].shape[:-2], trajectory.steps)
     return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
 
 
