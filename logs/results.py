@@ -68,6 +68,7 @@ class TrialResult(Struct, frozen=True):
         score: Score of the trial.
         predicted_score: Score that was predicted before the trial, by one simulation without noise
             under the best hypothesis at the time.
+        robust_mean: Mean score of its controller in the last simulations of its repair.
         fell_at_step: Step at which the robot fell.
         hypothesis: Best hypothesis at the time, in notation.
     """
@@ -79,6 +80,7 @@ class TrialResult(Struct, frozen=True):
     ended_early: bool | None = None
     score: float | None = None
     predicted_score: float | None = None
+    robust_mean: float | None = None
     fell_at_step: int | None = None
     hypothesis: str = ""
 

@@ -133,7 +133,7 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
     """Returns the outcome of a recovery as ``recover --json`` prints it."""
     recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
     design = experiment.design or network_for(experiment.robot)
-    columns = (recovery.trials, recovery.tried, recovery.scores, recovery.predicted, recovery.falls)
+    columns = (recovery.scored, recovery.tried, recovery.predicted, recovery.robust_means)
     return results.RecoveryResult(
         robot=experiment.robot.name,
         model=self_model_digest(experiment.robot),
@@ -152,17 +152,18 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
         seed=experiment.seed,
         trials=tuple(
             results.TrialResult(
-                log=trial.path,
-                stage=trial.plan.stage,
-                displacement=trial.displacement,
-                steps=trial.trajectory.steps,
-                ended_early=trial.early_end != "",
-                score=score,
+                log=one.trial.path,
+                stage=one.trial.plan.stage,
+                displacement=one.trial.displacement,
+                steps=one.trial.trajectory.steps,
+                ended_early=one.trial.early_end != "",
+                score=one.value,
                 predicted_score=finite_or_none(predicted),
-                fell_at_step=fall,
+                robust_mean=finite_or_none(mean),
+                fell_at_step=one.fall,
                 hypothesis=str(tried),
             )
-            for trial, tried, score, predicted, fall in zip(*columns, strict=True)
+            for one, tried, predicted, mean in zip(*columns, strict=True)
         ),
         **output_of(recovery.diagnosis),
         summary=" ".join(summary(recovery.diagnosis)),

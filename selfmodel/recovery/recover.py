@@ -111,7 +111,9 @@ class RecoveryLoop:
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(robot)
         self._repairs = [self._repair_in_simulator()]
+        self._means: dict[Controller, float] = {}
         self._predicted: list[float] = []
+        self._robust_means: list[float] = []
         self._scored: tuple[TrialScore, ...] = ()
         assumed = partial(assumed_uncertainty, robot)
         gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
@@ -149,11 +151,15 @@ class RecoveryLoop:
         self.on_event(SearchBegins("repair", hypotheses[0]))
         rng = random_stream(self.seed, "repair", len(self.diagnoses))
         repair = self._repairs[-1]
-        return repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
+        candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
+        self._means.update({each.controller: each.mean for each in candidates})
+        return candidates
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
-        unforeseen = stage == "after"
-        self._predicted.append(math.nan if unforeseen else self._predicted_score(controller))
+        foreseen = stage != "after"
+        self._predicted.append(self._predicted_score(controller) if foreseen else math.nan)
+        mean = self._means.get(controller, math.nan) if foreseen else math.nan
+        self._robust_means.append(mean)
         name = f"{len(self.trials):02d}-{stage}"
         plan = TrialPlan(name, stage, controller, self.settings.steps, self.seed)
         trial = self.run_trial(robot, plan)
@@ -236,6 +242,7 @@ class RecoveryLoop:
             calibration=calibration,
             score=self.score,
             predicted=tuple(self._predicted),
+            robust_means=tuple(self._robust_means),
             scored=self._scored,
         )
 

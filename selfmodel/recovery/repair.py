@@ -87,6 +87,12 @@ class CandidateController:
     controller: Controller
     scores: FloatArray
 
+    @property
+    def mean(self) -> float:
+        """Mean score of the rollouts that did not diverge; NaN if all did."""
+        finite = self.scores[np.isfinite(self.scores)]
+        return float(np.mean(finite)) if len(finite) else math.nan
+
 
 class Repair(Protocol):
     """Search for controllers that compensate for the faults of a hypothesis.

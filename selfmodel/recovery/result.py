@@ -82,6 +82,9 @@ class Recovery:
         predicted: Score of each trial that the self-model predicted: of one simulation without
             noise under the best hypothesis at the time. NaN for the first trial after the failure,
             and if the simulation diverged.
+        robust_means: Mean score of each trial's controller in the last simulations of its repair,
+            under its noise and uncertainty. NaN for the first trial after the failure, and for a
+            controller that was not among the candidates.
         scored: Score and fall of each trial; those after the failure under the last diagnosis.
         calibration: Fit of the self-model to the trials before the failure; None without one.
         score: Fitness of the repair.
@@ -95,6 +98,7 @@ class Recovery:
     distinct_hypotheses: int
     comparator: ChosenComparator
     predicted: tuple[float, ...]
+    robust_means: tuple[float, ...]
     scored: tuple[TrialScore, ...]
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT

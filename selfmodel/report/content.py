@@ -40,6 +40,7 @@ MAX_DIAGRAMS = 12
 
 TRIAL_COLUMNS = {
     "predicted before the trial": "predicted_score",
+    "mean of its repair": "robust_mean",
     "hypothesis at the time": "hypothesis",
     "fell at step": "fell_at_step",
 }

@@ -296,7 +296,8 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "search": shared["search"],
     }
     others = recovery.scores_by(UPRIGHT, robot), _returns(recovery, entry)
-    columns = (recovery.scored, recovery.tried, recovery.predicted, *others)
+    forecasts = recovery.predicted, recovery.robust_means
+    columns = (recovery.scored, recovery.tried, *forecasts, *others)
     trials = [
         {
             "robot": robot.name,
@@ -305,12 +306,15 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
             "hypothesis": str(tried),
             "score": finite_or_none(one.value),
             "predicted": finite_or_none(predicted),
+            "robust_mean": finite_or_none(mean),
             "displacement": finite_or_none(one.trial.displacement),
             "return": reward,
             "upright": finite_or_none(walked),
             "fell_at_step": one.fall,
         }
-        for number, (one, tried, predicted, walked, reward) in enumerate(zip(*columns, strict=True))
+        for number, (one, tried, predicted, mean, walked, reward) in enumerate(
+            zip(*columns, strict=True)
+        )
     ]
     return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
 

@@ -26,7 +26,7 @@ from selfmodel.tasks.suite_bodies import EPISODE
 
 TRIAL_COLUMNS = (
     *("robot", "case", "truth", "seed", "number", "stage", "hypothesis", "score", "predicted"),
-    *("displacement", "return", "fell_at_step"),
+    *("robust_mean", "displacement", "return", "fell_at_step"),
 )
 """Columns of the trials of a study of bodies."""
 
@@ -87,8 +87,9 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
         interval; ``score``, its ``unit``, and the ``control_steps``; the medians of ``before``,
         ``after`` and ``recovered``, of the displacements and returns with these ends, and
         ``return_most``; ``recovery``, see ``recovered_over_before``, its median; ``upright``, the
-        number of runs whose best recovery trial had no fall; the mean number of ``trials``; the
-        median of the ``seconds``; ``reason``, why the body cannot have the failure.
+        number of runs whose best recovery trial had no fall, None if that is unknown; the mean
+        number of ``trials``; the median of the ``seconds``; ``reason``, why the body cannot have
+        the failure.
     """
     summaries = []
     for (robot,), own in grouped(rows, "robot").items():
@@ -106,13 +107,14 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
 def _summary(rows: Sequence[Row]) -> Row:
     runs, first = [row for row in rows if not row.get("reason")], rows[0]
     ratios = recovered_over_before(runs)
+    stayed = [row["upright"] for row in runs if row.get("upright") is not None]
     return {
         **_right(runs),
         **{name: first.get(name) for name in ("score", "unit", "control_steps")},
         **medians(runs, *ENDS, *(f"{what}_{end}" for what in MEASURED for end in ENDS)),
         "return_most": first.get("return_most"),
         "recovery": median(ratios) if ratios else None,
-        "upright": sum(row.get("upright") is True for row in runs),
+        "upright": sum(stayed) if stayed else None,
         "trials": fmean(row["trials"] for row in runs) if runs else None,
         **medians(runs, "seconds"),
         "reason": first.get("reason"),
@@ -306,10 +308,11 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
         title = f"{score} {end}, {unit}".strip(", ")
         limit = f" of {most:,}" if runs and most and score == RETURN else ""
         texts[title] = _number(one[end]) + limit
-    if fallen := runs - one["upright"]:
-        texts[title] += f", {fallen} of {runs} fell"
+    stayed = one["upright"]
+    if stayed is not None and stayed < runs:
+        texts[title] += f", {runs - stayed} of {runs} fell"
     texts["recovered ÷ before"] = _number(one["recovery"])
-    texts["upright"] = f"{one['upright']} of {runs}" if runs else "-"
+    texts["upright"] = "-" if stayed is None else f"{stayed} of {runs}"
     for what, title in (("displacement", "displacements, m"), (RETURN, "returns")):
         if what != score and any(it[f"{what}_before"] is not None for it in every):
             values = ", ".join(_number(one[f"{what}_{end}"]) for end in ENDS) if runs else "-"

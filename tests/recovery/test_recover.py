@@ -336,6 +336,7 @@ def test_a_repair_is_for_the_diagnosed_robot_and_its_candidates_are_tried_in_tur
     before, after, *later = stubbed.recovery.predicted
     assert [before, *later] == [one for k, one in enumerate(stubbed.recovery.scores) if k != 1]
     assert math.isnan(after)
+    np.testing.assert_equal(stubbed.recovery.robust_means, (8.0, math.nan, 8.0, 8.0))
     # A prediction and a score of each trial, each computed once; none was predicted of the second.
     assert stubbed.scored == ["intact", "intact", TRUTH, *[TRUTH, TRUTH] * 2]
 

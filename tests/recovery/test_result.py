@@ -55,7 +55,7 @@ def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
     scored = (TrialScore(blind, INTACT, DISPLACEMENT, math.nan, None),) * 3
-    found = (diagnosis, 0, 0, 0, CHOSEN, (math.nan,) * 3, scored)
+    found = (diagnosis, 0, 0, 0, CHOSEN, *[(math.nan,) * 3] * 2, scored)
     recovery = Recovery((blind,) * 3, (INTACT,) * 3, *found)
 
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
