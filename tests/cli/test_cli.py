@@ -125,7 +125,7 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(recovery: tup
 
 def test_a_trial_of_a_robot_that_falls_says_when(tmp_path: Path):
     given = ("trial", "suite-walker-walk", "--controller", "cpg", "--steps", "150", "--out")
-    told = printed(*given, "a.mcap", cwd=tmp_path)
+    told = printed(*given, "a.mcap", "--json", cwd=tmp_path)
     said = succeeds(*given, "b.mcap", cwd=tmp_path).stdout
     heights = read_log(tmp_path / "a.mcap").trial.trajectory["base_position"][:, 2]
 
