@@ -67,13 +67,15 @@ def rows_of(folder: Path) -> list[Row]:
     number = partial(round, ndigits=4)
     rows = []
     for row in rows_in(folder, "recoveries"):
+        if "reason" in row:  # the robot cannot have the failure
+            continue
         own = trials[tuple(row[name] for name in RUN)]
         rows.append(
             {
                 **{name: row[name] for name in (*RUN, "truth", "repair", "correct")},
                 "diagnosis": row["best"],
                 "verdict": row["verdict"],
-                "predicted": [one["predicted"] and number(one["predicted"]) for one in own],
+                "predicted": [one["robust_mean"] and number(one["robust_mean"]) for one in own],
                 "upright": [number(one["upright"]) for one in own],
                 "displacement": [number(one["displacement"]) for one in own],
                 "falls": [one["fell_at_step"] for one in own],

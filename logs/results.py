@@ -66,7 +66,9 @@ class TrialResult(Struct, frozen=True):
         steps: Number of control steps.
         ended_early: Whether the trial was stopped.
         score: Score of the trial.
-        predicted_score: Score that was predicted before the trial.
+        predicted_score: Score that was predicted before the trial, by one simulation without noise
+            under the best hypothesis at the time.
+        robust_mean: Mean score of its controller in the last simulations of its repair.
         fell_at_step: Step at which the robot fell.
         hypothesis: Best hypothesis at the time, in notation.
     """
@@ -78,6 +80,7 @@ class TrialResult(Struct, frozen=True):
     ended_early: bool | None = None
     score: float | None = None
     predicted_score: float | None = None
+    robust_mean: float | None = None
     fell_at_step: int | None = None
     hypothesis: str = ""
 
@@ -88,13 +91,17 @@ class TrialResult(Struct, frozen=True):
 
 
 class ScoreResult(Struct, frozen=True):
-    """The score of a recovery before and after the failure, with the same controller, and since."""
+    """The score of a recovery before and after the failure, with the same controller, and since.
+
+    ``most`` is the largest return that trials of this length can have; None for other scores.
+    """
 
     name: str
     unit: str
     before: float | None
     after: float | None
     recovered: float | None
+    most: int | None = None
 
 
 class DiagnosisResult(Struct, frozen=True, kw_only=True):
@@ -190,7 +197,8 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         repertoire: Origin of the repertoire; None without one.
         controller: Name of the controller design, which has ``neurons`` hidden neurons.
         displacement: Forward displacement before and after the failure, and recovered, m.
-        recovery: Recovered displacement as a share of that before; None if that is not positive.
+        recovery: Recovered displacement as a share of that before; None if that is not positive, or
+            if the robot fell.
         evaluations: Number of evaluations, by the EA, and of simulations.
         settings: Parameters of the recovery, of ``result.json``.
         repair_settings: Those of the repair, where they are others.

@@ -132,6 +132,9 @@ def _module(domain: str) -> Any:  # noqa: ANN401  # modules of dm_control have n
     return importlib.import_module(f"dm_control.suite.{domain}")
 
 
+EPISODE = 1000
+"""Rewards in an episode of each task of ``DOMAINS``: its time limit over its control time step."""
+
 STATE: tuple[Signal, ...] = (
     "joint_positions",
     "joint_velocities",
@@ -255,7 +258,7 @@ def episode_return(domain: str, task: str) -> Score:
         runs = range(len(trajectory["commands"]))
         return np.array([_sum(robot, physics, rewarding, trajectory, run) for run in runs])
 
-    return Score("return", (*STATE, "commands"), of)
+    return Score("return", (*STATE, "commands"), of, episode=EPISODE)
 
 
 def _sum(robot: Robot, physics: "Physics", task: "Task", trajectory: Trajectory, run: int) -> float:

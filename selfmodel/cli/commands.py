@@ -337,6 +337,7 @@ class RunSuite(Study, Repair):
     PANELS: ClassVar = ("Study", "Physical robot", "Search", "Controllers and trials", "Diagnosis")
     domains: str = "all"
     tasks: str | None = None
+    damages: str = ""
     gap: float = 0.0
     controller: str = "network"
     neurons: int | None = None

@@ -15,18 +15,15 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import counted
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress, time_left, timed
-from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins
+from selfmodel.recovery.falls import fall_text
+from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins, TrialScore
+from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.studies.grid import CellEnds, GridBegins
 from selfmodel.trials.trial import Trial
 
 QUIET = 10.0
 """Time between two lines of the progress of a stage where standard error is no terminal, s."""
-
-
-def displacement_text(trial: Trial) -> str:
-    """Returns the displacement of a trial as text."""
-    return f"{trial.displacement:.3f} m forward"
 
 
 class Display:
@@ -54,23 +51,17 @@ def _bar(*columns: bars.ProgressColumn, transient: bool = False) -> Iterator[bar
 
 
 @contextmanager
-def display(
-    describe: Callable[[Trial], str] = displacement_text,
-) -> Iterator[Callable[[Event], None]]:
-    """Yields a function that displays the events of a recovery or a diagnosis.
-
-    ``describe`` returns the result of a trial as text.
-    """
+def display() -> Iterator[Callable[[Event], None]]:
+    """Yields a function that displays the events of a recovery or a diagnosis."""
     names = ("{task.description}", "{task.percentage:.0f} %", "{task.fields[detail]}")
     text, share, detail = map(bars.TextColumn, names)
     with _bar(text, bars.BarColumn(bar_width=None), share, detail, transient=True) as bar:
-        yield _Events(bar, describe)
+        yield _Events(bar)
 
 
 class _Events(Display):
-    def __init__(self, bar: bars.Progress | None, describe: Callable[[Trial], str]) -> None:
+    def __init__(self, bar: bars.Progress | None) -> None:
         super().__init__(bar)
-        self._describe = describe
         self._search, self._stage = SearchBegins(""), timed(self._show)
         self._told = monotonic()
 
@@ -91,8 +82,8 @@ class _Events(Display):
                 self.print_lines(str(event))
             case Calibration():
                 self.print_lines(*_fit_lines(event))
-            case Trial():
-                self.print_lines(f"trial {event.plan.name}: {self._describe(event)}")
+            case Trial() | TrialScore():
+                self.print_lines(*_trial_lines(event))
             case Diagnosis():
                 first, trials = event.ranked[0], counted(event.trials, "trial")
                 finite = math.isfinite(first.distance)
@@ -113,6 +104,21 @@ class _Events(Display):
         elif left and monotonic() - self._told >= QUIET:
             self._told = monotonic()
             self.print_lines(str(now))
+
+
+def _trial_lines(event: Trial | TrialScore) -> list[str]:
+    """Returns the measured way of a trial; then its score and its fall, if the way is not all."""
+    if isinstance(event, Trial):
+        went, steps = event.displacement, counted(event.trajectory.steps, "step")
+        # A base that is fixed or not observed has no displacement.
+        way = f"{went:.3f} m forward" if went and math.isfinite(went) else steps
+        return [f"trial {event.plan.name}: {way}"]
+    score, trial = event.score, event.trial
+    if score is DISPLACEMENT and event.fall is None:
+        return []
+    text = value_text(event.value, score.unit, score.most(trial.trajectory.steps))
+    result = f"{score.name} {text}{fall_text(event.fall)}"
+    return [f"trial {trial.plan.name} by {event.hypothesis}: {result}"]
 
 
 def _fit_lines(fit: Calibration) -> list[str]:

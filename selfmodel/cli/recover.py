@@ -6,7 +6,6 @@ robots that it drives here are drawn by ``selfmodel.studies.experiment.run``.
 
 import dataclasses
 from datetime import datetime
-from functools import partial
 from os.path import relpath
 from pathlib import Path
 from typing import Any
@@ -16,36 +15,33 @@ from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import Recover, repair_settings_of, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.cli.progress import displacement_text, display
+from selfmodel.cli.progress import display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.errors import counted
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
 from selfmodel.logs import results
 from selfmodel.logs.files import replace_file
+from selfmodel.recovery.falls import fall_text
 from selfmodel.recovery.repertoire import self_model_digest
-from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
 from selfmodel.report.progress import RunProgress
 from selfmodel.report.subject import subject_of_run
 from selfmodel.robot.designs import network_for
-from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies.experiment import Experiment, Outcome, choose_score, run
-from selfmodel.trials.trial import Trial
 
 
 def recover(options: Recover) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
     experiment = experiment_of(options)
-    describe = partial(_described, experiment.robot, experiment.score)
-    with display(describe) as on_event:
+    with display() as on_event:
         progress = RunProgress(
             experiment.folder,
             experiment.robot,
@@ -134,19 +130,11 @@ def experiment_of(options: Recover) -> Experiment:
     )
 
 
-def _described(robot: Robot, score: Score, trial: Trial) -> str:
-    """Returns the score of a trial as text; the physical robot's failure is taken as unknown."""
-    if score is DISPLACEMENT:
-        return displacement_text(trial)
-    value = score.of_trial(robot, INTACT, trial)
-    return f"{score.name} {value:.4f} {score.unit}".rstrip()
-
-
 def recovery_result(experiment: Experiment, outcome: Outcome) -> results.RecoveryResult:
     """Returns the outcome of a recovery as ``recover --json`` prints it."""
     recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
     design = experiment.design or network_for(experiment.robot)
-    columns = (recovery.trials, recovery.tried, recovery.scores, recovery.predicted, recovery.falls)
+    columns = (recovery.scored, recovery.tried, recovery.predicted, recovery.robust_means)
     return results.RecoveryResult(
         robot=experiment.robot.name,
         model=self_model_digest(experiment.robot),
@@ -165,17 +153,18 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
         seed=experiment.seed,
         trials=tuple(
             results.TrialResult(
-                log=trial.path,
-                stage=trial.plan.stage,
-                displacement=trial.displacement,
-                steps=trial.trajectory.steps,
-                ended_early=trial.early_end != "",
-                score=score,
+                log=one.trial.path,
+                stage=one.trial.plan.stage,
+                displacement=one.trial.displacement,
+                steps=one.trial.trajectory.steps,
+                ended_early=one.trial.early_end != "",
+                score=one.value,
                 predicted_score=finite_or_none(predicted),
-                fell_at_step=fall,
+                robust_mean=finite_or_none(mean),
+                fell_at_step=one.fall,
                 hypothesis=str(tried),
             )
-            for trial, tried, score, predicted, fall in zip(*columns, strict=True)
+            for one, tried, predicted, mean in zip(*columns, strict=True)
         ),
         **output_of(recovery.diagnosis),
         summary=" ".join(summary(recovery.diagnosis)),
@@ -188,9 +177,10 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
             before=recovery.scores[0],
             after=recovery.scores[1],
             recovered=recovery.best_score,
+            most=recovery.score.most(experiment.settings.steps),
         ),
         fell=recovery.fell,
-        recovery=recovery.recovered / recovery.before if recovery.before > 0 else None,
+        recovery=recovery.recovery,
         physical_trials=len(recovery.trials) - 2,
         evaluations={
             "repair": recovery.repair_evaluations,
@@ -207,12 +197,10 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
     """Prints the trials, the last diagnosis, and the true hypothesis."""
     values, score, evaluations = results.as_json(found), found.score, found.evaluations
     column, key, subject = f"{score.name}, {score.unit}", "score", f"The score {score.name} was"
-    ways = (score.before, score.after, score.recovered)
-    ends = [f"{value:.4f} {score.unit}".rstrip() for value in ways]
     if score.name == DISPLACEMENT.name:
         column, key, subject = "forward, m", "displacement", "The robot went"
-        ends = [f"{value:.2f} m" for value in found.displacement.values()]
-    before, after, recovered = ends
+    ways = (score.before, score.after, score.recovered)
+    before, after, recovered = (value_text(value, score.unit, score.most) for value in ways)
     rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in values["trials"]]
     columns = ("trial", "best hypothesis so far", column.removesuffix(", "))
     trials = folding(columns, rows, title="physical trials", texts=2)
@@ -234,6 +222,5 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
 
 def _result(trial: dict[str, Any], key: str) -> str:
     """Returns the result of a trial, with its early end or its fall."""
-    fall = trial["fell_at_step"]
     end = f", ended at step {trial['steps']}" if trial["ended_early"] else ""
-    return f"{trial[key]:.3f}" + ("" if fall is None else f", fell at step {fall}") + end
+    return f"{trial[key]:.3f}{fall_text(trial['fell_at_step'])}{end}"

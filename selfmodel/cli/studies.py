@@ -22,6 +22,7 @@ from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.plugins import RETURN
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import paper_page, plans, tables as formats
@@ -29,6 +30,7 @@ from selfmodel.studies.definition import read_study
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
 from selfmodel.tasks import ROBOTS
+from selfmodel.tasks.suite_bodies import EPISODE
 
 RESULTS: Mapping[str, Callable[[Path], formats.Results]] = {
     "ablate": formats.ablation_results,
@@ -44,13 +46,12 @@ PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 def ablate(options: Ablate) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds."""
     formats.check_format(options.table)
-    cases = options.cases.strip()
-    numbers = () if cases in ("all", "none") else inputs.whole_numbers("--case", cases, ())
+    is_every = options.cases.strip() == "all"
     study = plans.ablation(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
-        cases=None if cases == "all" else numbers,
-        damages=[damage.strip() for damage in options.damages.split(",") if damage.strip()],
+        cases=None if is_every else _cases(options, ()),
+        damages=_damages(options),
         kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         gaps=inputs.numbers("--gap", options.gaps),
@@ -77,13 +78,14 @@ def run_suite(options: RunSuite) -> None:
         else inputs.texts("--tasks", options.tasks, plans.tasks_of(names))
     )
     bodies = plans.bodies_of(names, wanted)
-    # The last sample of a trial has no reward: an episode of the suite has 1000 rewards.
-    length = options.steps or (1001 if options.score == "return" else Settings.steps)
+    # The last sample of a trial has no reward.
+    length = options.steps or (EPISODE + 1 if options.score == RETURN else Settings.steps)
     settings = settings_of(options, length)
     study = plans.suite(
         options.out,
         bodies=bodies,
-        cases=inputs.whole_numbers("--case", options.cases, plans.known_cases(bodies)),
+        cases=_cases(options, plans.known_cases(bodies)),
+        damages=_damages(options),
         seeds=options.every_seed,
         settings=settings,
         repair_settings=repair_settings_of(options, settings),
@@ -120,6 +122,15 @@ def run_file(options: RunStudy) -> None:
     _run(read_study(options.file), options)
 
 
+def _cases(options: Ablate | RunSuite, every: Sequence[int]) -> tuple[int, ...]:
+    is_none = options.cases.strip() == "none"
+    return () if is_none else inputs.whole_numbers("--case", options.cases, every)
+
+
+def _damages(options: Ablate | RunSuite) -> list[str]:
+    return [damage.strip() for damage in options.damages.split(",") if damage.strip()]
+
+
 def _run(study: Study, options: Computed) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
     failed = _compute(study, options)
@@ -136,7 +147,7 @@ def _run(study: Study, options: Computed) -> None:
     else:
         if len(rows := found.shown.shown):
             show(list(rows.columns), rows.to_numpy().tolist(), texts=found.shown.texts)
-            print_lines(found.legend)
+        print_lines(*found.legend.splitlines())
         print_notes(*found.notes)
         print_lines(*paths)
     if failed:

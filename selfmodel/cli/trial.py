@@ -16,6 +16,7 @@ from selfmodel.logs.files import partial_path
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.trials.trial import TrialPlan, stage_of
@@ -53,9 +54,10 @@ def trial(options: RunTrial) -> None:
         "seed": options.seed,
         "steps": logged.trajectory.steps,
         "displacement": finite_or_none(logged.displacement),
+        "fell_at_step": (fall := fall_of(robot, hidden, logged)),
     }
     if options.as_json:
         print_json(facts)
     else:
-        went = f"{robot.name} ({hidden}) went {logged.displacement:.3f} m forward"
+        went = f"{robot.name} ({hidden}) went {logged.displacement:.3f} m forward{fall_text(fall)}"
         print_lines(f"{went}: {options.out}")

@@ -1,5 +1,6 @@
 """Falls of a robot: the first step at which its base lies or is turned over, and stays so."""
 
+import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
@@ -25,8 +26,12 @@ the measurements. A low stride or a wrong measurement is shorter."""
 def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> IndexArray:
     """Returns the first step at which each run has fallen; see ``first_falls``.
 
-    The hypothesis matters because a slope tilts the ground.
+    The hypothesis matters because a slope tilts the ground. A robot without gravity, as a fish of
+    dm_control, turns over and does not fall.
     """
+    options = robot.model.opt
+    if options.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY or not options.gravity.any():
+        return np.full(trajectory["base_position"].shape[:-2], trajectory.steps)
     return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
 
 
@@ -67,6 +72,11 @@ def fall_of(robot: Robot, hypothesis: Hypothesis, trial: Trial) -> int | None:
     whole = held_at_the_end(logged) if logged.steps < trial.plan.steps else logged
     fall = int(falls_of(robot, hypothesis, whole))
     return fall if fall < logged.steps else None
+
+
+def fall_text(step: int | None) -> str:
+    """Returns the fall of a robot at a step as a clause; nothing without one."""
+    return "" if step is None else f", fell at step {step}"
 
 
 def held_at_the_end(trajectory: Trajectory) -> Trajectory:

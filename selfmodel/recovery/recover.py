@@ -23,8 +23,8 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.result import Event, Recovery, SearchBegins
-from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in
+from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
+from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in, scores_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
@@ -114,8 +114,10 @@ class RecoveryLoop:
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(robot)
         self._repairs = [self._repair_in_simulator()]
-        self._predictions: dict[Controller, float] = {}
+        self._means: dict[Controller, float] = {}
         self._predicted: list[float] = []
+        self._robust_means: list[float] = []
+        self._scored: tuple[TrialScore, ...] = ()
         assumed = partial(assumed_uncertainty, robot)
         gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
         self._log_trial(healthy, "before", gait)
@@ -154,17 +156,51 @@ class RecoveryLoop:
         rng = random_stream(self.seed, "repair", len(self.diagnoses))
         repair = self._repairs[-1]
         candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
-        self._predictions.update({each.controller: each.predicted for each in candidates})
+        self._means.update({each.controller: each.mean for each in candidates})
         return candidates
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
-        predicted = math.nan if stage == "after" else self._predictions.get(controller, math.nan)
-        self._predicted.append(predicted)
+        foreseen = stage != "after"
+        self._predicted.append(self._predicted_score(controller) if foreseen else math.nan)
+        mean = self._means.get(controller, math.nan) if foreseen else math.nan
+        self._robust_means.append(mean)
         name = f"{len(self.trials):02d}-{stage}"
         plan = TrialPlan(name, stage, controller, self.settings.steps, self.seed)
         trial = self.run_trial(robot, plan)
         self.trials = (*self.trials, trial)
         self.on_event(trial)
+
+    def _predicted_score(self, controller: Controller) -> float:
+        """Returns the score of one simulation by the self-model, without noise; NaN if it diverges.
+
+        Its hypothesis is the best so far. The simulation is no cost of a search.
+        """
+        best, robot = self._best_so_far, self.simulator.robot
+        runs = Simulator(robot, threads=1).run(
+            [(best, controller)], self.settings.steps, self.score.record
+        )
+        (value,) = scores_of(self.score, robot, [best], runs.grouped(1, 1))[0]
+        return float(value) if math.isfinite(value) else math.nan
+
+    @property
+    def _best_so_far(self) -> Hypothesis:
+        return self.diagnoses[-1].best if self.diagnoses else INTACT
+
+    def _score_trials(self) -> None:
+        """Scores each trial by the best hypothesis so far; what is new or changes is an event."""
+        robot, scored = self.simulator.robot, list[TrialScore]()
+        for number, trial in enumerate(self.trials):
+            known = self._scored[number] if number < len(self._scored) else None
+            # The first trial is of the healthy robot.
+            hypothesis = self._best_so_far if number else INTACT
+            if known is None or known.hypothesis != hypothesis:
+                value = self.score.of_trial(robot, hypothesis, trial)
+                fall = fall_of(robot, hypothesis, trial)
+                before, known = known, TrialScore(trial, hypothesis, self.score, value, fall)
+                if before is None or (before.value, before.fall) != (value, fall):
+                    self.on_event(known)
+            scored.append(known)
+        self._scored = tuple(scored)
 
     def _fit_self_model(self) -> Calibration | None:
         """Fits the self-model to the healthy trials; a new repair simulates the fitted one."""
@@ -181,6 +217,7 @@ class RecoveryLoop:
         rng = random_stream(self.seed, "posterior")
         settings = self.settings.of_repair(self.repair_settings)
         self._posterior = Posterior(self.simulator, healthy_trials, calibration, settings, rng)
+        self._score_trials()
         return calibration
 
     def _diagnose(self, search: DiagnosticSearch) -> None:
@@ -191,6 +228,7 @@ class RecoveryLoop:
         self.diagnoses = (*self.diagnoses, diagnosis)
         self.rng = random_stream(self.seed, "choice", len(self.diagnoses))
         self.on_event(diagnosis)
+        self._score_trials()
 
     def _result(
         self,
@@ -198,10 +236,8 @@ class RecoveryLoop:
         calibration: Calibration | None,
         search: DiagnosticSearch,
     ) -> Recovery:
-        trials, robot, best = self.trials, self.simulator.robot, self.diagnoses[-1].best
-        faults = [INTACT, *[best] * (len(trials) - 1)]  # the first trial is of the healthy robot
         return Recovery(
-            trials=trials,
+            trials=self.trials,
             tried=(INTACT, INTACT, *(diagnosis.best for diagnosis in self.diagnoses[:-1])),
             diagnosis=self.diagnoses[-1],
             repair_evaluations=sum(repair.evaluations for repair in self._repairs),
@@ -211,8 +247,8 @@ class RecoveryLoop:
             calibration=calibration,
             score=self.score,
             predicted=tuple(self._predicted),
-            scores=tuple(map(partial(self.score.of_trial, robot), faults, trials)),
-            falls=tuple(map(partial(fall_of, robot), faults, trials)),
+            robust_means=tuple(self._robust_means),
+            scored=self._scored,
         )
 
 

@@ -88,8 +88,8 @@ class CandidateController:
     scores: FloatArray
 
     @property
-    def predicted(self) -> float:
-        """Mean predicted score of the rollouts that did not diverge; NaN if all did."""
+    def mean(self) -> float:
+        """Mean score of the rollouts that did not diverge; NaN if all did."""
         finite = self.scores[np.isfinite(self.scores)]
         return float(np.mean(finite)) if len(finite) else math.nan
 

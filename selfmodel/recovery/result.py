@@ -11,6 +11,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
 from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
 
@@ -41,6 +42,26 @@ class DiscriminatingTrial:
         return f"the next trial discriminates between: {', '.join(map(str, self.hypotheses))}"
 
 
+@dataclass(frozen=True)
+class TrialScore:
+    """Score of a trial by the best hypothesis so far; an event again if a diagnosis changes it.
+
+    Attributes:
+        trial: The trial.
+        hypothesis: Intact before the failure; after it, the best hypothesis of the last diagnosis.
+            It matters for a score that depends on the ground or on detached limbs.
+        score: Fitness of the repair.
+        value: Its value; NaN if unobserved.
+        fall: Step at which the robot fell; None if it did not.
+    """
+
+    trial: Trial
+    hypothesis: Hypothesis
+    score: Score
+    value: float
+    fall: int | None
+
+
 Event = (
     SearchBegins
     | Generation
@@ -49,11 +70,12 @@ Event = (
     | Calibration
     | DiscriminatingTrial
     | Trial
+    | TrialScore
     | Diagnosis
 )
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
-a search, the progress of another stage, the chosen comparator, the calibration, a finished trial, a
-diagnosis. ``print`` shows each as text, those of a stage with the time left."""
+a search, the progress of another stage, the chosen comparator, the calibration, a finished trial,
+its score, a diagnosis. ``print`` shows each as text, those of a stage with the time left."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +90,13 @@ class Recovery:
         diagnostic_evaluations: Number of hypotheses that the diagnostic EA evaluated.
         distinct_hypotheses: Number of distinct hypotheses among them.
         comparator: Comparator of the diagnoses, and the reason for its choice.
-        predicted: Score that the self-model predicted of each trial's controller; NaN if none was
-            predicted, as for the first trial after the failure.
-        scores: Score of each trial; those after the failure under the last diagnosis, which matters
-            for a score that depends on the ground or on detached limbs.
-        falls: Step at which the robot fell in each trial; None if it did not.
+        predicted: Score of each trial that the self-model predicted: of one simulation without
+            noise under the best hypothesis at the time. NaN for the first trial after the failure,
+            and if the simulation diverged.
+        robust_means: Mean score of each trial's controller in the last simulations of its repair,
+            under its noise and uncertainty. NaN for the first trial after the failure, and for a
+            controller that was not among the candidates.
+        scored: Score and fall of each trial; those after the failure under the last diagnosis.
         calibration: Fit of the self-model to the trials before the failure; None without one.
         score: Fitness of the repair.
     """
@@ -85,13 +109,30 @@ class Recovery:
     distinct_hypotheses: int
     comparator: ChosenComparator
     predicted: tuple[float, ...]
-    scores: tuple[float, ...]
-    falls: tuple[int | None, ...]
+    robust_means: tuple[float, ...]
+    scored: tuple[TrialScore, ...]
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT
 
     @property
-    def _best(self) -> int:
+    def scores(self) -> tuple[float, ...]:
+        """Score of each trial."""
+        return tuple(one.value for one in self.scored)
+
+    @property
+    def falls(self) -> tuple[int | None, ...]:
+        """Step at which the robot fell in each trial; None if it did not."""
+        return tuple(one.fall for one in self.scored)
+
+    def scores_by(self, score: Score, robot: Robot) -> tuple[float, ...]:
+        """Returns any score of each trial, by the same hypotheses; ``robot`` is the nominal one."""
+        if score == self.score:
+            return self.scores
+        model = self.calibration.robot if self.calibration else robot
+        return tuple(score.of_trial(model, one.hypothesis, one.trial) for one in self.scored)
+
+    @property
+    def best_trial(self) -> int:
         """Number of the recovery trial with the largest score; of the first if all are NaN."""
         known = [-math.inf if math.isnan(score) else score for score in self.scores]
         return max(range(2, len(known)), key=known.__getitem__)
@@ -99,12 +140,12 @@ class Recovery:
     @property
     def fell(self) -> bool:
         """Whether the robot fell in the recovery trial with the largest score."""
-        return self.falls[self._best] is not None
+        return self.falls[self.best_trial] is not None
 
     @property
     def best_score(self) -> float:
         """Largest score of the recovery trials; NaN if unobserved in all."""
-        return self.scores[self._best]
+        return self.scores[self.best_trial]
 
     @property
     def before(self) -> float:
@@ -122,7 +163,12 @@ class Recovery:
 
         NaN if the base was not observed in that trial.
         """
-        return self.trials[self._best].displacement
+        return self.trials[self.best_trial].displacement
+
+    @property
+    def recovery(self) -> float | None:
+        """Recovered displacement as a share of that before; None if the robot fell, or had none."""
+        return self.recovered / self.before if self.before > 0 and not self.fell else None
 
     def __repr__(self) -> str:
         lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
@@ -166,15 +212,16 @@ class Recovery:
         return values_by_name(title, label, names, self.scores, others=predicted)
 
     def _rows(self) -> list[dict[str, Any]]:
-        columns = zip(self.trials, self.tried, self.scores, self.predicted, strict=True)
+        columns = zip(self.trials, self.tried, self.scored, self.predicted, strict=True)
         return [
             {
                 "trial": trial.plan.name,
                 "stage": trial.plan.stage,
                 "hypothesis": str(tried),
                 "displacement": finite_or_none(trial.displacement),
-                "score": finite_or_none(score),
+                "score": finite_or_none(score.value),
                 "predicted_score": finite_or_none(predicted),
+                "fell_at_step": score.fall,
                 "log": trial.path,
             }
             for trial, tried, score, predicted in columns

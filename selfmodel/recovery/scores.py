@@ -69,6 +69,8 @@ class Score:
             displacement.
         needs_touch: Whether only a robot with touch sensors has the score.
         optional: Signals of ``record`` without which a trial has a score all the same.
+        episode: Rewards in an episode of the dm_control task of which the score is the return, of 1
+            at most each; None for any other score.
     """
 
     name: str
@@ -79,6 +81,11 @@ class Score:
     needs_free_base: bool = False
     needs_touch: bool = False
     optional: tuple[Signal, ...] = ()
+    episode: int | None = None
+
+    def most(self, steps: int) -> int | None:
+        """Returns the largest return of a trial of some control steps; None for other scores."""
+        return None if self.episode is None else steps - 1  # the last command has no reward
 
     def of_trial(self, robot: Robot, hypothesis: Hypothesis, trial: Trial) -> float:
         """Returns the score of a trial of a robot with faults; NaN if it was not observed."""
@@ -86,6 +93,17 @@ class Score:
         signals = {signal: logged[signal][np.newaxis] for signal in self.record}
         batch = Trajectory(logged.names, logged.time, signals)
         return float(self.of(robot, hypothesis, batch)[0])
+
+
+def value_text(value: float | None, unit: str, most: float | None = None) -> str:
+    """Returns the value of a score as text, a return with the most that was possible.
+
+    Examples:
+        >>> value_text(46.2, "", 199)
+        '46.200 of 199'
+    """
+    known = math.nan if value is None else value
+    return f"{known:.3f}{'' if most is None else f' of {most:,}'} {unit}".rstrip()
 
 
 def scores_of(

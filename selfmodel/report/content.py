@@ -18,7 +18,8 @@ from selfmodel.diagnosis.text import (
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT
+from selfmodel.recovery.falls import fall_text
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, value_text
 from selfmodel.report import charts
 from selfmodel.report.charts import Item, Report, Section
 from selfmodel.report.evidence import residual_section, separation_section
@@ -39,6 +40,7 @@ MAX_DIAGRAMS = 12
 
 TRIAL_COLUMNS = {
     "predicted before the trial": "predicted_score",
+    "mean of its repair": "robust_mean",
     "hypothesis at the time": "hypothesis",
     "fell at step": "fell_at_step",
 }
@@ -79,12 +81,12 @@ def headline(subject: Subject) -> str:
         return f"{trials} of the {subject.robot.name}. {what}"
     score = result.score
     before, after, recovered = (
-        f"{math.nan if value is None else value:.3g} {score.unit}".rstrip()
+        value_text(value, score.unit, score.most)
         for value in (score.before, score.after, score.recovered)
     )
     is_distance = score.name in (DISPLACEMENT.name, UPRIGHT.name)
     name, achieved = ("", "moved") if is_distance else (f" ({score.name})", "scored")
-    fall = ", and fell" if result.fell else ""
+    fall = ", and fell, which is no recovery" if result.fell else ""
     return (
         f"The {subject.robot.name} {achieved} {before}{name} before the failure and {after} after "
         f"it. {what} The robot {achieved} {recovered} at best in "
@@ -138,7 +140,7 @@ def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
         "controller, from its initial pose. Trials before the failure are predicted without a "
         "fault, all others under the hypotheses of the last diagnosis."
     )
-    items: list[Item] = []
+    items = _score_chart(subject.result) if subject.result is not None else []
     if not subject.robot.has_fixed_base:
         items.append(
             charts.BarChart(
@@ -150,6 +152,29 @@ def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
         )
     items.append(_trials_table(subject, shots))
     return Section("trials", "Trials", (text,), tuple(items))
+
+
+def _score_chart(result: RecoveryResult) -> list[Item]:
+    """Returns the chart of the score of each trial, unless that is the displacement."""
+    score, trials = result.score, result.trials or ()
+    if score.name == DISPLACEMENT.name or not trials:
+        return []
+    groups = [
+        charts.Group(
+            one.name + fall_text(one.fell_at_step),
+            tuple(math.nan if it is None else it for it in (one.score, one.predicted_score)),
+        )
+        for one in trials
+    ]
+    most = "" if score.most is None else f" (of {score.most:,})"
+    return [
+        charts.BarChart(
+            title="Score of each trial, observed and predicted before the trial",
+            x_label=f"{score.name}{most}, {score.unit}".removesuffix(", "),
+            names=("observed", "predicted before the trial"),
+            groups=tuple(groups),
+        )
+    ]
 
 
 def _displacements(shot: Shot) -> tuple[float, ...]:

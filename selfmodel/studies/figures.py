@@ -18,6 +18,7 @@ from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import counted
+from selfmodel.plugins import RETURN
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
 from selfmodel.studies.rows import failure_of, whole
@@ -149,6 +150,50 @@ def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
         axes.spines[:].set_visible(False)
         axes.set(title=f"gap {gap:g}", xlabel="case")
     figure.suptitle(f"{robot}, {counted(trials, 'trial')}: right diagnoses, %")
+    return figure
+
+
+def of_suite(rows: Sequence[Row]) -> dict[str, bytes]:
+    """Returns the files of a figure of the recoveries of bodies; none without a recovery."""
+    runs = [row for row in rows if not row.get("reason")]
+    return files_of("bodies", by_body(runs)) if runs else {}
+
+
+@figure_style()
+def by_body(rows: Sequence[Row]) -> Figure:
+    """Returns the score of each body and failure before, after and recovered, a dot per run.
+
+    A cross in place of a dot is a trial in which the robot fell.
+    """
+    places = list(grouped(rows, "robot", "case", "truth").items())
+    labels = [f"{robot}, {truth} ({counts_text([len(own)])})" for (robot, _, truth), own in places]
+    size = (3.7 + 0.068 * max(map(len, labels)), 0.5 + 0.36 * len(places))
+    figure, (axes,) = _panels(1, 1, size=size, margin=(0.4, 0.8), share=False)
+    ends = ("before", "upright_before"), ("after", "upright_after"), ("recovered", "upright")
+    for number, (end, upright) in enumerate(ends):
+        values: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+        for place, (_, own) in enumerate(places):
+            y = place + 0.24 * (number - 1)
+            for row in own:
+                values[row.get(upright) is False].append((row[end], y))
+        for fell, points in values.items():
+            style: Style = look(number) | {"linestyle": "none", "alpha": 0.8, "markersize": 5}
+            axes.plot(
+                *np.array(points, dtype=float).reshape(-1, 2).T,
+                **style | ({"marker": "x"} if fell else {"label": end}),
+            )
+    if any(row.get(upright) is False for row in rows for _, upright in ends):
+        axes.plot([], [], color="0.3", marker="x", linestyle="none", label="fell")
+    axes.axvline(0, color="0.3", linewidth=0.8)
+    axes.set_yticks(range(len(places)), labels, fontsize=8)
+    axes.set(ylim=(len(places) - 0.5, -0.5))
+    score, unit = rows[0].get("score") or "score", rows[0].get("unit") or ""
+    limits = {row.get("return_most") if score == RETURN else None for row in rows}
+    most = limits.pop() if len(limits) == 1 else None
+    limit = f" (of {most:,})" if most else ""
+    axes.set_xlabel(f"{score}{limit}, {unit}".rstrip(", "))
+    axes.grid(axis="x")
+    _legend(figure, columns=4)
     return figure
 
 

@@ -13,6 +13,7 @@ from urllib.parse import quote
 from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.controllers.controller import Design, check_silent_neurons
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import (
     InputError,
@@ -37,7 +38,13 @@ from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import check_score
-from selfmodel.studies.recoveries import HEALTHY_TRIALS, ON_ROBOT, repair_parameters, robot_key
+from selfmodel.studies.recoveries import (
+    HEALTHY_TRIALS,
+    ON_ROBOT,
+    REASON,
+    repair_parameters,
+    robot_key,
+)
 from selfmodel.studies.study import SHARED, Point, Study
 from selfmodel.tasks import ROBOTS, Entry, suite_bodies
 
@@ -65,6 +72,20 @@ TABLE_ONE: Mapping[int, str] = MappingProxyType(
 )
 """Failures by their number in the paper's Table I."""
 
+CASE_NEEDS: Mapping[int, str] = MappingProxyType(
+    {
+        1: "a limb of two joints",
+        2: "a limb",
+        3: "a touch sensor at its first limb",
+        4: "a touch sensor at another than its first limb",
+        5: "an angle sensor at its first limb",
+        6: "a limb",
+        7: "two limbs",
+        8: "an angle sensor at a third limb",
+    }
+)
+"""What a robot without a case of Table I lacks."""
+
 DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {name: tuple(entry.suite) for name, entry in ROBOTS.items()}
     | {f"{suite_bodies.PREFIX}{name}": tasks for name, tasks in suite_bodies.DOMAINS.items()}
@@ -75,6 +96,9 @@ PAPER_COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
 """Comparators of the paper's experiment by default: the paper's, then selfmodel's."""
 
 Needs = Callable[[Point], Mapping[str, Cell]]
+
+Asked = tuple[int | None, str]
+"""A failure that is asked for: the number of a case, or None and a damage in notation."""
 
 Share = tuple[int, int]
 """``(i, n)``: share i of n of the runs, from 1, for n machines with a folder each."""
@@ -201,6 +225,7 @@ def suite(
     seeds: int | Iterable[int] = range(1),
     settings: Settings = Settings(),  # noqa: B008  # frozen
     comparator: str | Comparator = SEGMENT_PREDICTION.name,
+    damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     controller: str | plugins.MakeDesign = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
@@ -214,11 +239,13 @@ def suite(
     """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.
 
     Bodies are names of robots, or paths of MJCF or URDF files; by default those of all domains. A
-    case that does not apply to a body or to its controllers is omitted; the share is of bodies with
-    their seeds. The comparator may be ``auto``, and ``score`` is reported per trial too.
+    case or a damage that does not apply to a body or to its controllers is a row with the reason,
+    of the first seed; one that applies to none is refused. The share is of bodies with their seeds.
+    The comparator may be ``auto``.
     """
     bodies = bodies_of(tuple(DOMAINS), None) if bodies is None else names_of(bodies, ROBOT)
     cases = known_cases(bodies) if cases is None else whole_numbers("cases", cases, 1)
+    damages = names_of(damages, "failures in notation", Hypothesis)
     seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
@@ -226,21 +253,28 @@ def suite(
     controller = plugins.name_of("controller", controller)
     comparator_choice(comparator)
     plugins.kinds(kinds)
+    _check_any(cases, damages)
     chosen = repair_parameters(repair, search, score, repair_settings)
     entries = {body: robot_entry(body) for body in bodies}
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
     _check_cases("case of these bodies", cases, known_cases(bodies))
-    points: list[Point] = []
-    for seed, body in list(itertools.product(seeds, bodies))[share - 1 :: shares]:
-        entry, robot = entries[body], entries[body].robot()
+    asked: list[Asked] = [*((case, "") for case in cases), *((None, one) for one in damages)]
+    failures: dict[str, list[tuple[int | None, str, str]]] = {}
+    for body, entry in entries.items():
         check_score(chosen["score"], entry)
-        hidden = plugins.design(controller, robot, neurons).hidden
-        for case in cases:
-            truth = entry.cases.get(case)
-            # Controllers without hidden neurons have none that could fail.
-            if truth and max(silent_neurons(parse(truth, robot.anatomy)), default=-1) < hidden:
-                point = _point(models[body], case, truth, gap, seed)
-                points.append({**point, "comparator": comparator})
+        design = plugins.design(controller, entry.robot(), neurons)
+        failures[body] = _judged(body, entry, design, asked, kinds)
+    for number, damage in enumerate(damages, start=len(cases)):
+        reasons = [judged[number][2] for judged in failures.values()]
+        if reasons and all(reasons):
+            raise InputError(f"no body can have {damage}: {reasons[0]}")
+    points = [
+        _point(models[body], case, truth, gap, seed)
+        | {"comparator": comparator, **({REASON: reason} if reason else {})}
+        for seed, body in list(itertools.product(seeds, bodies))[share - 1 :: shares]
+        for case, truth, reason in dict.fromkeys(failures[body])
+        if not reason or seed == seeds[0]
+    ]
     shared = _shared(settings, kinds, chosen) | {"comparator": comparator, "gap": gap}
     shared |= {"controller": controller, "neurons": neurons}
     return _study("suite", folder, points, shared, _one_gait(models, shared))
@@ -288,7 +322,7 @@ def _one_gait(models: Mapping[str, Mapping[str, str]], shared: Mapping[str, Any]
     def gait(robot: str, seed: int) -> Cell:
         return recoveries.gait_cell(models[robot], shared, seed)
 
-    return lambda point: {"gait": gait(point["robot"], point["seed"])}
+    return lambda point: {} if REASON in point else {"gait": gait(point["robot"], point["seed"])}
 
 
 def _study(
@@ -361,8 +395,7 @@ def _check(
     """Refuses the definition of an ablation that has no runs, or no trials to choose."""
     if empty := [name for name, values in lists.items() if not values]:
         raise InputError(f"expected at least one of the {empty[0]} of an ablation, got none")
-    if not (cases is None or cases or damages):
-        raise InputError("expected at least one case or one damage of an ablation, got neither")
+    _check_any(cases, damages)
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
     if next_trial not in NEXT_TRIAL and ":" not in next_trial:
@@ -381,6 +414,11 @@ def _check(
         )
 
 
+def _check_any(cases: Sequence[int] | None, damages: Sequence[str]) -> None:
+    if not (cases is None or cases or damages):
+        raise InputError("expected at least one case or one damage of a study, got neither")
+
+
 def _failures(
     robot: str, entry: Entry, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
 ) -> list[tuple[int | None, str]]:
@@ -391,6 +429,30 @@ def _failures(
     numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
     named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
     return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
+
+
+def _judged(
+    robot: str, entry: Entry, design: Design, asked: Iterable[Asked], kinds: str
+) -> list[tuple[int | None, str, str]]:
+    """Returns failures as ``_failures`` does, each with the reason why it does not apply, or ""."""
+    judged: list[tuple[int | None, str, str]] = []
+    for case, damage in asked:
+        try:
+            judged.append((case, _applied(robot, entry, design, (case, damage), kinds), ""))
+        except InputError as error:
+            judged.append((case, damage, str(error)))
+    return judged
+
+
+def _applied(robot: str, entry: Entry, design: Design, asked: Asked, kinds: str) -> str:
+    """Returns a failure in notation; refuses one that the robot or its controllers cannot have."""
+    case, damage = asked
+    if case is not None and case not in entry.cases:
+        raise InputError(f'"{TABLE_ONE[case]}" needs {CASE_NEEDS[case]}, which {robot} lacks')
+    cases, damages = ((), (damage,)) if case is None else ((case,), ())
+    ((_, truth),) = _failures(robot, entry, cases, damages, kinds)
+    check_silent_neurons(design, silent_neurons(parse(truth, entry.robot().anatomy)))
+    return truth
 
 
 def _check_cases(what: str, cases: Sequence[int], known: Iterable[int]) -> None:

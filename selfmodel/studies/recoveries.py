@@ -38,11 +38,10 @@ from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import MakeSearch, RepairSearch
 from selfmodel.recovery.repertoire import model_digest
-from selfmodel.recovery.result import Event, SearchBegins
+from selfmodel.recovery.result import Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
@@ -60,6 +59,9 @@ GAIT, CALIBRATED = "gait.npz", "calibrated.xml"
 
 HEALTHY_TRIALS = 2
 """Number of trials before the failure, in a run whose trials all comparators share."""
+
+REASON = "reason"
+"""Parameter of a run that cannot be: why its failure does not apply to the robot."""
 
 ON_ROBOT = "evolution-on-robot"
 """In place of a comparator: the paper's control, the repair EA on the damaged robot."""
@@ -265,12 +267,15 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     """Runs a recovery, and returns rows of its diagnoses, of its trials, and its own.
 
-    In place of a recovery, the paper's control runs the repair EA on the robot.
+    In place of a recovery, the paper's control runs the repair EA on the robot. A failure that the
+    robot cannot have, with the reason, has a row of its own and nothing else.
     """
     if parameters["comparator"] == ON_ROBOT:
         return _evolve_on_robot(parameters, needs)
     shared, entry = parameters["shared"], planned_entry(parameters)
     robot, (settings, of_repair) = entry.robot(), settings_of(shared)
+    if REASON in parameters:
+        return {"recoveries": [{"robot": robot.name}]}
     design = plugins.design(shared["controller"], robot, shared["neurons"])
     truth, gait = truth_of(parameters, robot), read_controller(needs["gait"] / GAIT, robot)
     check_silent_neurons(design, silent_neurons(truth))
@@ -302,11 +307,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     watch = _DiagnosisWatch()
     outcome = experiments.run(experiment, watch)
     recovery = outcome.recovery
-    before, after, *recoveries = [
-        score.of_trial(robot, truth if number else INTACT, trial)
-        for number, trial in enumerate(recovery.trials)
-    ]
-    best = recovery.trials[2 + recoveries.index(max(recoveries))].trajectory
+    before, after, *recoveries = recovery.scores
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
@@ -320,10 +321,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "correct": outcome.correct,
         "verdict": recovery.diagnosis.verdict,
         "trials": len(recovery.trials) - 1,
-        "before": before,
-        "after": after,
-        "recovered": max(recoveries),
-        "upright": bool(falls_of(robot, truth, best) == best.steps),
+        **_ends(recovery, entry),
         "distinct_hypotheses": recovery.distinct_hypotheses,
         "diverged": outcome.stats.diverged,
         "simulated_steps": outcome.stats.steps,
@@ -331,21 +329,50 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "repair": shared["repair"],
         "search": shared["search"],
     }
-    columns = (recovery.trials, recovery.tried, recovery.predicted, recovery.falls)
+    others = recovery.scores_by(UPRIGHT, robot), _returns(recovery, entry)
+    forecasts = recovery.predicted, recovery.robust_means
+    columns = (recovery.scored, recovery.tried, *forecasts, *others)
     trials = [
         {
             "robot": robot.name,
             "number": number,
-            "stage": trial.plan.stage,
+            "stage": one.trial.plan.stage,
             "hypothesis": str(tried),
-            "displacement": trial.displacement,
-            "upright": UPRIGHT.of_trial(robot, tried, trial),
+            "score": finite_or_none(one.value),
             "predicted": finite_or_none(predicted),
-            "fell_at_step": fall,
+            "robust_mean": finite_or_none(mean),
+            "displacement": finite_or_none(one.trial.displacement),
+            "return": reward,
+            "upright": finite_or_none(walked),
+            "fell_at_step": one.fall,
         }
-        for number, (trial, tried, predicted, fall) in enumerate(zip(*columns, strict=True))
+        for number, (one, tried, predicted, mean, walked, reward) in enumerate(
+            zip(*columns, strict=True)
+        )
     ]
     return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
+
+
+def _returns(recovery: Recovery, entry: Entry) -> list[float | None]:
+    """Returns the return of each trial; None for a robot without a task."""
+    if entry.episode_return is None:
+        return [None] * len(recovery.trials)
+    return [*map(finite_or_none, recovery.scores_by(entry.episode_return, entry.robot()))]
+
+
+def _ends(recovery: Recovery, entry: Entry) -> Row:
+    """Returns what was reached before and after the failure, and in the best recovery trial."""
+    steps, task = recovery.trials[0].plan.steps, entry.episode_return
+    row: Row = {"score": recovery.score.name, "unit": recovery.score.unit}
+    row["control_steps"] = steps
+    returns = _returns(recovery, entry)
+    for name, number in (("before", 0), ("after", 1), ("recovered", recovery.best_trial)):
+        one = recovery.scored[number]
+        row[name] = finite_or_none(one.value)
+        row["upright" if name == "recovered" else f"upright_{name}"] = one.fall is None
+        row[f"displacement_{name}"] = finite_or_none(one.trial.displacement)
+        row[f"return_{name}"] = returns[number]
+    return {**row, "return_most": None if task is None else task.most(steps)}
 
 
 def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:

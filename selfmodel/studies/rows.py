@@ -18,7 +18,10 @@ from selfmodel.studies import comparisons
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, rows_in, shared_in
 
-INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
+INTEGERS = (
+    *("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged"),
+    *("control_steps", "return_most", "fell_at_step"),
+)
 """Columns of whole numbers, of which some may be unknown."""
 
 MAX_BYTES = 2**30
@@ -61,7 +64,7 @@ class Kind:
 
     def order(self, row: Row) -> tuple[Any, ...]:
         """Returns the sort key of a row; of a run, the paper's comparator is the first."""
-        key = [row[name] for name in self.sorted_by.split()]
+        key = [(row[name] is None, row[name]) for name in self.sorted_by.split()]
         return (*key, row.get("comparator") != REFERENCE)
 
 
@@ -152,10 +155,14 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         ),
         "suite": Kind(
             "recoveries",
-            "robot case truth seed best correct verdict trials before after recovered diverged "
-            "seconds upright repair search",
-            "upright repair search",
-            "robot case seed",
+            "robot case truth seed best correct verdict trials score unit control_steps before "
+            "after recovered upright_before upright_after upright displacement_before "
+            "displacement_after displacement_recovered return_before return_after return_recovered "
+            "return_most diverged seconds repair search reason",
+            "score unit control_steps upright_before upright_after upright displacement_before "
+            "displacement_after displacement_recovered return_before return_after return_recovered "
+            "return_most repair search reason",
+            "robot case truth seed",
             lambda _rows: iter(()),  # its bodies have one comparator, and are no pairs
         ),
     }
@@ -260,8 +267,9 @@ def load(path: str | Path) -> LoadedStudy:
     if not len(rows):
         raise InputError(f"{place}: expected the rows of a study, got none: run the study first")
     for column, kinds in (("correct", "b"), ("gap", "fi"), ("seed", "iu"), ("case", "iu")):
-        if column in rows and rows[column].dtype.kind not in kinds:
-            odd = rows[column].dropna().astype(str).iloc[0]
+        known = rows[column].dropna().infer_objects() if column in rows else pd.Series()
+        if len(known) and known.dtype.kind not in kinds:
+            odd = known.astype(str).iloc[0]
             raise InputError(
                 f"{place}: expected {'true or false' if kinds == 'b' else 'numbers'} in the column "
                 f"{column}, got values such as {odd!r}"
@@ -312,7 +320,7 @@ def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
     kind = KINDS[name]
     rows = rows_in(folder, table or kind.table)
     if table is None:
-        rows = [{column: row[column] for column in kind.columns} for row in rows]
+        rows = [{column: row.get(column) for column in kind.columns} for row in rows]
     return sorted(rows, key=kind.order)
 
 

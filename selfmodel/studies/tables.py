@@ -16,15 +16,28 @@ import pandas as pd
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
 from selfmodel.logs.files import make_folder, replace_file
-from selfmodel.plugins import check_known
+from selfmodel.plugins import RETURN, check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
 from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
+from selfmodel.tasks.suite_bodies import EPISODE
+
+TRIAL_COLUMNS = (
+    *("robot", "case", "truth", "seed", "number", "stage", "hypothesis", "score", "predicted"),
+    *("robust_mean", "displacement", "return", "fell_at_step"),
+)
+"""Columns of the trials of a study of bodies."""
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
+
+ENDS = ("before", "after", "recovered")
+"""What is reported of a recovery: before and after the failure, and in its best trial since."""
+
+MEASURED = ("displacement", RETURN)
+"""What is reported at these ends beside the score; the return of a robot with a task."""
 
 
 def ablation_scores(rows: Sequence[Row]) -> list[Row]:
@@ -66,51 +79,72 @@ def ablation_scores(rows: Sequence[Row]) -> list[Row]:
 
 
 def suite_summaries(rows: Sequence[Row]) -> list[Row]:
-    """Returns the summaries of each body: one per case, then one of all single faults.
+    """Returns the summaries of each body: one per failure, then one of its single faults, if many.
 
     Returns:
-        ``robot``; ``case`` and ``truth``, None and "" for all single faults; ``runs`` and
-        ``right``, their numbers; ``correct``, the proportion of right diagnoses with Wilson's
-        interval; the medians of the scores ``before``, ``after`` and ``recovered``; ``recovery``,
-        the median of recovered over before, for runs with a score above 0 before; ``upright``, the
-        number of runs whose best recovery trial had no fall; the mean number of ``trials``; the
-        median of the ``seconds``.
+        ``robot``; ``case`` and ``truth``, None and "" for all single faults of Table I; ``runs``
+        and ``right``, their numbers; ``correct``, the proportion of right diagnoses with Wilson's
+        interval; ``score``, its ``unit``, and the ``control_steps``; the medians of ``before``,
+        ``after`` and ``recovered``, of the displacements and returns with these ends, and
+        ``return_most``; ``recovery``, see ``recovered_over_before``, its median; ``upright``, the
+        number of runs whose best recovery trial had no fall, None if that is unknown; the mean
+        number of ``trials``; the median of the ``seconds``; ``reason``, why the body cannot have
+        the failure.
     """
     summaries = []
     for (robot,), own in grouped(rows, "robot").items():
-        cases = [(case, same) for (case,), same in sorted(grouped(own, "case").items())]
-        cases.append((None, [row for row in own if row["case"] in SINGLE]))
+        failures = [(*key, same) for key, same in grouped(own, "case", "truth").items()]
+        every = [row for row in own if row["case"] in SINGLE and not row.get("reason")]
+        if len({row["case"] for row in every}) > 1:
+            failures.append((None, "", every))
         summaries += [
-            {
-                "robot": robot,
-                "case": case,
-                "truth": "" if case is None else same[0]["truth"],
-                **_right(same),
-                **medians(same, "before", "after", "recovered"),
-                "recovery": median(ratios) if (ratios := recovered_over_before(same)) else None,
-                "upright": sum(row.get("upright") is True for row in same),
-                "trials": fmean(row["trials"] for row in same),
-                **medians(same, "seconds"),
-            }
-            for case, same in cases
-            if same
+            {"robot": robot, "case": case, "truth": truth, **_summary(same)}
+            for case, truth, same in failures
         ]
     return summaries
 
 
+def _summary(rows: Sequence[Row]) -> Row:
+    runs, first = [row for row in rows if not row.get("reason")], rows[0]
+    ratios = recovered_over_before(runs)
+    stayed = [row["upright"] for row in runs if row.get("upright") is not None]
+    return {
+        **_right(runs),
+        **{name: first.get(name) for name in ("score", "unit", "control_steps")},
+        **medians(runs, *ENDS, *(f"{what}_{end}" for what in MEASURED for end in ENDS)),
+        "return_most": first.get("return_most"),
+        "recovery": median(ratios) if ratios else None,
+        "upright": sum(stayed) if stayed else None,
+        "trials": fmean(row["trials"] for row in runs) if runs else None,
+        **medians(runs, "seconds"),
+        "reason": first.get("reason"),
+    }
+
+
 def _right(rows: Sequence[Row]) -> Row:
     right = sum(row["correct"] for row in rows)
-    return {"runs": len(rows), "right": right, "correct": proportion(right, len(rows))}
+    share = proportion(right, len(rows)) if rows else None
+    return {"runs": len(rows), "right": right, "correct": share}
 
 
 def medians(rows: Sequence[Row], *names: str) -> Row:
-    """Returns the medians of some columns."""
-    return {name: median(row[name] for row in rows) for name in names}
+    """Returns the medians of some columns, of the known values; None without any."""
+    known = {name: [row[name] for row in rows if row.get(name) is not None] for name in names}
+    return {name: median(values) if values else None for name, values in known.items()}
 
 
 def recovered_over_before(rows: Sequence[Row]) -> list[float]:
-    """Returns the recovered part of the score before the failure, where that is above 0."""
-    return [row["recovered"] / row["before"] for row in rows if row["before"] > 0]
+    """Returns the recovered part of the score before the failure, where that is above 0.
+
+    A robot that fell in its best recovery trial, which is not ``upright``, is not recovered.
+    """
+    return [
+        row["recovered"] / row["before"]
+        for row in rows
+        if row.get("upright") is not False
+        and None not in (row["before"], row["recovered"])
+        and row["before"] > 0
+    ]
 
 
 @dataclass(frozen=True)
@@ -200,12 +234,38 @@ def ablation_results(folder: Path) -> Results:
 
 
 def suite_results(folder: Path) -> Results:
-    """Returns the results of a study of bodies."""
-    facts = {"rows": (rows := study_rows("suite", folder)), "summaries": suite_summaries(rows)}
-    texts = list(map(_summary_texts, facts["summaries"]))
-    table = table_of("summaries", facts["summaries"], texts, texts=3)
-    legend = "Medians over the runs; right with its 95 % interval, %."
-    return Results(facts, [table], table, legend, _files("suite", facts))
+    """Returns the results of a study of bodies, with a figure."""
+    rows, trials = study_rows("suite", folder), study_rows("suite", folder, "trials")
+    summaries = suite_summaries(rows)
+    facts = {"rows": rows, "summaries": summaries, "trials": trials}
+    table, shown = (
+        table_of("summaries", some, [_summary_text(one, some) for one in some], texts=2)
+        for some in (summaries, [one for one in summaries if one["runs"]])
+    )
+    files = _files("suite", facts) | {"trials.csv": csv_bytes(frame_of(trials, TRIAL_COLUMNS))}
+    files |= {f"figures/{name}": data for name, data in figures.of_suite(rows).items()}
+    return Results(facts, [table], shown, _legend(summaries), files)
+
+
+def _legend(summaries: Sequence[Row]) -> str:
+    """Returns what the values in the table of a study of bodies are, and what is not in it."""
+    lines = []
+    for one in summaries:
+        if one["reason"]:
+            failure = one["truth"] or f"case {one['case']}"
+            lines.append(f"Not run: {one['robot']}, {failure}: {one['reason']}")
+    run = next((one for one in summaries if one["runs"]), None)
+    if run is None:
+        return "\n".join(lines)
+    text = (
+        f"The score is {run['score']}, of trials of {run['control_steps']} control steps: medians "
+        f"before and after the failure, and in the best trial since. A robot that fell in that "
+        f"trial is not recovered, and counts in no recovered ÷ before. "
+    )
+    if most := next((one["return_most"] for one in summaries if one["return_most"]), None):
+        which = "as these trials" if most == EPISODE else f"of which these trials have {most:,}"
+        text += f"An episode of dm_control has {EPISODE:,} rewards of up to 1, {which}. "
+    return "\n".join([f"{text}Right has its 95 % interval, %.", *lines])
 
 
 def _files(name: str, facts: Mapping[str, Any]) -> dict[str, bytes]:
@@ -233,19 +293,35 @@ def _score_table(scores: Sequence[Row]) -> Table:
     return table_of("scores", scores, texts, texts=3)
 
 
-def _summary_texts(one: Row) -> dict[str, str]:
-    share = one["correct"]
-    interval = f"({100 * share.low:.0f} to {100 * share.high:.0f})"
-    return {
+def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
+    """Returns the texts of a summary; its columns are those that any of them has."""
+    score, unit = next(((it["score"], it["unit"]) for it in every if it["score"]), ("", ""))
+    runs, share, most = one["runs"], one["correct"], one["return_most"]
+    interval = f" ({100 * share.low:.0f} to {100 * share.high:.0f})" if share else ""
+    case = "" if one["case"] is None else f"{one['case']}, "
+    texts = {
         "robot": one["robot"],
-        "case": "single faults" if one["case"] is None else str(one["case"]),
-        "truth": one["truth"],
-        "right": f"{one['right']} of {one['runs']} {interval}",
-        **{name: f"{one[name]:.2f}" for name in ("before", "after", "recovered")},
-        "recovered ÷ before": "-" if one["recovery"] is None else f"{one['recovery']:.2f}",
-        "upright": f"{one['upright']} of {one['runs']}",
-        **{name: f"{one[name]:.0f}" for name in ("trials", "seconds")},
+        "failure": f"{case}{one['truth']}".rstrip(", ") or "single faults",
+        "right": f"{one['right']} of {runs}{interval}" if runs else "-",
     }
+    for end in ENDS:
+        title = f"{score} {end}, {unit}".strip(", ")
+        limit = f" of {most:,}" if runs and most and score == RETURN else ""
+        texts[title] = _number(one[end]) + limit
+    stayed = one["upright"]
+    if stayed is not None and stayed < runs:
+        texts[title] += f", {runs - stayed} of {runs} fell"
+    texts["recovered ÷ before"] = _number(one["recovery"])
+    texts["upright"] = "-" if stayed is None else f"{stayed} of {runs}"
+    for what, title in (("displacement", "displacements, m"), (RETURN, "returns")):
+        if what != score and any(it[f"{what}_before"] is not None for it in every):
+            values = ", ".join(_number(one[f"{what}_{end}"]) for end in ENDS) if runs else "-"
+            texts[title] = f"{values} of {most:,}" if runs and most and what == RETURN else values
+    return texts | ({"why not": one["reason"] or ""} if any(it["reason"] for it in every) else {})
+
+
+def _number(value: float | None, form: str = ".3f") -> str:
+    return "-" if value is None else format(value, form)
 
 
 def _interval(interval: Interval | None, factor: float = 1, form: str = ".2f") -> str:

@@ -106,18 +106,32 @@ def test_the_same_seed_gives_the_same_in_another_process(short: tuple[Path, dict
 
 
 def test_progress_goes_to_standard_error_in_plain_lines_when_piped(recovery: tuple[Path, Done]):
-    _, done = recovery
+    folder, done = recovery
     lines = [line for line in done.stderr.splitlines() if not line.endswith(" left")]  # if slow
     begins = [
-        *("repair for intact:", "trial 00-before:", "calibration: error ", "trial 01-after:"),
-        *("comparator segment-prediction: ", "diagnostic EA:"),
-        *("diagnosis from 1 trial:", "repair for ", "trial 02-recovery:", "diagnostic EA:"),
-        "diagnosis from 2 trials:",
+        *("repair for intact:", "trial 00-before:", "calibration: error ", "trial 00-before by "),
+        *("trial 01-after:", "comparator segment-prediction: ", "diagnostic EA:"),
+        *("diagnosis from 1 trial:", "trial 01-after by ", "repair for ", "trial 02-recovery:"),
+        *("diagnostic EA:", "diagnosis from 2 trials:", "trial 02-recovery by "),
     ]
 
     assert "\x1b" not in done.stderr + done.stdout
     assert len(lines) == len(begins)
     assert all(line.startswith(begin) for line, begin in zip(lines, begins, strict=True))
+    (result,) = folder.rglob("result.json")
+    scores = [f"{one['score']:.3f} m" for one in json.loads(result.read_text())["trials"]]
+    assert [line.split("upright ")[1] for line in lines if "upright" in line] == scores
+
+
+def test_a_trial_of_a_robot_that_falls_says_when(tmp_path: Path):
+    given = ("trial", "suite-walker-walk", "--controller", "cpg", "--steps", "150", "--out")
+    told = printed(*given, "a.mcap", "--json", cwd=tmp_path)
+    said = succeeds(*given, "b.mcap", cwd=tmp_path).stdout
+    heights = read_log(tmp_path / "a.mcap").trial.trajectory["base_position"][:, 2]
+
+    assert f"{told['displacement']:.3f} m forward, fell at step {told['fell_at_step']}: " in said
+    assert 0 < told["fell_at_step"] < 150
+    assert heights[-1] < heights[0] / 2
 
 
 def test_a_folder_that_holds_another_run_is_refused_and_left_alone(short: tuple[Path, dict]):

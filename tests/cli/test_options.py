@@ -112,7 +112,7 @@ def test_every_option_of_the_table_is_of_a_command():
         (
             "--case",
             " none ",
-            "expected at least one case or one damage of an ablation, got neither",
+            "expected at least one case or one damage of a study, got neither",
         ),
     ],
 )

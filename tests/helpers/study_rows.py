@@ -44,7 +44,7 @@ def body(seed: int = 0, **changes: object) -> Row:
         "seconds": 3.0,
         "upright": True,
     }
-    return usual | changes
+    return dict.fromkeys(KINDS["suite"].columns) | usual | changes
 
 
 def recovery(**changes: object) -> Row:

@@ -35,7 +35,7 @@ from selfmodel.recovery import recover as module
 from selfmodel.recovery.next_trial import discriminating_controller
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, diagnose_trials
 from selfmodel.recovery.repair import CandidateController, RepairSearch
-from selfmodel.recovery.result import Event, Recovery, SearchBegins
+from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
@@ -137,8 +137,11 @@ def test_a_recovery_follows_the_paper_and_simulates_nothing_twice(watched: Simpl
         if not isinstance(event, Generation | Progress)
     ]
 
-    first, once = ["repair", "Trial", "Trial", "ChosenComparator"], ["diagnostic", "Diagnosis"]
+    first = ["repair", "Trial", "TrialScore", "Trial", "ChosenComparator"]
+    once = ["diagnostic", "Diagnosis", "TrialScore"]
     assert order == [*first, *[*once, "repair", "Trial"] * 3, *once]
+    told = [event for event in events if isinstance(event, TrialScore)]
+    assert tuple(told) == outcome.scored, "no diagnosis changed a displacement"
     trials = outcome.trials
     assert [trial.plan.stage for trial in trials] == ["before", "after", *["recovery"] * 3]
     assert trials[0].plan.controller == trials[1].plan.controller
@@ -279,11 +282,10 @@ class StubRepair:
         uncertainty: Callable[[], DomainDistribution],
         *_rest: object,
     ) -> tuple[CandidateController, ...]:
-        """Returns the candidates; each prediction is the number of the call."""
+        """Returns the candidates, with a fitness that is no score of one simulation."""
         self.hypotheses.append(tuple(map(str, hypotheses)))
         self.uncertainties.append(uncertainty())
-        predicted = np.array([float(len(self.hypotheses))])
-        return tuple(CandidateController(one, predicted) for one in self._candidates)
+        return tuple(CandidateController(one, np.array([9.0, 7.0])) for one in self._candidates)
 
 
 @pytest.fixture
@@ -330,21 +332,25 @@ def test_a_repair_is_for_the_diagnosed_robot_and_its_candidates_are_tried_in_tur
     controllers = [trial.plan.controller for trial in stubbed.recovery.trials]
     assert controllers[0] == controllers[1]
     assert len(set(controllers[1:])) == 3
+    # Without a gap and with the right diagnosis, a prediction is exact.
     before, after, *later = stubbed.recovery.predicted
-    assert (before, later) == (1.0, [2.0, 3.0])
+    assert [before, *later] == [one for k, one in enumerate(stubbed.recovery.scores) if k != 1]
     assert math.isnan(after)
-    assert stubbed.scored == ["intact", *[TRUTH] * 3]
+    np.testing.assert_equal(stubbed.recovery.robust_means, (8.0, math.nan, 8.0, 8.0))
+    # A prediction and a score of each trial, each computed once; none was predicted of the second.
+    assert stubbed.scored == ["intact", "intact", TRUTH, *[TRUTH, TRUTH] * 2]
 
 
 @pytest.mark.parametrize(("scores", "fell"), [((0.0, 2.0), True), ((2.0, math.nan), False)])
 def test_a_recovery_fell_if_the_robot_fell_in_its_best_trial(
     stubbed: SimpleNamespace, scores: tuple[float, float], *, fell: bool
 ):
-    outcome = dataclasses.replace(
-        stubbed.recovery, scores=(9.0, 9.0, *scores), falls=(None, None, None, 12)
-    )
+    ends = zip(stubbed.recovery.scored, (9.0, 9.0, *scores), (None, None, None, 12), strict=True)
+    scored = [dataclasses.replace(one, value=value, fall=fall) for one, value, fall in ends]
+    outcome = dataclasses.replace(stubbed.recovery, scored=tuple(scored))
     assert outcome.fell == fell
     assert outcome.best_score == 2.0
+    assert fell == (outcome.recovery is None), "a robot that fell is not recovered"
     assert outcome.recovered == outcome.trials[2 + scores.index(2.0)].displacement
 
 

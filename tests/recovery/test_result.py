@@ -13,7 +13,8 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.recovery.result import Recovery
+from selfmodel.recovery.result import Recovery, TrialScore
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.model_factors import nominal
@@ -53,8 +54,8 @@ def without_base(trial: Trial) -> Trial:
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
-    unknown = (math.nan,) * 3
-    found = (diagnosis, 0, 0, 0, CHOSEN, unknown, unknown, (None,) * 3)
+    scored = (TrialScore(blind, INTACT, DISPLACEMENT, math.nan, None),) * 3
+    found = (diagnosis, 0, 0, 0, CHOSEN, *[(math.nan,) * 3] * 2, scored)
     recovery = Recovery((blind,) * 3, (INTACT,) * 3, *found)
 
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))

@@ -1,5 +1,6 @@
 """Promises of the scores: the falls that end them, the limits, and the checks of a plug-in's."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -208,6 +209,15 @@ def test_a_fixed_base_does_not_fall():
     runs = [(INTACT, driver) for driver in random_cpgs(arm(), 1)]
     trajectory = Simulator(arm(), 1).run(runs, 50, UPRIGHT.record).trajectory
     assert falls_of(arm(), INTACT, trajectory) == 50
+
+
+def test_a_robot_without_gravity_turns_over_and_does_not_fall(quadruped: Robot):
+    floating = quadruped.mjcf.replace("<option", '<option gravity="0 0 0"', 1)
+    height = quadruped.standing_height
+    run = walked(quadruped, [0.0] * STEPS, [0.0] + [np.pi] * (STEPS - 1), [height] * STEPS)
+
+    assert falls_of(quadruped, INTACT, run) == 1
+    assert falls_of(dataclasses.replace(quadruped, mjcf=floating), INTACT, run) == STEPS
 
 
 def hurried(robot: Robot, x: list[float], speeds: list[float], torques: list[float]) -> Trajectory:

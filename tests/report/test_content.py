@@ -4,12 +4,19 @@ import dataclasses
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from selfmodel.diagnosis.text import summary
 from selfmodel.faults.notation import parse
 from selfmodel.report.charts import GaitDiagram
-from selfmodel.report.content import details, gait_section, headline, report_of
+from selfmodel.report.content import (
+    details,
+    gait_section,
+    headline,
+    report_of,
+    trials_section,
+)
 from selfmodel.report.scene import Shot
 from selfmodel.report.subject import Subject
 
@@ -27,14 +34,35 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     assert [section.key for section in report.sections] == [
         *("trials", "hypotheses", "residual", "separation", "searches", "calibration", "gait")
     ]
-    assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3g} m")
-    assert f"moved {result['score']['recovered']:.3g} m at best in 1 trial since" in report.headline
+    assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3f} m")
+    assert f"moved {result['score']['recovered']:.3f} m at best in 1 trial since" in report.headline
     assert summary(subject.diagnosis)[0] in report.headline
     assert f"True faults: {result['truth']}, at a reality gap of 0.1" in report.verdict[-1]
     trials = report.sections[0].items[1]
     assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]
     ranking = report.sections[1].items[1].rows
     assert ranking[0][1:3] == tuple(result["diagnosis"][0].values())
+
+
+def test_a_score_other_than_the_displacement_has_its_chart_with_falls_and_its_limit(
+    subject: Subject, shots: tuple[Shot, ...]
+):
+    score = msgspec.structs.replace(subject.result.score, name="return", unit="", most=99)
+    trials = [msgspec.structs.replace(one, fell_at_step=7) for one in subject.result.trials]
+    changes = {"score": score, "trials": tuple(trials), "fell": True}
+    result = msgspec.structs.replace(subject.result, **changes)
+    scored = dataclasses.replace(subject, result=result)
+
+    chart, displacement, _ = trials_section(scored, shots).items
+    values = np.array([one.values for one in chart.groups])
+    expected = [(one.score, one.predicted_score) for one in trials]
+    np.testing.assert_equal(values, np.array(expected, dtype=float))
+    assert chart.x_label == "return (of 99)"
+    assert chart.groups[0].label == "00-before, fell at step 7"
+    assert displacement.x_label == "forward displacement, m"
+    said = headline(scored)
+    assert f"scored {score.before:.3f} of 99 (return) before the failure" in said
+    assert said.endswith("at best in 1 trial since, and fell, which is no recovery.")
 
 
 def test_logs_have_their_number_and_the_summary_and_no_truth(subject: Subject):

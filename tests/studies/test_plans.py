@@ -138,6 +138,8 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         (ablated, {"robots": ["a.xml", "./a.xml"], "cases": [9]}, "would have the same file names"),
         (ablated, {"only": (0, 1)}, r"only=\(2, 8\), got \(0, 1\)"),
         (bodies, {"cases": [11]}, "unknown case of these bodies '11'"),
+        (bodies, {"cases": []}, "at least one case or one damage"),
+        (bodies, {"damages": "jam:nose"}, "no body can have jam:nose: unknown part in the term"),
         (bodies, {"score": "retrn"}, "unknown score .retrn"),
         (bodies, {"comparator": "no-such"}, "unknown comparator"),
         (bodies, {"controller": "brain"}, "unknown kind of controller"),
@@ -158,9 +160,41 @@ def test_what_cannot_be_run_is_refused_before_anything_is(
     assert not (tmp_path / "out").exists()
 
 
-def test_cases_of_silent_neurons_are_of_controllers_with_neurons_that_could_fail(tmp_path: Path):
-    for controller, cases in (("network", [9, 10]), ("cpg", [9])):
-        assert values(bodies(tmp_path, cases=[9, 10], controller=controller), "case") == cases
+def test_a_failure_that_a_body_cannot_have_is_a_run_of_its_first_seed_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "biped.xml").write_text(BIPED)
+    one, same = "friction=0.4+jam:left_hip", "jam:left_hip+friction=0.40"
+    study = bodies(
+        tmp_path,
+        bodies=["quadruped", "biped.xml"],
+        cases=[1, 10],
+        damages=[one, same],
+        seeds=[3, 4],
+        controller="cpg",
+    )
+    reasons = {}
+    for cell in study.cells():
+        given = cell.parameters
+        reasons[given["robot"], given["case"], given["truth"], given["seed"]] = (
+            given.get("reason", ""),
+            len(cell.needs),
+        )
+
+    assert {key for key, (reason, _) in reasons.items() if not reason} == {
+        *(("quadruped", 1, "break:front_left_knee", seed) for seed in (3, 4)),
+        *(("biped.xml", None, one, seed) for seed in (3, 4)),
+    }
+    told = {key[:3]: reason for key, (reason, _) in reasons.items() if reason}
+    assert told.keys() == {
+        *(("quadruped", 10, ""), ("quadruped", None, one), ("quadruped", None, same)),
+        *(("biped.xml", 1, ""), ("biped.xml", 10, "")),
+    }
+    assert '"a lower leg breaks off" needs a limb of two joints' in told["biped.xml", 1, ""]
+    assert "for jam 'left_hip': the known ones are" in told["quadruped", None, one]
+    assert "neuron:0 does not apply to a CPG" in told["quadruped", 10, ""]
+    assert all(needs == (not reason) for reason, needs in reasons.values()), "no gait is evolved"
 
 
 def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(tmp_path: Path):

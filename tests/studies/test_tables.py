@@ -3,6 +3,7 @@
 import io
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pytest
 
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
-from selfmodel.studies import figures
+from selfmodel.studies import figures, tables as module
 from selfmodel.studies.comparisons import compare
 from selfmodel.studies.rows import KINDS, frame_of, outcomes_of
 from selfmodel.studies.statistics import Interval
@@ -19,6 +20,7 @@ from selfmodel.studies.tables import (
     ablation_scores,
     check_format,
     csv_bytes,
+    suite_results,
     suite_summaries,
     table_files,
     table_of,
@@ -54,13 +56,64 @@ def test_time_is_compared_on_the_runs_that_both_have():
 def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
     rows = [body(), body(1, before=-1.0, recovered=3.0, correct=False)]
     rows += [body(2, before=4.0, recovered=4.0, upright=False)]
-    case, single = suite_summaries(rows)
+    rows += [body(3, before=2.0, recovered=1.5, case=2, truth="break:y")]
+    rows += [body(4, case=None, truth="friction=0.4", displacement_after=None)]
+    none = {"robot": "b", "case": 1, "truth": "", "seed": 0, "reason": "no limb of two joints"}
+    rows += [dict.fromkeys(KINDS["suite"].columns) | none]
+    case, other, damage, single, lacking = suite_summaries(rows)
 
-    assert (case["case"], single["case"]) == (1, None)
+    keys = [(one["case"], one["truth"]) for one in (case, other, damage, single, lacking)]
+    assert keys == [(1, "break:x"), (2, "break:y"), (None, "friction=0.4"), (None, ""), (1, "")]
     assert (case["right"], case["runs"], case["upright"]) == (2, 3, 2)
     assert case["before"] == 2.0
-    assert case["recovery"] == 0.75  # of 0.5 and 1
+    assert case["recovery"] == 0.5, "a gait that went backwards and a robot that fell count nothing"
     assert case["correct"].low < 2 / 3 < case["correct"].high
+    assert single["runs"] == 4
+    assert single["recovery"] == 0.625
+    assert (lacking["runs"], lacking["correct"], lacking["recovery"]) == (0, None, None)
+    assert lacking["reason"] == "no limb of two joints"
+
+
+def test_the_table_of_bodies_says_score_steps_returns_falls_and_what_was_not_run(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    ends = {"return_before": 50.0, "return_after": 5.0, "return_recovered": 40.0}
+    found = {**ends, "return_most": 199, "control_steps": 200, "score": "return", "unit": ""}
+    found |= {"before": 50.0, "after": 5.0, "recovered": 40.0, "displacement_before": -1.0}
+    ours = body(robot="quadruped", **found | {"return_most": None})
+    rows = [body(**found), body(1, **found, upright=False), ours]
+    none = {"robot": "fish", "case": 1, "truth": "", "reason": "it has no limb of two joints"}
+    rows += [dict.fromkeys(KINDS["suite"].columns) | none]
+    tables = {None: rows, "trials": []}
+    monkeypatch.setattr(module, "study_rows", lambda _kind, _folder, table=None: tables[table])
+    results = suite_results(Path("unused"))
+    first, second = results.shown.shown.to_dict("records")
+
+    assert first["return before"] == "50.000 of 199"
+    assert first["return recovered"] == "40.000 of 199, 1 of 2 fell"
+    assert first["recovered ÷ before"] == "0.800"
+    assert first["displacements, m"] == "-1.000, -, -"
+    assert second["return recovered"] == "40.000", "speeds have no largest sum"
+    assert "The score is return, of trials of 200 control steps" in results.legend
+    assert "1,000 rewards of up to 1, of which these trials have 199" in results.legend
+    assert results.legend.endswith("Not run: fish, case 1: it has no limb of two joints")
+    assert results.tables[0].records["reason"].iloc[-1] == "it has no limb of two joints"
+    assert {"results.csv", "trials.csv", "figures/bodies.png"} < results.files.keys()
+
+
+def test_a_fall_is_a_cross_in_the_figure_of_bodies():
+    figure = figures.by_body([body(), body(1, upright=False), body(2, upright_after=False)])
+    drawn = {
+        (line.get_label(), line.get_marker()): len(line.get_xdata())
+        for line in figure.axes[0].lines
+        if not line.get_label().startswith("_child0")
+    }
+    crosses = sum(n for (label, marker), n in drawn.items() if marker == "x" and label != "fell")
+
+    assert [drawn[key] for key in drawn if key[0] in ("before", "after", "recovered")] == [3, 2, 2]
+    assert crosses == 2
+    assert ("fell", "x") in drawn
+    assert figure.axes[0].get_yticklabels()[0].get_text() == "a, break:x (n = 3)"
 
 
 def test_every_format_has_its_file():

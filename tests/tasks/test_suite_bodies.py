@@ -75,13 +75,14 @@ def test_the_environment_of_a_damaged_body_is_its_simulation_to_the_bit(name: st
 
 @pytest.mark.parametrize(("domain", "task"), FIRST)
 def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
-    robot = entry(suite_bodies.name(domain, task)).robot()
-    env = suite.load(domain, task)
+    own = entry(suite_bodies.name(domain, task))
+    robot, env = own.robot(), suite.load(domain, task)
 
     assert robot.control_timestep == pytest.approx(env.control_timestep(), rel=1e-12)
     assert float(robot.model.opt.timestep) == env.physics.timestep()
     assert env.action_spec().shape == (len(robot.anatomy.motors),)
-    assert round(env._step_limit) == 1000
+    assert own.episode_return is not None
+    assert round(env._step_limit) == own.episode_return.episode == own.episode_return.most(1001)
 
 
 @pytest.mark.parametrize(
