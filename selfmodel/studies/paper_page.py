@@ -22,6 +22,7 @@ from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, study_rows
 from selfmodel.studies.study import Row, grouped, shared_in
+from selfmodel.studies.style import files_of
 from selfmodel.studies.tables import Table, table_of
 from selfmodel.tasks import ROBOTS
 
@@ -174,7 +175,7 @@ def _files(results: PaperResults, every: Sequence[Table]) -> dict[str, bytes]:
     rows = {name: getattr(results, name) for name in ("recoveries", "trials", "evolution")}
     files: dict[str, bytes] = {}
     for name, figure in drawn.items():
-        files |= figures.files_of(name, figure)
+        files |= files_of(name, figure)
     files |= tables.table_files([*every, *(table_of(*item) for item in rows.items())], "csv")
     return {
         **files,

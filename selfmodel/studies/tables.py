@@ -19,7 +19,15 @@ from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
-from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
+from selfmodel.studies.rows import (
+    KINDS,
+    REFERENCE,
+    frame_of,
+    methods_of,
+    outcomes_of,
+    study_rows,
+    whole,
+)
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
 
@@ -28,26 +36,27 @@ SINGLE = (1, 2, 3, 5, 6)
 
 
 def ablation_scores(rows: Sequence[Row]) -> list[Row]:
-    """Returns the score of each comparator per robot, gap and number of trials, over all cases.
+    """Returns the score of each method per robot, gap and number of trials, over all cases.
 
     Returns:
-        ``robot``, ``gap``, ``comparator``, ``trials``; ``runs`` and ``right``, numbers of
-        diagnoses; ``correct``, their proportion with Wilson's interval; ``time``, the seconds over
-        those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery trial
-        over that before the failure. The last two are None without such runs.
+        ``robot``, ``gap``, ``comparator``, ``method``, ``trials``; ``runs`` and ``right``, numbers
+        of diagnoses; ``correct``, their proportion with Wilson's interval; ``time``, the seconds
+        over those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery
+        trial over that before the failure. The last two are None without such runs.
     """
-    names = ("robot", "gap", "comparator", "trials")
-    groups = grouped(rows, *names)
+    named = [{**row, "method": name} for row, name in zip(rows, methods_of(rows), strict=True)]
+    # Times are compared on the same search.
+    run = ("robot", "gap", "trials", "truth", "seed", "diagnostic_search")
+    reference = {
+        tuple(map(row.get, run)): row["seconds"] for row in rows if row["comparator"] == REFERENCE
+    }
+    names = ("robot", "gap", "comparator", "method", "trials")
     scores = []
-    for key, own in sorted(groups.items()):
-        reference = {
-            (row["truth"], row["seed"]): row["seconds"]
-            for row in groups.get((*key[:2], REFERENCE, key[3]), [])
-        }
+    for key, own in sorted(grouped(named, *names).items()):
         times = [
-            (row["seconds"], reference[run])
+            (row["seconds"], reference[one])
             for row in own
-            if (run := (row["truth"], row["seed"])) in reference
+            if (one := tuple(map(row.get, run))) in reference
         ]
         recoveries = [
             (row["recovered"], row["before"])
@@ -221,7 +230,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
         {
             "robot": one["robot"],
             "gap": f"{one['gap']:g}",
-            "comparator": one["comparator"],
+            "method": one["method"],
             "trials": str(one["trials"]),
             "right": f"{one['right']} of {one['runs']}",
             "right, %": _interval(one["correct"], 100, ".0f"),

@@ -14,7 +14,7 @@ ROWS = [
     diagnosis(name, case=case, truth=str(case), seed=seed, correct=name == "a")
     for name in "ab"
     for case in (1, 2, 3)
-    for seed in range(4)
+    for seed in range(6)
 ]
 
 
@@ -25,7 +25,7 @@ def write(folder: Path, rows: list[dict], name: str = "ablate") -> Path:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with the rows of two comparators: the first right in 12 runs, the second in none."""
+    """A folder with the rows of two comparators: the first right in 18 runs, the second in none."""
     return write(tmp_path, ROWS)
 
 
@@ -33,14 +33,14 @@ def test_pairs_are_printed_with_difference_interval_n_and_p(folder: Path):
     told = succeeds("compare", "rows.csv", "-o", "out", cwd=folder)
 
     assert "quadruped, 1 trial:" in told.stdout
-    assert "  a better than b: 1.000 (0.587 to 1.000), n 12, p 0.00049" in told.stdout
+    assert "  a better than b: XX" in told.stdout
     assert told.stderr == ""
     assert {path.name for path in (folder / "out").iterdir()} == {
         *("rows.csv", "marginal-means.csv", "comparisons.csv"),
         *(f"differences-quadruped.{suffix}" for suffix in ("png", "pdf", "svg")),
     }
     (row,) = csv.DictReader((folder / "out" / "comparisons.csv").read_text().splitlines())
-    assert (row["first"], row["n"], row["only_first"], row["better"]) == ("a", "12", "12", "a")
+    assert (row["first"], row["n"], row["only_first"], row["better"]) == ("a", "18", "18", "a")
     assert row["table"] == "quadruped, 1 trial"
 
 

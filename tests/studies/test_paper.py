@@ -80,7 +80,7 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     rows += [recovery(robot="hexapod", case=7, seed=1, distinct_hypotheses=51)]
     given = results(rows, trials([2.0, 0.0, 1.0, 3.0]), evolution([1.0]))
     monkeypatch.setattr(paper_page, "collect", lambda _folder: given)
-    monkeypatch.setattr(figures, "files_of", lambda name, _figure: {f"{name}.png": b""})
+    monkeypatch.setattr(paper_page, "files_of", lambda name, _figure: {f"{name}.png": b""})
     files = write_files(tmp_path, results_of(tmp_path).files)
     text = (tmp_path / "paper.md").read_text()
 
