@@ -74,6 +74,7 @@ class Study(Command):
     executor: str = "processes"
     scheduler: str | None = None
     table: str | None = None
+    style: str | None = None
 
     @property
     def settings(self) -> Settings:
@@ -346,6 +347,7 @@ class Compare(Command):
     study: Path
     out: Path | None = None
     table: str = "csv"
+    style: str | None = None
 
 
 def settings_of(options: Study | Recover, steps: int) -> Settings:

@@ -19,6 +19,7 @@ from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import paper_page, plans, tables as formats
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
+from selfmodel.studies.style import figure_style, read_style
 from selfmodel.tasks import ROBOTS
 
 PROCESSES, DASK = EXECUTORS = ("processes", "dask")
@@ -27,7 +28,6 @@ PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 
 def ablate(options: Ablate) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds."""
-    formats.check_format(options.table)
     cases = options.cases.strip()
     numbers = () if cases in ("all", "none") else inputs.whole_numbers("--case", cases, ())
     study = plans.ablation(
@@ -52,7 +52,6 @@ def ablate(options: Ablate) -> None:
 
 def run_suite(options: RunSuite) -> None:
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds."""
-    formats.check_format(options.table)
     names = inputs.texts("--domains", options.domains, plans.DOMAINS)
     wanted = (
         None
@@ -83,7 +82,6 @@ def run_suite(options: RunSuite) -> None:
 
 def paper(options: RepeatPaper) -> None:
     """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown."""
-    formats.check_format(options.table)
     study = plans.paper(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
@@ -97,8 +95,11 @@ def paper(options: RepeatPaper) -> None:
 
 def _run(study: Study, options: Options, results_of: Callable[[Path], formats.Results]) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
+    formats.check_format(options.table)
+    read_style(options.style)
     failed = _compute(study, options)
-    found = results_of(study.folder)
+    with figure_style(options.style):
+        found = results_of(study.folder)
     files = dict(found.files)
     if options.table is not None:
         content = formats.table_files(found.tables, options.table)

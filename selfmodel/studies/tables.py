@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +31,7 @@ from selfmodel.studies.rows import (
 )
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
+from selfmodel.studies.style import figure_style
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
@@ -189,13 +191,14 @@ class Results:
     notes: Sequence[str] = field(default=())
 
 
-def ablation_results(folder: Path) -> Results:
-    """Returns the results of an ablation, with its figures."""
+def ablation_results(folder: Path, style: str | Path | None = None) -> Results:
+    """Returns the results of an ablation, with its figures in a style; see ``figure_style``."""
     rows = study_rows("ablate", folder)
     scores = ablation_scores(rows)
     counts = {one["trials"] for one in scores}
     shown = [one for one in scores if one["trials"] in (min(counts), max(counts))]
-    drawn = figures.of_ablation(rows, scores)
+    with figure_style(style):
+        drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
     return Results(
@@ -289,10 +292,15 @@ def markdown_of(table: Table) -> str:
 
 def _latex(table: Table) -> bytes:
     sides = "l" * table.texts + "r" * (len(table.shown.columns) - table.texts)
-    text = table.shown.style.hide(axis="index").format(escape="latex")
+    text = table.shown.style.hide(axis="index").format(_mathematical, escape="latex")
     text = text.format_index(escape="latex", axis="columns")
     latex: str = text.to_latex(column_format=sides, hrules=True)
     return latex.encode()
+
+
+def _mathematical(text: str) -> str:
+    """Returns an escaped text with signs that LaTeX's text fonts lack, or show as a hyphen."""
+    return re.sub(r"<|(?<![\w])-(?=[\d.])", lambda sign: f"${sign[0]}$", text)
 
 
 def _parquet(table: Table) -> bytes:
@@ -316,6 +324,9 @@ FORMATS: Mapping[str, tuple[str, Callable[[Table], bytes]]] = MappingProxyType(
 )
 """Suffix and writer by the name of a format. CSV and Parquet files have the records, LaTeX (with
 the package booktabs) and Markdown the rows for readers."""
+
+FOR_READERS = ("latex", "markdown")
+"""Formats of tables for readers, which have no table of all rows."""
 
 
 def check_format(wanted: str | None) -> None:
