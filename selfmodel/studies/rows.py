@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
@@ -213,13 +213,7 @@ def load(path: str | Path) -> LoadedStudy:
         rows = frame_of(study_rows(name, place), KINDS[name].columns)
     else:
         rows = _rows_of_file(place)
-        columns = set(rows.columns)
-        fitting = (
-            name
-            for name, kind in KINDS.items()
-            if set(kind.columns) - set(kind.may_lack.split()) <= columns <= set(kind.columns)
-        )
-        if not (name := next(fitting, "")):
+        if not (name := kind_of(rows.columns)):
             raise InputError(
                 f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
                 f"{', '.join(map(str, rows.columns))[:300]}"
@@ -237,6 +231,17 @@ def load(path: str | Path) -> LoadedStudy:
         return LoadedStudy(name, place, rows, outcomes_of(name, rows))
     except (TypeError, ValueError) as error:
         raise InputError(f"{place}: expected the rows of a study by {name}, got {error}") from error
+
+
+def kind_of(columns: Collection[str]) -> str:
+    """Returns the kind of study whose rows have these columns; an empty text if none has."""
+    given = set(columns)
+    fitting = (
+        name
+        for name, kind in KINDS.items()
+        if set(kind.columns) - set(kind.may_lack.split()) <= given <= set(kind.columns)
+    )
+    return next(fitting, "")
 
 
 def _rows_of_file(path: Path) -> pd.DataFrame:
