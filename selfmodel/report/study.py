@@ -98,7 +98,7 @@ def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | 
     """
     named = [{**row, "method": name} for row, name in zip(rows, methods_in(rows), strict=True)]
     split = [name for name in ("robot", "trials") if len({row.get(name) for row in named}) > 1]
-    groups = grouped(named, *split, "method")
+    groups = dict(sorted(grouped(named, *split, "method").items(), key=_order))
     items: list[IntervalChart | Table] = []
     if by_method and len(groups) > 1:
         found = tuple(_share(", ".join(map(str, key)), own) for key, own in groups.items())
@@ -118,7 +118,7 @@ def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | 
                 for key, own in groups.items()
             ]
             items.append(Table.of(f"Right diagnoses by {factor}", records))
-    text = "Right diagnoses of all that a method has: a row is a method, a column a case or a gap."
+    text = "Right of all diagnoses of a method: each row is a method, each column a case or a gap."
     return Section("shares", "Right diagnoses", (text,), tuple(items)) if items else None
 
 
@@ -136,12 +136,16 @@ def _value(row: Mapping[str, Cell], factor: str) -> str:
 
 
 def _count(rows: Sequence[Mapping[str, Cell]]) -> str | None:
-    return f"{sum(bool(row[CORRECT]) for row in rows)} of {len(rows)}" if rows else None
+    return f"{sum(bool(row[CORRECT]) for row in rows)}/{len(rows)}" if rows else None
 
 
 def _share(name: str, rows: Sequence[Mapping[str, Cell]]) -> Estimate:
     share = proportion(sum(bool(row[CORRECT]) for row in rows), len(rows))
     return Estimate(f"{name} (n = {len(rows)})", share.estimate, share.low, share.high)
+
+
+def _order(group: tuple[tuple[Cell, ...], object]) -> list[tuple[float, str]]:
+    return [_numbers_first(str(value)) for value in group[0]]
 
 
 def _numbers_first(name: str) -> tuple[float, str]:

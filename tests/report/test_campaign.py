@@ -63,7 +63,7 @@ def test_right_diagnoses_are_shown_by_method_case_and_gap_and_never_pooled(folde
     assert shares == [("a (n = 2)", 1.0), ("b (n = 1)", 0.0)]
     by_gap = tables["Right diagnoses by gap"]
     assert by_gap.columns == ("method", "0.0", "0.1")
-    assert by_gap.rows == (("a", "1 of 1", "1 of 1"), ("b", None, "0 of 1"))
+    assert by_gap.rows == (("a", "1/1", "1/1"), ("b", None, "0/1"))
     (folder / "results.csv").write_text("robot,correct\na,true\na,false\n")
     alone = report_of_campaign(folder).headline
     assert alone == "1 of 2 diagnoses are right: 50.0% (95 % interval 9.5% to 90.5%)."
@@ -98,7 +98,7 @@ def test_a_study_of_comparators_begins_with_its_paired_comparisons_of_each_robot
     assert [one.label for one in methods.items[0].estimates] == ["A (n = 12)", "b (n = 12)"]
     (table,) = shares.items
     assert table.columns == ("robot", "method", "1", "2")
-    assert table.rows[0] == ("ant", "A", "6 of 6", "6 of 6")
+    assert table.rows[0] == ("ant", "A", "6/6", "6/6")
 
 
 def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_path: Path):
