@@ -97,19 +97,20 @@ def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | 
         by_method: Whether they are charted by method alone too, where no comparison is.
     """
     named = [{**row, "method": name} for row, name in zip(rows, methods_in(rows), strict=True)]
-    split = [name for name in ("robot", "trials") if len({row.get(name) for row in named}) > 1]
-    groups = dict(sorted(grouped(named, *split, "method").items(), key=_order))
+    names = ("robot", "trials", "method")
+    split = [name for name in names if len({row.get(name) for row in named}) > 1] or ["method"]
+    groups = dict(sorted(grouped(named, *split).items(), key=_order))
     items: list[IntervalChart | Table] = []
     if by_method and len(groups) > 1:
         found = tuple(_share(", ".join(map(str, key)), own) for key, own in groups.items())
-        title = "Share of right diagnoses by method, with 95 % intervals"
+        title = f"Share of right diagnoses by {' and '.join(split)}, with 95 % intervals"
         items.append(IntervalChart(title, "share of right diagnoses", found, limits=(0.0, 1.0)))
     for factor in ("case", "gap"):
         values = sorted({_value(row, factor) for row in named}, key=_numbers_first)
         if len(values) > 1:
             records = [
                 {
-                    **dict(zip((*split, "method"), key, strict=True)),
+                    **dict(zip(split, key, strict=True)),
                     **{
                         value: _count([row for row in own if _value(row, factor) == value])
                         for value in values
@@ -118,7 +119,7 @@ def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | 
                 for key, own in groups.items()
             ]
             items.append(Table.of(f"Right diagnoses by {factor}", records))
-    text = "Right of all diagnoses of a method: each row is a method, each column a case or a gap."
+    text = "Right of all diagnoses; methods are apart. A column of a table is a case or a gap."
     return Section("shares", "Right diagnoses", (text,), tuple(items)) if items else None
 
 
@@ -162,13 +163,16 @@ def recovered(rows: Sequence[Row]) -> tuple[str, list[Section]]:
     runs = [row for row in rows if None not in (row["before"], row["recovered"])]
     robots = counted(len({row["robot"] for row in runs}), "robot")
     headline = f"{counted(len(runs), 'run')} of {robots} with a failure"
-    if walked := [row for row in runs if row["before"] > 0]:
-        after, best = (
-            median(row[name] / row["before"] for row in walked) for name in ("after", "recovered")
-        )
-        headline += f": a median of {after:.0%} of the score remains, and {best:.0%} is recovered"
+    walked = [row for row in runs if row["before"] > 0]
+    stayed = [row for row in walked if row.get("upright") is not False]  # a fall is no recovery
+    if walked:
+        after = median(row["after"] / row["before"] for row in walked)
+        headline += f": a median of {after:.0%} of the score remains"
+    if stayed:
+        best = median(row["recovered"] / row["before"] for row in stayed)
+        headline += f", {best:.0%} is recovered"
     if falls := sum(row.get("upright") is False for row in runs):
-        headline += f"; {falls} of the best trials fell"
+        headline += f"; in {falls} the best trial fell, which is not recovered"
     scores = grouped([{"score": None, "unit": None, **row} for row in runs], "score", "unit")
     charts = tuple(
         BarChart(
