@@ -87,7 +87,7 @@ def main() -> None:
         "of these, of the edited plug-in": len(edited),
         "computed by Dask": len(computed),
         "told": [line for line in told.splitlines() if "earlier" in line],
-        "names": sorted({row["compared_by"] for row in rows_in(study, "diagnoses")}),
+        "names": sorted({row["comparator_name"] for row in rows_in(study, "diagnoses")}),
         "rows": len(tables[0].splitlines()) - 1,
     }
     checks = {

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.foreign.scoring import calibration_error, row_of
-from selfmodel.studies.figures import COLOURS, REFERENCE, figure_style
 from selfmodel.studies.statistics import proportion
+from selfmodel.studies.style import COLOURS, REFERENCE, figure_style
 
 
 @figure_style()

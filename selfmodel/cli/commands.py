@@ -66,6 +66,7 @@ class Computed(Command):
     executor: str = "processes"
     scheduler: str | None = None
     table: str | None = None
+    style: str | None = None
 
 
 class Study(Computed):
@@ -367,6 +368,7 @@ class Compare(Command):
     study: Path
     out: Path | None = None
     table: str = "csv"
+    style: str | None = None
 
 
 class Check(Command):

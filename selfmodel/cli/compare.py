@@ -11,9 +11,10 @@ from selfmodel.cli.tables import show
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
 from selfmodel.studies import figures, tables as formats
-from selfmodel.studies.comparisons import LEVEL
+from selfmodel.studies.comparisons import p_text
 from selfmodel.studies.rows import LoadedStudy, load, whole
 from selfmodel.studies.study import Row
+from selfmodel.studies.style import figure_style, read_style
 
 COMPARISON = "comparison"
 """Folder of the files, in the folder of a study."""
@@ -22,6 +23,7 @@ COMPARISON = "comparison"
 def compare(options: Compare) -> None:
     """Compare the methods of a study by pairs: tests, intervals, marginal means, figures."""
     formats.check_format(options.table)
+    read_style(options.style)
     if options.out is None and not options.study.is_dir():
         raise InputError(
             f"{options.study} is no folder of a study: give the folder of the tables, -o DIR"
@@ -30,11 +32,12 @@ def compare(options: Compare) -> None:
     pairs, means = found.comparisons(), found.marginal_means()
     pair_rows, mean_rows = _records(pairs), _records(means)
     tables = [
-        formats.table_of("rows", found.rows),
+        *([] if options.table in formats.FOR_READERS else [formats.table_of("rows", found.rows)]),
         formats.table_of("marginal-means", means, list(map(_mean_texts, mean_rows)), texts=2),
-        formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), texts=3),
+        formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), texts=2),
     ]
-    content = formats.table_files(tables, options.table) | figures.of_comparisons(pairs)
+    with figure_style(options.style):
+        content = formats.table_files(tables, options.table) | figures.of_comparisons(pairs)
     if options.out is None:  # within the study, where no linked folder is written to
         content = {f"{COMPARISON}/{name}": data for name, data in content.items()}
     files = list(map(str, formats.write_files(options.out or options.study, content)))
@@ -73,8 +76,9 @@ def _print_comparison(study: LoadedStudy, found: list[Row], means: pd.DataFrame)
     print_lines(
         "Means are over the cells that all methods have. Differences are on the n runs that both "
         "methods have, with 95 % intervals over seeds. p: the larger of a test over runs (exact "
-        "McNemar, or sign flips) and one over seeds (Student's), corrected for the number of pairs "
-        "(Holm). Better: p below 0.05."
+        "McNemar, or sign flips) and one over seeds (Student's; of fewer than four seeds, or of "
+        "seeds without variance, exact sign flips, whose p is 2 / 2^seeds at least), corrected for "
+        "the number of pairs (Holm). Better: p below 0.05."
     )
 
 
@@ -82,27 +86,24 @@ def _pair_line(one: Row) -> str:
     pair = f"{one['first']} or {one['second']}, not decided"
     if one["better"]:
         pair = f"{one['first']} better than {one['second']}"
-    return f"  {pair}: {_ends(one, 'difference')}, n {one['n']}, p {_p(one['p_holm'])}"
+    return f"  {pair}: {_ends(one, 'difference')}, n {one['n']}, p {p_text(one['p_holm'])}"
 
 
 def _mean_texts(one: Row) -> dict[str, str]:
-    counts = {name: str(one[name]) for name in ("n", "seeds", "cells")}
+    counts = {name: str(one[name]) for name in ("n", "seeds")}
     named = {"table": one["table"], "method": one["method"]}
     return {**named, **counts, "mean (95 %)": _ends(one, "mean")}
 
 
 def _pair_texts(one: Row) -> dict[str, str]:
+    """Returns the columns of a pair for a paper; the files of records have all."""
+    better = "*" if one["better"] else ""
     return {
-        **{name: one[name] for name in ("table", "first", "second")},
-        **{name: str(one[name]) for name in ("n", "seeds")},
+        "table": one["table"],
+        "comparison": f"{one['first']} vs. {one['second']}",
         "difference (95 %)": _ends(one, "difference"),
-        "only first": str(one["only_first"]),
-        "only second": str(one["only_second"]),
-        "p, runs": _p(one["p_runs"]),
-        "p, runs, Holm": _p(one["p_runs_holm"]),
-        "p, seeds": _p(one["p_seeds"]),
-        "p, Holm": _p(one["p_holm"]),
-        "better": one["better"] or "-",
+        "n": str(one["n"]),
+        "p": f"{p_text(one['p_holm'])}{better}",
     }
 
 
@@ -112,15 +113,3 @@ def _ends(one: Row, name: str) -> str:
     if low is None or high is None:
         return f"{one[name]:.3f} (-)"
     return f"{one[name]:.3f} ({low:.3f} to {high:.3f})"
-
-
-def _p(p: float) -> str:
-    """Returns a p value as text; very small ones as a bound.
-
-    It has two digits, or as many as are necessary to distinguish it from the level: 0.0496 is not
-    0.05.
-    """
-    if p < 0.0001:
-        return "< 0.0001"
-    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
-    return next(text for text in texts if (float(text) < LEVEL) == (p < LEVEL))

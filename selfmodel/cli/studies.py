@@ -29,6 +29,7 @@ from selfmodel.studies import paper_page, plans, tables as formats
 from selfmodel.studies.definition import read_study
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
+from selfmodel.studies.style import figure_style, read_style
 from selfmodel.tasks import ROBOTS
 from selfmodel.tasks.suite_bodies import EPISODE
 
@@ -45,7 +46,6 @@ PROCESSES, DASK = EXECUTORS = ("processes", "dask")
 
 def ablate(options: Ablate) -> None:
     """Compare comparators on the same trials: robots x cases x gaps x seeds."""
-    formats.check_format(options.table)
     is_every = options.cases.strip() == "all"
     study = plans.ablation(
         options.out,
@@ -70,7 +70,6 @@ def ablate(options: Ablate) -> None:
 
 def run_suite(options: RunSuite) -> None:
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds."""
-    formats.check_format(options.table)
     names = inputs.texts("--domains", options.domains, plans.DOMAINS)
     wanted = (
         None
@@ -104,7 +103,6 @@ def run_suite(options: RunSuite) -> None:
 
 def paper(options: RepeatPaper) -> None:
     """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown."""
-    formats.check_format(options.table)
     study = plans.paper(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
@@ -133,8 +131,11 @@ def _damages(options: Ablate | RunSuite) -> list[str]:
 
 def _run(study: Study, options: Computed) -> None:
     """Runs a study, writes and prints its results, and ends the command."""
+    formats.check_format(options.table)
+    read_style(options.style)
     failed = _compute(study, options)
-    found = RESULTS[study.name](study.folder)
+    with figure_style(options.style):
+        found = RESULTS[study.name](study.folder)
     files = dict(found.files)
     if options.table is not None:
         content = formats.table_files(found.tables, options.table)

@@ -14,10 +14,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, counted
 from selfmodel.files import check_regular, encodable, read_file
 from selfmodel.logs.results import parse_json
-from selfmodel.report.charts import Cell, Estimate, IntervalChart, Picture, Report, Section, Table
+from selfmodel.report.charts import Cell, Picture, Report, Section, Table
+from selfmodel.report.study import CORRECT, compared, methods_in, recovered, shares
+from selfmodel.studies.rows import kind_of, load
 from selfmodel.studies.statistics import proportion
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
@@ -37,12 +40,6 @@ MAX_INTEGER = 2**53 - 1
 NUMBER = re.compile(r"[+-]?((0|[1-9][0-9]*)(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf)")
 """A number; not 007, nor 1_000, which Python reads as one: they are names."""
 
-CORRECT = "correct"
-"""Column of the rows of a study: whether a diagnosis is right."""
-
-FACTORS = ("comparator", "method", "robot", "case", "gap", "trials")
-"""Columns by which the share of right diagnoses is shown."""
-
 Record = Mapping[str, Cell]
 """A row of a table: cells by the name of their column."""
 
@@ -60,65 +57,51 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
             f"{folder}: expected the folder of a run with its trials and diagnoses.json, or of a "
             f"campaign with a table such as results.csv, got neither"
         )
-    scored = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
-    rows = next(filter(None, scored), [])
     every = {**other_lists(folder), **tables}
     shown = tuple(Table.of(encodable(name), records) for name, records in every.items())
+    headline, verdict, found = _findings(folder, tables)
     sections = [
-        _shares(rows) if rows else None,
+        *found,
         Section("tables", "Tables", ("A heading sorts its table by that column.",), shown),
         _figures(folder, most_figures),
     ]
+    counts = ", ".join(
+        f"{counted(len(records), 'row')} in {encodable(name)}" for name, records in tables.items()
+    )
     return Report(
         title=f"campaign: {encodable(folder.resolve().name)}",
-        headline=_headline(tables, rows),
+        headline=headline or f"The campaign has {counts}.",
+        verdict=(*verdict, f"Tables: {counts}.") if headline else (),
         sections=tuple(section for section in sections if section is not None),
     )
 
 
-def _headline(tables: Mapping[str, Sequence[Record]], rows: Sequence[Record]) -> str:
-    """Returns what the campaign has; ``rows`` are those with a judged diagnosis."""
-    counts = ", ".join(
-        f"{counted(len(records), 'row')} in {encodable(name)}" for name, records in tables.items()
-    )
+def _findings(
+    folder: Path, tables: Mapping[str, Sequence[Record]]
+) -> tuple[str, tuple[str, ...], list[Section | None]]:
+    """Returns headline, further sentences and sections of what the tables of a campaign show."""
+    judged = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
+    rows = next(filter(None, judged), [])
+    names = (name for name, one in tables.items() if kind_of({key for row in one for key in row}))
+    study = load(folder / name) if (name := next(names, "")) else None
+    if study is not None and study.kind == "suite":
+        headline, sections = recovered(to_json(study.rows.to_dict("records")))
+        return headline, (), [*sections, shares(rows, by_method=True)]
+    if study is not None and study.outcomes["method"].nunique() > 1:
+        headline, best, sections = compared(study)
+        return headline, best, [*sections, shares(rows, by_method=False)]
     if not rows:
-        return f"The campaign has {counts}."
-    right = sum(bool(row[CORRECT]) for row in rows)
-    share = proportion(right, len(rows))
-    return (
-        f"{right} of {len(rows)} diagnoses are right: {share.estimate:.1%} (95 % interval "
-        f"{share.low:.1%} to {share.high:.1%}). Tables: {counts}."
-    )
-
-
-def _shares(rows: Sequence[Record]) -> Section:
-    charts = []
-    for factor in FACTORS:
-        groups: dict[str, list[bool]] = {}
-        for row in (row for row in rows if factor in row):
-            groups.setdefault(str(row[factor]), []).append(bool(row[CORRECT]))
-        if len(groups) > 1:
-            title = f"Share of right diagnoses by {factor}, with 95 % intervals"
-            found = tuple(_share(name, groups[name]) for name in sorted(groups, key=_numbers_first))
-            charts.append(
-                IntervalChart(title, "share of right diagnoses", found, limits=(0.0, 1.0))
-            )
-    text = "Marginal shares: cells of a campaign that is not finished are not balanced."
-    return Section("shares", "Right diagnoses", (text,), tuple(charts))
-
-
-def _share(name: str, right: Sequence[bool]) -> Estimate:
-    share = proportion(sum(right), len(right))
-    return Estimate(f"{name} (n = {len(right)})", share.estimate, share.low, share.high)
-
-
-def _numbers_first(name: str) -> tuple[float, str]:
-    """Sort key of names, of which some are numbers."""
-    try:
-        value = float(name)
-    except ValueError:
-        return math.inf, name
-    return (math.inf if math.isnan(value) else value), name
+        return "", (), []
+    methods = dict.fromkeys(methods_in(rows))
+    headline = f"{counted(len(rows), 'row')} of {counted(len(methods), 'method')}."
+    if len(methods) == 1:
+        right = sum(bool(row[CORRECT]) for row in rows)
+        share = proportion(right, len(rows))
+        headline = (
+            f"{right} of {len(rows)} diagnoses are right: {share.estimate:.1%} (95 % interval "
+            f"{share.low:.1%} to {share.high:.1%})."
+        )
+    return headline, (), [shares(rows, by_method=True)]
 
 
 def _figures(folder: Path, most: int) -> Section | None:

@@ -62,10 +62,14 @@ class LineChart(Item, frozen=True, tag="line"):
 
 
 class Group(msgspec.Struct, frozen=True):
-    """Values with one label, NaN where unknown: bars, or a row of a heat map."""
+    """Values with one label, NaN where unknown: bars, or a row of a heat map.
+
+    A bar with a note, such as ``fell in 1 of 3``, is hatched.
+    """
 
     label: str
     values: Numbers
+    notes: tuple[str, ...] = ()
 
 
 class BarChart(Item, frozen=True, tag="bars"):
@@ -87,7 +91,10 @@ class Estimate(msgspec.Struct, frozen=True):
 
 
 class IntervalChart(Item, frozen=True, tag="intervals"):
-    """Values with intervals, one below the other, with a marked value and ends of the axis."""
+    """Values with intervals, one below the other, with a marked value and ends of the axis.
+
+    An end is NaN without an interval.
+    """
 
     x_label: str
     estimates: tuple[Estimate, ...]

@@ -47,9 +47,9 @@ def compare(outcomes: pd.DataFrame) -> pd.DataFrame:
         mean over these runs, with the ends of its interval over seeds, ``difference_low`` and
         ``difference_high``; ``only_first`` and ``only_second``, the numbers of runs in which one is
         larger; ``p_runs``, of the exact McNemar test for a share, of the sign-flip test for
-        numbers, and ``p_runs_holm``; ``p_seeds``, of Student's paired test over the means of the
-        seeds; ``p_holm``, the larger of both, corrected; ``better``, the first method if that is
-        below ``LEVEL``, else None.
+        numbers, and ``p_runs_holm``; ``p_seeds``, of ``statistics.seed_test``; ``p_holm``, the
+        larger of both, corrected; ``better``, the first method if that is below ``LEVEL``, else
+        None.
 
     Raises:
         InputError: A value is not finite, or no 0 or 1 in a share; a method has two outcomes of one
@@ -127,6 +127,18 @@ def balance_warnings(outcomes: pd.DataFrame) -> tuple[str, ...]:
         f"differences, not means of all runs; marginal means balance the cells, and not the seeds"
         for numbers, names in tables.items()
     )
+
+
+def p_text(p: float) -> str:
+    """Returns a p value as text; very small ones as a bound.
+
+    It has two digits, or as many as are necessary to distinguish it from the level: 0.0496 is not
+    0.05.
+    """
+    if p < 0.0001:
+        return "< 0.0001"
+    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
+    return next(text for text in texts if (float(text) < LEVEL) == (p < LEVEL))
 
 
 def ends(name: str, interval: Interval) -> dict[str, float]:

@@ -1,14 +1,10 @@
 """Figures of studies, with numbers of runs in them, in the style of one file: PNG, PDF and SVG."""
 
-import io
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import mujoco
 import numpy as np
 import pandas as pd
@@ -21,25 +17,23 @@ from selfmodel.errors import counted
 from selfmodel.plugins import RETURN
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
-from selfmodel.studies.rows import failure_of, whole
+from selfmodel.studies.rows import failure_of, methods_of, whole
 from selfmodel.studies.study import Row, grouped
-
-STYLE = Path(__file__).with_name("figures.mplstyle")
-"""Style file of matplotlib: ``matplotlib.style.use(STYLE)`` draws other figures alike."""
-
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#333333")
-"""Colours of methods, distinguishable with colour blindness.
-
-Source: M. Okabe and K. Ito, *Color Universal Design* (2008).
-"""
-
-MARKERS = "osD^v<P*"
-"""Markers of methods, one more than colours, so that no pair recurs soon."""
-
-Style = dict[str, Any]
-"""Arguments of matplotlib."""
-
-REFERENCE: Style = {"color": "0.35", "linestyle": "--", "linewidth": 1.0}
+from selfmodel.studies.style import (
+    COLOURS,
+    REFERENCE,
+    Style,
+    errorbars,
+    figure_style,
+    files_of,
+    folded,
+    given_width,
+    legend_below,
+    look,
+    panels_of,
+    row_label,
+    text_size,
+)
 
 SLOT = 0.8
 """Width of all lines of one case in Figure 5; the distance between two cases is 1."""
@@ -52,29 +46,12 @@ TURNS = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
 
-@contextmanager
-def figure_style() -> Iterator[None]:
-    """Context manager in which figures are made and written with the style of ``STYLE``."""
-    with mpl.rc_context(fname=STYLE):
-        yield
-
-
-@figure_style()
-def files_of(name: str, figure: Figure) -> dict[str, bytes]:
-    """Returns a figure as PNG, PDF and SVG of a name, the same bytes in every call."""
-    files = {}
-    for suffix, date in (("png", None), ("pdf", "CreationDate"), ("svg", "Date")):
-        data = io.BytesIO()
-        figure.savefig(data, format=suffix, metadata={date: None} if date else None)
-        files[f"{name}.{suffix}"] = data.getvalue()
-    return files
-
-
 def of_ablation(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
     """Returns the files of the figures of an ablation by their name; none without rows."""
     files = files_of("gap", by_gap(scores)) if rows else {}
     ends = _first_and_last(rows)
-    for (robot, trials), same in sorted(grouped(rows, "robot", "trials").items()):
+    named = [{**row, "method": name} for row, name in zip(rows, methods_of(rows), strict=True)]
+    for (robot, trials), same in sorted(grouped(named, "robot", "trials").items()):
         if trials in ends:
             name = f"cases-{robot_key(robot)}-{trials}"
             files |= files_of(name, by_case(robot, trials, same))
@@ -83,21 +60,23 @@ def of_ablation(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
 
 @figure_style()
 def by_gap(scores: Sequence[Row]) -> Figure:
-    """Returns right diagnoses by gap: a panel per robot and trial count, a line per comparator.
+    """Returns right diagnoses by gap: a panel per robot and trial count, a line per method.
 
     The legend has the number n of diagnoses per point of each line.
     """
-    robots, gaps, comparators = (
-        sorted({score[name] for score in scores}) for name in ("robot", "gap", "comparator")
+    robots, gaps, methods = (
+        sorted({score[name] for score in scores}) for name in ("robot", "gap", "method")
     )
     ends = _first_and_last(scores)
     counts = len(robots) * len(ends), len(ends)
-    figure, panels = _panels(*counts, size=(4.2, 3.2), margin=(1, 0.8), share=True)
+    figure, panels = panels_of(
+        *counts, size=(4.2, 2.4 if given_width() else 3.2), margin=(1, 0.8), share=True
+    )
     spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
     for axes, (robot, trials) in zip(panels, itertools.product(robots, ends), strict=True):
-        for number, name in enumerate(comparators):  # the same look in panels without all of them
-            own = [one for one in scores if one["comparator"] == name]
-            shift = spread * (number - (len(comparators) - 1) / 2)
+        for number, name in enumerate(methods):  # the same look in panels without all of them
+            own = [one for one in scores if one["method"] == name]
+            shift = spread * (number - (len(methods) - 1) / 2)
             points = [
                 (one["gap"] + shift, share.estimate, share.low, share.high)
                 for one in own
@@ -106,47 +85,48 @@ def by_gap(scores: Sequence[Row]) -> Figure:
             ]
             if points:
                 label = f"{name} ({counts_text(one['runs'] for one in own)})"
-                _errorbars(axes, points, number, label=label)
+                errorbars(axes, points, number, label=label)
         axes.set(title=f"{robot}, {counted(trials, 'trial')}", ylim=(-0.03, 1.03), xticks=gaps)
         axes.grid(axis="y")
-    for axes in panels[-len(ends) :]:
-        axes.set_xlabel("reality gap")
+    for axes in panels:
+        if (place := axes.get_subplotspec()) and place.is_last_row():
+            axes.set_xlabel("reality gap")
     figure.supylabel("right diagnoses (95 % interval)")
-    _legend(figure, columns=min(2, len(comparators)))
+    legend_below(figure, columns=min(2, len(methods)))
     return figure
 
 
 @figure_style()
 def by_case(robot: str, trials: int, rows: Sequence[Row]) -> Figure:
-    """Returns right diagnoses by case and comparator, a panel per gap.
+    """Returns right diagnoses by case and method, a panel per gap.
 
-    The name of a comparator has the number n of diagnoses per square of its row.
+    The name of a method has the number n of diagnoses per square of its row.
     """
     frame = pd.DataFrame(rows)
+    frame["method"] = frame["method"] if "method" in frame else methods_of(rows)
     frame["failure"] = [failure_of(row["case"], row["truth"]) for row in rows]
-    gaps, cases, comparators = (
-        sorted(frame[name].unique()) for name in ("gap", "failure", "comparator")
-    )
-    squares = frame.groupby(["gap", "comparator", "failure"])["correct"]
-    counts = squares.size().groupby("comparator")
-    labels = [f"{name} ({counts_text(counts.get_group(name))})" for name in comparators]
-    figure, panels = _panels(
+    gaps, cases, methods = (sorted(frame[name].unique()) for name in ("gap", "failure", "method"))
+    squares = frame.groupby(["gap", "method", "failure"])["correct"]
+    counts = squares.size().groupby("method")
+    labels = [row_label(name, f"({counts_text(counts.get_group(name))})") for name in methods]
+    figure, panels = panels_of(
         len(gaps),
-        size=(0.4 + 0.42 * len(cases), 0.8 + 0.36 * len(comparators)),
+        size=(0.4 + 0.42 * len(cases), 0.8 + 0.36 * len(methods)),
         margin=(1.2 + 0.09 * max(map(len, labels)), 0.6),
         share="y",
     )
     for axes, gap in zip(panels, gaps, strict=True):
         shares = squares.mean()[gap].unstack()  # noqa: PD010  # nothing to aggregate
-        values = shares.reindex(index=comparators, columns=cases).to_numpy(dtype=float)
-        axes.imshow(values, vmin=0, vmax=1, cmap="viridis", aspect="auto")
+        values = shares.reindex(index=methods, columns=cases).to_numpy(dtype=float)
+        axes.imshow(values, vmin=0, vmax=1, aspect="auto")
         for (i, j), share in np.ndenumerate(values):
             if not math.isnan(share):
                 colour = "white" if share < 0.5 else "black"
-                style: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": colour}
+                style: Style = {"ha": "center", "va": "center", "color": colour}
+                style["fontsize"] = text_size(0.7)
                 axes.text(j, i, f"{100 * share:.0f}", **style)
         axes.set_xticks(range(len(cases)), cases)
-        axes.set_yticks(range(len(comparators)), labels)
+        axes.set_yticks(range(len(methods)), labels)
         axes.spines[:].set_visible(False)
         axes.set(title=f"gap {gap:g}", xlabel="case")
     figure.suptitle(f"{robot}, {counted(trials, 'trial')}: right diagnoses, %")
@@ -168,7 +148,7 @@ def by_body(rows: Sequence[Row]) -> Figure:
     places = list(grouped(rows, "robot", "case", "truth").items())
     labels = [f"{robot}, {truth} ({counts_text([len(own)])})" for (robot, _, truth), own in places]
     size = (3.7 + 0.068 * max(map(len, labels)), 0.5 + 0.36 * len(places))
-    figure, (axes,) = _panels(1, 1, size=size, margin=(0.4, 0.8), share=False)
+    figure, (axes,) = panels_of(1, 1, size=size, margin=(0.4, 0.8), share=False)
     ends = ("before", "upright_before"), ("after", "upright_after"), ("recovered", "upright")
     for number, (end, upright) in enumerate(ends):
         values: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
@@ -185,7 +165,7 @@ def by_body(rows: Sequence[Row]) -> Figure:
     if any(row.get(upright) is False for row in rows for _, upright in ends):
         axes.plot([], [], color="0.3", marker="x", linestyle="none", label="fell")
     axes.axvline(0, color="0.3", linewidth=0.8)
-    axes.set_yticks(range(len(places)), labels, fontsize=8)
+    axes.set_yticks(range(len(places)), labels, fontsize=text_size(0.8))
     axes.set(ylim=(len(places) - 0.5, -0.5))
     score, unit = rows[0].get("score") or "score", rows[0].get("unit") or ""
     limits = {row.get("return_most") if score == RETURN else None for row in rows}
@@ -193,7 +173,7 @@ def by_body(rows: Sequence[Row]) -> Figure:
     limit = f" (of {most:,})" if most else ""
     axes.set_xlabel(f"{score}{limit}, {unit}".rstrip(", "))
     axes.grid(axis="x")
-    _legend(figure, columns=4)
+    legend_below(figure, columns=4)
     return figure
 
 
@@ -216,31 +196,32 @@ def paired_differences(comparisons: pd.DataFrame) -> Figure:
     """
     tables = comparisons.sort_values("difference", kind="stable").groupby("table", sort=False)
     minus = "\N{MINUS SIGN}"
-    names = comparisons["first"] + f" {minus} " + comparisons["second"]
+    longest = (comparisons["first"] + comparisons["second"]).str.len().max() + 3
     # Proportions have one scale; metres and ratios do not.
     ends = comparisons[["difference_low", "difference_high"]]
-    figure, panels = _panels(
+    figure, panels = panels_of(
         len(tables),
-        size=(3.7 + 0.068 * names.str.len().max(), 0.7 + 0.21 * tables.size().max()),
+        size=(3.7 + 0.068 * longest, 0.7 + (0.28 if given_width() else 0.21) * tables.size().max()),
         margin=(0.4, 0.5),
         share="x" if (ends.abs() <= 1).all(axis=None) else False,
     )
     for axes, (table, rows) in zip(panels, tables, strict=True):
         axes.axvline(0, color="0.3", linewidth=0.8)
         for place, row in enumerate(rows.itertuples()):
-            colour = COLOURS[0] if row.better else "0.55"
+            colour = look(0)["color"] if row.better else "0.55"
             line = row.difference_low, row.difference_high
             axes.plot(line, [place] * 2, color=colour, linewidth=1.2)
             face = colour if row.better else "white"
             style: Style = {"marker": "o", "markersize": 4.5, "markerfacecolor": face}
             axes.plot([row.difference], [place], color=colour, **style)
-        labels = [f"{row.first} {minus} {row.second} (n = {row.n})" for row in rows.itertuples()]
-        axes.set_yticks(range(len(rows)), labels, fontsize=8)
+        labels = [
+            row_label(row.first, f"{minus} {row.second} (n = {row.n})") for row in rows.itertuples()
+        ]
+        axes.set_yticks(range(len(rows)), labels, fontsize=text_size(0.8))
         axes.set(title=", ".join(table), ylim=(-0.7, len(rows) - 0.3))
         axes.grid(axis="x")
-    figure.supxlabel(
-        "mean paired difference, first minus second, with 95 % interval; filled: better"
-    )
+    text = "mean paired difference, first minus second, with 95 % interval; filled: better"
+    figure.supxlabel(folded(text))
     return figure
 
 
@@ -264,7 +245,7 @@ def by_trial(
     for key, one in grouped(trials, "robot", "case", "comparator", "seed").items():
         lines.setdefault(key[:3], []).append(restored(one))
     size = (1.8 + 0.75 * max(len(cases), 4), 2.6)
-    figure, panels = _panels(len(robots), 1, size=size, margin=(0, 0.9), share="x")
+    figure, panels = panels_of(len(robots), 1, size=size, margin=(0, 0.9), share="x")
     width = SLOT / len(comparators)
     for axes, robot in zip(panels, robots, strict=True):
         for place, case in enumerate(cases):
@@ -290,7 +271,7 @@ def by_trial(
     legend = "; grey: not restored in the paper" if is_grey else ""
     panels[-1].set_xlabel(f"case of Table I{legend}")
     figure.supylabel("displacement ÷ before the failure")
-    _legend(figure, columns=min(3, len(comparators)))
+    legend_below(figure, columns=min(3, len(comparators)))
     return figure
 
 
@@ -307,12 +288,14 @@ def by_cost(costs: Sequence[Row], band: str, reported: tuple[float, float, str])
         key: pd.DataFrame(own)[["physical_trials", "recovery", "low", "high"]]
         for key, own in grouped(costs, "robot", "way").items()
     }
-    figure, panels = _panels(len(robots), len(robots), size=(4.4, 4.0), margin=(0.8, 0), share="y")
+    figure, panels = panels_of(
+        len(robots), len(robots), size=(4.4, 4.0), margin=(0.8, 0), share="y"
+    )
     for axes, robot in zip(panels, robots, strict=True):
         for number, way in enumerate(others):
             points = lines[robot, way].to_numpy() if (robot, way) in lines else np.empty((0, 4))
             shift = 1 + 0.06 * (number - (len(others) - 1) / 2)
-            _errorbars(axes, points * (shift, 1, 1, 1), number, label=way, linewidth=1.2)
+            errorbars(axes, points * (shift, 1, 1, 1), number, label=way, linewidth=1.2)
         if (robot, band) in lines:
             x, middle, low, high = lines[robot, band].sort_values("physical_trials").to_numpy().T
             axes.plot(x, middle, color="black", label="evolution on the robot")
@@ -328,14 +311,14 @@ def by_cost(costs: Sequence[Row], band: str, reported: tuple[float, float, str])
         axes.set_title(f"{robot} ({counts})")
         axes.grid(axis="y")
     panels[0].set_ylabel("displacement ÷ before the failure")
-    _legend(figure, columns=len(robots))
+    legend_below(figure, columns=len(robots))
     return figure
 
 
 @figure_style()
 def robots(shown: Sequence[Robot]) -> Figure:
     """Returns Figure 1: a row per robot in its standing pose, with its joints and sensors."""
-    figure, panels = _panels(2 * len(shown), size=(4.2, 2.5), margin=(0, 0.7), share=False)
+    figure, panels = panels_of(2 * len(shown), size=(4.2, 2.5), margin=(0, 0.7), share=False)
     for axes, (robot, view) in zip(panels, itertools.product(shown, VIEWS), strict=True):
         _draw_robot(axes, robot, VIEWS[view])
         anatomy = robot.anatomy
@@ -345,8 +328,8 @@ def robots(shown: Sequence[Robot]) -> Figure:
         )
         below = parts if view == "from the side" else "forward is to the right; m"
         axes.set_title(f"{robot.name}, {view}")
-        axes.set_xlabel(below, fontsize=9)
-    _legend(figure, columns=3)
+        axes.set_xlabel(below, fontsize=text_size(0.9))
+    legend_below(figure, columns=3)
     return figure
 
 
@@ -392,11 +375,6 @@ def _outline(
     return (points[:, None] + radius * CIRCLE).reshape(-1, 2) if is_capsule else points
 
 
-def look(number: int) -> Style:
-    """Returns colour and marker of a method by its number, as arguments of matplotlib."""
-    return {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
-
-
 def counts_text(counts: Iterable[int]) -> str:
     """Returns the smallest and the largest of some numbers of runs: n = 4, or n = 4 to 12."""
     ordered = sorted(counts) or [0]
@@ -411,45 +389,3 @@ def _distinct(rows: Sequence[Row], name: str) -> list[Any]:
 def _first_and_last(rows: Sequence[Row]) -> list[int]:
     trials = sorted({row["trials"] for row in rows})
     return sorted({*trials[:1], *trials[-1:]})
-
-
-def _errorbars(axes: Axes, points: Any, number: int, **style: Any) -> None:  # noqa: ANN401  # of matplotlib
-    """Draws estimates with the ends of their intervals, x, y, low and high, in a method's look."""
-    x, y, low, high = np.array(points).reshape(-1, 4).T
-    # An interval may end a rounding error inside its estimate.
-    bars = np.maximum([y - low, high - y], 0)
-    drawn = {"markersize": 5, "capsize": 2, "elinewidth": 0.8, **look(number), **style}
-    axes.errorbar(x, y, yerr=bars, **drawn)
-
-
-def _panels(
-    count: int,
-    columns: int = 2,
-    *,
-    size: tuple[float, float],
-    margin: tuple[float, float],
-    share: Any,  # noqa: ANN401  # of matplotlib
-) -> tuple[Figure, list[Axes]]:
-    """Returns a figure with panels, of a size each, and a margin around all of them, in inches.
-
-    The panels share the axes ``x``, ``y``, both (True) or none (False).
-    """
-    rows, columns = math.ceil(count / columns), min(count, columns)
-    whole_size = (margin[0] + columns * size[0], margin[1] + rows * size[1])
-    figure = Figure(figsize=whole_size, layout="constrained")
-    sharex, sharey = (share in (way, True) for way in "xy")
-    panels = list(figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False).flat)
-    for number, axes in enumerate(panels):
-        axes.tick_params(labelbottom=True)
-        axes.set_visible(number < count)
-    return figure, panels[:count]
-
-
-def _legend(figure: Figure, columns: int) -> None:
-    """Puts a legend of the labels of all panels below them."""
-    handles = {
-        label: handle
-        for axes in figure.axes
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)

@@ -20,8 +20,9 @@ from selfmodel.settings import Settings
 from selfmodel.studies import figures, tables
 from selfmodel.studies.plans import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
-from selfmodel.studies.rows import KINDS, study_rows
+from selfmodel.studies.rows import KINDS, methods_of, study_rows
 from selfmodel.studies.study import Row, grouped, shared_in
+from selfmodel.studies.style import files_of
 from selfmodel.studies.tables import Table, table_of
 from selfmodel.tasks import ROBOTS
 
@@ -82,7 +83,16 @@ class PaperResults:
 
     def summaries(self) -> list[Row]:
         """Returns Table II: a row per robot, case and comparator, in the order of the rows."""
-        return list(map(_summary, grouped(self.recoveries, "robot", "case", "comparator").values()))
+        named = self.named(self.recoveries)
+        return list(map(_summary, grouped(named, "robot", "case", "comparator").values()))
+
+    def named(self, rows: Sequence[Row]) -> list[Row]:
+        """Returns rows whose comparator has the name that readers see; see ``methods_of``."""
+        given = [row["comparator"] for row in self.recoveries]
+        names = dict(zip(given, methods_of(self.recoveries), strict=True))
+        return [
+            {**row, "comparator": names.get(row["comparator"], row["comparator"])} for row in rows
+        ]
 
     def costs(self) -> list[Row]:
         """Returns the restored function by way and number of physical trials: quartiles.
@@ -92,7 +102,7 @@ class PaperResults:
         """
         points = [
             (*run, trials, share)
-            for run, rows in grouped(self.trials, *RUN, "comparator").items()
+            for run, rows in grouped(self.named(self.trials), *RUN, "comparator").items()
             for trials, share in enumerate(best_so_far(rows))
             if trials
         ]
@@ -167,14 +177,14 @@ def _files(results: PaperResults, every: Sequence[Table]) -> dict[str, bytes]:
     robots = dict.fromkeys(row["robot"] for row in results.recoveries)
     drawn = {
         "figure-1": figures.robots([ROBOTS[name].robot() for name in robots]),
-        "figure-5": figures.by_trial(results.trials, NOT_RESTORED, best_so_far),
+        "figure-5": figures.by_trial(results.named(results.trials), NOT_RESTORED, best_so_far),
     }
     if costs := results.costs():  # comparators that have no run in common cannot be compared
         drawn["figure-6"] = figures.by_cost(costs, ON_ROBOT, REPORTED)
     rows = {name: getattr(results, name) for name in ("recoveries", "trials", "evolution")}
     files: dict[str, bytes] = {}
     for name, figure in drawn.items():
-        files |= figures.files_of(name, figure)
+        files |= files_of(name, figure)
     files |= tables.table_files([*every, *(table_of(*item) for item in rows.items())], "csv")
     return {
         **files,

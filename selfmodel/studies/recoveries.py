@@ -261,7 +261,13 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
     diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
     rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
-    return {"diagnoses": [{**row, "compared_by": chosen.name} for row in rows]}
+    return {"diagnoses": [{**row, **_named(parameters)} for row in rows]}
+
+
+def _named(parameters: Parameters) -> Row:
+    """Returns the name of the comparator of a point as a column; ``auto`` is a choice of one."""
+    given = parameters["comparator"]
+    return {"comparator_name": plugins.comparator(given).name if ":" in given else given}
 
 
 def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
@@ -311,11 +317,12 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
-        row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
-        row["compared_by"] = recovery.comparator.comparator.name
+        found = {"before": before, "after": after, "recovered": max(tried, default=None)}
+        row |= {**found, **_named(parameters)}
     diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
     own = {
         "robot": robot.name,
+        **_named(parameters),
         "compared_by": recovery.comparator.comparator.name,
         "best": str(recovery.diagnosis.best),
         "correct": outcome.correct,

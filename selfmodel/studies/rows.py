@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
@@ -76,13 +76,13 @@ def _of_ablation(rows: pd.DataFrame) -> OutcomeRows:
         for row in (rows if gap is None else rows[rows["gap"] == gap]).itertuples():
             table = row.robot, counted(row.trials, "trial"), *alone
             cell = f"gap {row.gap:g}", failure_of(row.case, row.truth), row.next_trial
-            yield table, row.comparator, cell, row.seed, float(row.correct), "share"
+            yield table, row.method, cell, row.seed, float(row.correct), "share"
 
 
 def _of_paper(rows: pd.DataFrame) -> OutcomeRows:
     """Yields right (1) and wrong (0) diagnoses, and recovered displacements, by comparator."""
     for row in rows.itertuples():
-        run = row.comparator, (f"{row.case:2d}",), row.seed
+        run = row.method, (f"{row.case:2d}",), row.seed
         yield (row.robot, "right"), *run, float(row.correct), "share"
         yield (row.robot, "recovered, m"), *run, float(row.recovered), "number"
 
@@ -130,10 +130,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "ablate": Kind(
             "diagnoses",
-            "robot case truth gap seed next_trial comparator trials best correct distance "
-            "intact_distance verdict rivals evaluations distinct_hypotheses seconds before after "
-            "recovered repair search compared_by",
-            "repair search compared_by",
+            "robot case truth gap seed next_trial comparator comparator_name trials best correct "
+            "distance intact_distance verdict rivals evaluations distinct_hypotheses seconds "
+            "before after recovered repair search",
+            "comparator_name repair search",
             "robot truth gap seed comparator trials",
             _of_ablation,
         ),
@@ -147,9 +147,9 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         ),
         "paper": Kind(
             "recoveries",
-            "robot case truth seed comparator compared_by best correct before after recovered "
-            "distinct_hypotheses diverged seconds",
-            "",
+            "robot case truth seed comparator comparator_name compared_by best correct before "
+            "after recovered distinct_hypotheses diverged seconds",
+            "comparator_name",
             "robot case seed",
             _of_paper,
         ),
@@ -253,13 +253,7 @@ def load(path: str | Path) -> LoadedStudy:
         rows = frame_of(study_rows(name, place), KINDS[name].columns)
     else:
         rows = _rows_of_file(place)
-        columns = set(rows.columns)
-        fitting = (
-            name
-            for name, kind in KINDS.items()
-            if set(kind.columns) - set(kind.may_lack.split()) <= columns <= set(kind.columns)
-        )
-        if not (name := next(fitting, "")):
+        if not (name := kind_of(rows.columns)):
             raise InputError(
                 f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
                 f"{', '.join(map(str, rows.columns))[:300]}"
@@ -278,6 +272,17 @@ def load(path: str | Path) -> LoadedStudy:
         return LoadedStudy(name, place, rows, outcomes_of(name, rows))
     except (TypeError, ValueError) as error:
         raise InputError(f"{place}: expected the rows of a study by {name}, got {error}") from error
+
+
+def kind_of(columns: Collection[str]) -> str:
+    """Returns the kind of study whose rows have these columns; an empty text if none has."""
+    given = set(columns)
+    fitting = (
+        name
+        for name, kind in KINDS.items()
+        if set(kind.columns) - set(kind.may_lack.split()) <= given <= set(kind.columns)
+    )
+    return next(fitting, "")
 
 
 def _rows_of_file(path: Path) -> pd.DataFrame:
@@ -309,7 +314,28 @@ def _parsed(texts: pd.Series) -> pd.Series:
 def outcomes_of(name: str, rows: pd.DataFrame | Sequence[Row]) -> pd.DataFrame:
     """Returns what the rows of a kind of study compare, with the columns ``OUTCOME``."""
     frame = rows if isinstance(rows, pd.DataFrame) else frame_of(rows, KINDS[name].columns)
+    if "comparator" in frame:
+        frame = frame.assign(method=methods_of(frame.to_dict("records")))
     return pd.DataFrame(list(KINDS[name].outcomes(frame)), columns=list(comparisons.OUTCOME))
+
+
+def methods_of(rows: Sequence[Row]) -> list[str]:
+    """Returns the names of the methods of rows, as figures and tables show them.
+
+    A method is a comparator, by the name of its object, which a row of a newer study has. With two
+    objects of one name, it is that by which they were given, ``package.module:object``; with
+    several searches of the diagnoses, the search is added: ``segment-prediction, ea``.
+    """
+    named = {row["comparator"]: row.get("comparator_name") for row in rows}
+    names = {given: name if isinstance(name, str) else given for given, name in named.items()}
+    shown = list(names.values())
+    searches = {str(row.get("diagnostic_search")) for row in rows}
+    methods = []
+    for row in rows:
+        given = row["comparator"]
+        name = names[given] if shown.count(names[given]) == 1 else given
+        methods.append(f"{name}, {row['diagnostic_search']}" if len(searches) > 1 else name)
+    return methods
 
 
 def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:

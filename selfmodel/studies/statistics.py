@@ -21,6 +21,9 @@ NORMAL = float(stats.norm.ppf(TAIL))
 RESAMPLES = 2000
 """Resamples of a bootstrap."""
 
+MIN_SEEDS = 4
+"""Smallest number of seeds of Student's test; with fewer it errs too often."""
+
 MAX_EXACT, FLIPS = 14, 20_000
 """Largest number of differences whose signs are all enumerated; random sign vectors of more."""
 
@@ -174,18 +177,20 @@ def sign_flip_test(differences: Sequence[float], rng: np.random.Generator) -> fl
 def seed_test(differences: Sequence[float], seeds: Sequence[int]) -> float:
     """Returns the two-sided p of Student's paired test over the means of the seeds.
 
-    It is 1 with fewer than two seeds, or if the mean of the means is 0. The means of few runs may
-    be equal by chance, and p is then too small: a test over runs is needed too.
+    Of fewer than ``MIN_SEEDS``, and of means without variance, which its standard error would call
+    certain, it is that of the exact sign-flip test of the means: 2 / 2^n for n seeds at least. The
+    means of few runs may be equal by chance, and p is then too small: a test over runs is needed
+    too.
 
     Source: Student, *The probable error of a mean*, Biometrika 6 (1908).
     """
     values, groups = _finite("differences", differences), np.array(seeds)
     means = np.array([values[groups == seed].mean() for seed in np.unique(groups)])
     # Means that are 0 apart from roundings do not differ, also if they have no error.
-    if len(means) < 2 or abs(means.mean()) <= 1e-12 * np.abs(values).max():
+    if not len(means) or abs(means.mean()) <= 1e-12 * np.abs(values).max():
         return 1.0
-    if means.std(ddof=1) / math.sqrt(len(means)) <= 1e-12 * abs(means.mean()):
-        return 0.0
+    if len(means) < MIN_SEEDS or means.std(ddof=1) <= 1e-12 * abs(means.mean()):
+        return sign_flip_test(means.tolist(), np.random.default_rng(0))
     return float(stats.ttest_1samp(means, 0.0).pvalue)
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,9 +20,18 @@ from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
-from selfmodel.studies.rows import KINDS, REFERENCE, frame_of, outcomes_of, study_rows, whole
+from selfmodel.studies.rows import (
+    KINDS,
+    REFERENCE,
+    frame_of,
+    methods_of,
+    outcomes_of,
+    study_rows,
+    whole,
+)
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped
+from selfmodel.studies.style import figure_style
 from selfmodel.tasks.suite_bodies import EPISODE
 
 TRIAL_COLUMNS = (
@@ -41,26 +51,27 @@ MEASURED = ("displacement", RETURN)
 
 
 def ablation_scores(rows: Sequence[Row]) -> list[Row]:
-    """Returns the score of each comparator per robot, gap and number of trials, over all cases.
+    """Returns the score of each method per robot, gap and number of trials, over all cases.
 
     Returns:
-        ``robot``, ``gap``, ``comparator``, ``trials``; ``runs`` and ``right``, numbers of
-        diagnoses; ``correct``, their proportion with Wilson's interval; ``time``, the seconds over
-        those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery trial
-        over that before the failure. The last two are None without such runs.
+        ``robot``, ``gap``, ``comparator``, ``method``, ``trials``; ``runs`` and ``right``, numbers
+        of diagnoses; ``correct``, their proportion with Wilson's interval; ``time``, the seconds
+        over those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery
+        trial over that before the failure. The last two are None without such runs.
     """
-    names = ("robot", "gap", "comparator", "trials")
-    groups = grouped(rows, *names)
+    named = [{**row, "method": name} for row, name in zip(rows, methods_of(rows), strict=True)]
+    # Times are compared on the same search.
+    run = ("robot", "gap", "trials", "truth", "seed", "diagnostic_search")
+    reference = {
+        tuple(map(row.get, run)): row["seconds"] for row in rows if row["comparator"] == REFERENCE
+    }
+    names = ("robot", "gap", "comparator", "method", "trials")
     scores = []
-    for key, own in sorted(groups.items()):
-        reference = {
-            (row["truth"], row["seed"]): row["seconds"]
-            for row in groups.get((*key[:2], REFERENCE, key[3]), [])
-        }
+    for key, own in sorted(grouped(named, *names).items()):
         times = [
-            (row["seconds"], reference[run])
+            (row["seconds"], reference[one])
             for row in own
-            if (run := (row["truth"], row["seed"])) in reference
+            if (one := tuple(map(row.get, run))) in reference
         ]
         recoveries = [
             (row["recovered"], row["before"])
@@ -214,13 +225,14 @@ class Results:
     notes: Sequence[str] = field(default=())
 
 
-def ablation_results(folder: Path) -> Results:
-    """Returns the results of an ablation, with its figures."""
+def ablation_results(folder: Path, style: str | Path | None = None) -> Results:
+    """Returns the results of an ablation, with its figures in a style; see ``figure_style``."""
     rows = study_rows("ablate", folder)
     scores = ablation_scores(rows)
     counts = {one["trials"] for one in scores}
     shown = [one for one in scores if one["trials"] in (min(counts), max(counts))]
-    drawn = figures.of_ablation(rows, scores)
+    with figure_style(style):
+        drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
     return Results(
@@ -281,7 +293,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
         {
             "robot": one["robot"],
             "gap": f"{one['gap']:g}",
-            "comparator": one["comparator"],
+            "method": one["method"],
             "trials": str(one["trials"]),
             "right": f"{one['right']} of {one['runs']}",
             "right, %": _interval(one["correct"], 100, ".0f"),
@@ -356,10 +368,15 @@ def markdown_of(table: Table) -> str:
 
 def _latex(table: Table) -> bytes:
     sides = "l" * table.texts + "r" * (len(table.shown.columns) - table.texts)
-    text = table.shown.style.hide(axis="index").format(escape="latex")
+    text = table.shown.style.hide(axis="index").format(_mathematical, escape="latex")
     text = text.format_index(escape="latex", axis="columns")
     latex: str = text.to_latex(column_format=sides, hrules=True)
     return latex.encode()
+
+
+def _mathematical(text: str) -> str:
+    """Returns an escaped text with signs that LaTeX's text fonts lack, or show as a hyphen."""
+    return re.sub(r"<|(?<![\w])-(?=[\d.])", lambda sign: f"${sign[0]}$", text)
 
 
 def _parquet(table: Table) -> bytes:
@@ -383,6 +400,9 @@ FORMATS: Mapping[str, tuple[str, Callable[[Table], bytes]]] = MappingProxyType(
 )
 """Suffix and writer by the name of a format. CSV and Parquet files have the records, LaTeX (with
 the package booktabs) and Markdown the rows for readers."""
+
+FOR_READERS = ("latex", "markdown")
+"""Formats of tables for readers, which have no table of all rows."""
 
 
 def check_format(wanted: str | None) -> None:

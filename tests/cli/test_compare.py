@@ -14,7 +14,7 @@ ROWS = [
     diagnosis(name, case=case, truth=str(case), seed=seed, correct=name == "a")
     for name in "ab"
     for case in (1, 2, 3)
-    for seed in range(4)
+    for seed in range(6)
 ]
 
 
@@ -25,7 +25,7 @@ def write(folder: Path, rows: list[dict], name: str = "ablate") -> Path:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with the rows of two comparators: the first right in 12 runs, the second in none."""
+    """A folder with the rows of two comparators: the first right in 18 runs, the second in none."""
     return write(tmp_path, ROWS)
 
 
@@ -33,21 +33,35 @@ def test_pairs_are_printed_with_difference_interval_n_and_p(folder: Path):
     told = succeeds("compare", "rows.csv", "-o", "out", cwd=folder)
 
     assert "quadruped, 1 trial:" in told.stdout
-    assert "  a better than b: 1.000 (0.587 to 1.000), n 12, p 0.00049" in told.stdout
+    assert "  a better than b: 1.000 (0.709 to 1.000), n 18, p 0.031" in told.stdout
     assert told.stderr == ""
     assert {path.name for path in (folder / "out").iterdir()} == {
         *("rows.csv", "marginal-means.csv", "comparisons.csv"),
         *(f"differences-quadruped.{suffix}" for suffix in ("png", "pdf", "svg")),
     }
     (row,) = csv.DictReader((folder / "out" / "comparisons.csv").read_text().splitlines())
-    assert (row["first"], row["n"], row["only_first"], row["better"]) == ("a", "12", "12", "a")
+    assert (row["first"], row["n"], row["only_first"], row["better"]) == ("a", "18", "18", "a")
     assert row["table"] == "quadruped, 1 trial"
 
 
-def test_tables_are_written_in_the_format_of_choice(folder: Path):
-    succeeds("compare", "rows.csv", "-o", "out", "--table", "markdown", cwd=folder)
+def test_a_table_for_a_paper_has_five_columns_and_none_has_all_rows(folder: Path):
+    for wanted in ("markdown", "latex"):
+        succeeds("compare", "rows.csv", "-o", "out", "--table", wanted, cwd=folder)
 
-    assert (folder / "out" / "marginal-means.md").stat().st_size > 100
+    (head, _, pair) = (folder / "out" / "comparisons.md").read_text().splitlines()
+    assert head == "| table | comparison | difference (95 %) | n | p |"
+    assert pair.startswith("| quadruped, 1 trial | a vs. b | 1.000 (")
+    assert pair.endswith("| 18 | 0.031* |")
+    assert (folder / "out" / "marginal-means.tex").read_text().count("&") == 3 * 4
+    assert not list((folder / "out").glob("rows.*"))
+
+
+def test_figures_are_as_wide_as_a_column_or_as_a_style_file_says(folder: Path):
+    (folder / "own.mplstyle").write_text("figure.figsize: 5, 3\nsavefig.dpi: 100\n")
+    for style, pixels in (("column", 3.5 * 150), ("own.mplstyle", 5 * 100)):
+        succeeds("compare", "rows.csv", "-o", "out", "--style", style, cwd=folder)
+        data = (folder / "out" / "differences-quadruped.png").read_bytes()
+        assert int.from_bytes(data[16:20], "big") == pixels
 
 
 def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):
@@ -61,6 +75,7 @@ def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):
     [
         (("rows.csv",), "rows.csv is no folder of a study: give the folder of the tables, -o DIR"),
         (("rows.csv", "-o", "out", "--table", "xls"), "unknown table format 'xls'"),
+        (("rows.csv", "-o", "out", "--style", "wide"), "wide: expected column, page, or a style"),
         (("missing", "-o", "out"), "missing: expected the folder of a study"),
     ],
 )

@@ -11,8 +11,11 @@ from selfmodel.report.campaign import (
     read_table,
     report_of_campaign,
 )
-from selfmodel.report.charts import Cell, IntervalChart, Picture, Table, html_of
+from selfmodel.report.charts import Cell, IntervalChart, Picture, Report, Table, html_of
+from selfmodel.studies.rows import KINDS, frame_of
+from selfmodel.studies.tables import csv_bytes
 from tests.helpers.browser import browses, read_report
+from tests.helpers.study_rows import body, diagnosis
 
 PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -45,23 +48,71 @@ def test_every_table_and_figure_of_the_folder_is_in_the_report(folder: Path):
     assert tables["cells.jsonl"].rows == ((1, "1.5, 2"), (2, None))
     assert tables["scores"].columns == ("runs", "time low")
     assert "rows" not in tables
-    headline = report_of_campaign(folder).headline
-    assert headline.startswith("2 of 3 diagnoses are right: 66.7% (95 % interval 20.8% to 93.9%)")
-    assert "3 rows in results.csv" in headline
+    report = report_of_campaign(folder)
+    assert report.headline == "3 rows of 2 methods."
+    assert "3 rows in results.csv" in report.verdict[0]
     (picture,) = items(folder, Picture)
     assert (picture.title, picture.media_type, picture.data) == ("gap", "image/png", PIXEL)
 
 
-def test_shares_are_shown_by_each_column_that_varies(folder: Path):
-    charts = {chart.title: chart for chart in items(folder, IntervalChart)}
+def test_right_diagnoses_are_shown_by_method_case_and_gap_and_never_pooled(folder: Path):
+    (chart,) = items(folder, IntervalChart)
+    tables = {table.title: table for table in items(folder, Table)}
 
-    assert [title.split(",")[0] for title in charts] == [
-        "Share of right diagnoses by comparator",
-        "Share of right diagnoses by gap",
-    ]
-    by_comparator = charts["Share of right diagnoses by comparator, with 95 % intervals"]
-    shares = [(one.label, one.value) for one in by_comparator.estimates]
+    shares = [(one.label, one.value) for one in chart.estimates]
     assert shares == [("a (n = 2)", 1.0), ("b (n = 1)", 0.0)]
+    by_gap = tables["Right diagnoses by gap"]
+    assert by_gap.columns == ("method", "0.0", "0.1")
+    assert by_gap.rows == (("a", "1/1", "1/1"), ("b", None, "0/1"))
+    (folder / "results.csv").write_text("robot,correct\na,true\na,false\n")
+    alone = report_of_campaign(folder).headline
+    assert alone == "1 of 2 diagnoses are right: 50.0% (95 % interval 9.5% to 90.5%)."
+
+
+def study(folder: Path, name: str, rows: list[dict]) -> Report:
+    """The report of the folder of a study with these rows."""
+    (folder / "results.csv").write_bytes(csv_bytes(frame_of(rows, KINDS[name].columns)))
+    return report_of_campaign(folder)
+
+
+def test_a_study_of_comparators_begins_with_its_paired_comparisons_of_each_robot(tmp_path: Path):
+    rows = [
+        diagnosis(name, robot=robot, case=case, seed=seed, truth="t", correct=right)
+        for name, right in (("own:A", True), ("b", False))
+        for robot in ("ant", "hexapod")
+        for case in (1, 2)
+        for seed in range(6)
+    ]
+    rows = [row | {"comparator_name": row["comparator"].removeprefix("own:")} for row in rows]
+    report = study(tmp_path, "ablate", rows)
+    comparisons, methods, shares, _ = report.sections
+
+    assert report.headline == "2 methods in 48 rows: 2 of 2 paired comparisons are decided."
+    assert report.verdict[0].startswith("ant, 1 trial: A has the largest mean, 1, and is better")
+    assert [one.title for one in comparisons.items] == [
+        f"{robot}, 1 trial: first minus second" for robot in ("ant", "hexapod")
+    ]
+    (pair,) = comparisons.items[0].estimates
+    assert (pair.label, pair.value) == ("A \N{MINUS SIGN} b (n = 12, p 0.031)", 1)
+    assert (pair.low < 1, pair.high, pair.note) == (True, 1, "")
+    assert [one.label for one in methods.items[0].estimates] == ["A (n = 12)", "b (n = 12)"]
+    (table,) = shares.items
+    assert table.columns == ("robot", "method", "1", "2")
+    assert table.rows[0] == ("ant", "A", "6/6", "6/6")
+
+
+def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_path: Path):
+    rows = [body(), body(1, recovered=2.0, upright=False), body(robot="b", after=1.0)]
+    report = study(tmp_path, "suite", rows)
+    (chart,) = report.sections[0].items
+
+    said = "3 runs of 2 robots with a failure: a median of 0% of the score remains, 50% is "
+    assert report.headline == f"{said}recovered; in 1 the best trial fell, which is not recovered."
+    assert [(group.label, group.values) for group in chart.groups] == [
+        ("a, case 1", (2.0, 0.0, 1.5)),
+        ("b, case 1", (2.0, 1.0, 1.0)),
+    ]
+    assert [group.notes for group in chart.groups] == [("", "", "fell in 1 of 2"), ("", "", "")]
 
 
 @browses

@@ -45,8 +45,9 @@ def test_methods_are_compared_on_the_runs_that_both_have_whatever_their_order():
 
 
 def test_every_pair_of_a_table_counts_in_its_correction_and_other_tables_do_not():
-    own = [outcomes(name, values * 12) for name, values in (("a", "1"), ("b", "0"), ("c", "0"))]
-    other = [outcomes(name, v * 12, table=("hexapod",)) for name, v in (("a", "1"), ("b", "0"))]
+    # 12 seeds of a case: as many seeds as runs.
+    own = [outcomes(name, v * 12, 12) for name, v in (("a", "1"), ("b", "0"), ("c", "0"))]
+    other = [outcomes(name, v * 12, 12, table=("hexapod",)) for name, v in (("a", "1"), ("b", "0"))]
     found = compare(joined(*own, *other))
     by_pair = {(row.table[0], row.first, row.second): row for row in found.itertuples()}
 
@@ -70,6 +71,15 @@ def test_a_difference_that_one_seed_makes_is_not_called_better():
     assert found["better"] is None
 
 
+def test_three_seeds_that_agree_in_every_run_decide_nothing():
+    found = compare(joined(outcomes("a", "1" * 27, 3), outcomes("b", "0" * 27, 3))).iloc[0]
+
+    assert found[["n", "seeds", "only_first"]].tolist() == [27, 3, 27]
+    assert found["p_runs"] < 1e-7
+    assert found["p_holm"] == found["p_seeds"] == 0.25
+    assert found["better"] is None
+
+
 def test_numbers_are_compared_by_their_signs_and_their_seeds():
     rows = [
         (("m",), name, (f"case {case}",), seed, value + 0.1 * seed * case, "number")
@@ -81,7 +91,7 @@ def test_numbers_are_compared_by_their_signs_and_their_seeds():
 
     assert found["difference"] == pytest.approx(2)
     assert found["p_runs"] == pytest.approx(2 / 2**12)
-    assert found["p_seeds"] < 1e-6
+    assert found["p_seeds"] == 2 / 2**6  # equal differences in every seed
     assert found["better"] == "far"
     # Of numbers, no run contradicts a difference of 1; of shares, a rarer error may be unseen.
     shares = joined(outcomes("a", "111" * 2, 3), outcomes("b", "000" * 2, 3))

@@ -46,6 +46,15 @@ def test_a_row_of_table_two_has_medians_and_counts_of_its_runs():
     assert (other["recovery"], other["lowest"]) == (None, None)
 
 
+def test_a_comparator_of_ones_own_has_its_name_in_summaries_and_its_path_in_rows():
+    own = {"comparator": "dtw:DTW"}
+    found = results([recovery(comparator_name="dtw", **own)], trials([2.0, 0.0, 1.0], **own))
+
+    assert [row["comparator"] for row in found.summaries()] == ["dtw"]
+    assert {cost["way"] for cost in found.costs()} == {"dtw"}
+    assert {row["comparator"] for row in (*found.recoveries, *found.trials)} == {"dtw:DTW"}
+
+
 def test_costs_are_of_the_runs_that_all_ways_of_a_robot_have():
     easy, hard = {"case": 9}, {"case": 7}
     rows = [
@@ -80,7 +89,7 @@ def test_page_and_files_have_the_tables_the_figures_and_what_is_not_known(
     rows += [recovery(robot="hexapod", case=7, seed=1, distinct_hypotheses=51)]
     given = results(rows, trials([2.0, 0.0, 1.0, 3.0]), evolution([1.0]))
     monkeypatch.setattr(paper_page, "collect", lambda _folder: given)
-    monkeypatch.setattr(figures, "files_of", lambda name, _figure: {f"{name}.png": b""})
+    monkeypatch.setattr(paper_page, "files_of", lambda name, _figure: {f"{name}.png": b""})
     files = write_files(tmp_path, results_of(tmp_path).files)
     text = (tmp_path / "paper.md").read_text()
 

@@ -1,5 +1,6 @@
 """Rows of studies from their files and folders, and what they compare."""
 
+import math
 from pathlib import Path
 
 import pandas as pd
@@ -7,7 +8,7 @@ import pytest
 
 from selfmodel.errors import InputError
 from selfmodel.studies.comparisons import compare
-from selfmodel.studies.rows import KINDS, frame_of, load, outcomes_of, whole
+from selfmodel.studies.rows import KINDS, frame_of, load, methods_of, outcomes_of, whole
 from selfmodel.studies.tables import csv_bytes
 from tests.helpers.study_rows import body, diagnosis, recovery, rival
 
@@ -101,6 +102,23 @@ def test_comparators_are_compared_over_all_gaps_and_at_each():
     assert [table[1] for table in whole(found)["table"]] == ["1 trial"]
     alone = outcomes_of("ablate", [diagnosis("a"), diagnosis("b")])
     assert len(set(alone["table"])) == 1, "a study at one gap is compared once"
+
+
+@pytest.mark.parametrize(
+    ("given", "methods"),
+    [
+        ([("dtw:DTW", "dtw", "ea"), ("b", "b", "ea")], ["dtw", "b"]),
+        ([("dtw:DTW", None, None), ("b", math.nan, None)], ["dtw:DTW", "b"]),
+        ([("a:X", "dtw", "ea"), ("b:Y", "dtw", "ea")], ["a:X", "b:Y"]),
+        ([("a:X", "b", "ea"), ("b", "b", "ea")], ["a:X", "b"]),
+        ([("dtw:DTW", "dtw", "ea"), ("dtw:DTW", "dtw", "stepwise")], ["dtw, ea", "dtw, stepwise"]),
+    ],
+)
+def test_a_method_is_named_by_its_comparators_object_and_by_its_search_among_several(
+    given: list[tuple], methods: list[str]
+):
+    columns = ("comparator", "comparator_name", "diagnostic_search")
+    assert methods_of([dict(zip(columns, row, strict=True)) for row in given]) == methods
 
 
 def test_the_papers_comparators_are_compared_by_diagnosis_and_by_recovery():

@@ -64,7 +64,12 @@ def test_many_differences_are_flipped_at_random_with_the_same_result_in_every_ca
             [0, 0, 1, 1, 2, 2, 3, 3],
             stats.ttest_1samp([0.5, 1.0, -0.5, 0.5], 0).pvalue,
         ),
-        ([1.0, 1.0], [0, 1], 0),
+        # The exact test of the means of the seeds, of few of them or without variance.
+        ([1.0, 1.0], [0, 1], 2 / 2**2),
+        ([1.0] * 9, [0, 1, 2] * 3, 2 / 2**3),
+        ([1.0, 1.0, 1.0, 0.99], [0, 1, 2, 2], 2 / 2**3),
+        ([1.0, 1.0, -0.01], [0, 1, 2], 4 / 2**3),
+        ([0.1, 0.2, 0.2, 0.1] * 6, [n // 2 for n in range(24)], 2 / 2**12),
         ([0.0, 0.0], [0, 1], 1),
         ([1.0, 1.0], [5, 5], 1),  # one seed
         ([1.0, -1.0] * 4, [0, 0, 1, 1, 2, 2, 3, 3], 1),  # each wins as often in every seed

@@ -5,6 +5,7 @@ import itertools
 import math
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,6 +16,7 @@ from selfmodel.studies import figures, tables as module
 from selfmodel.studies.comparisons import compare
 from selfmodel.studies.rows import KINDS, frame_of, outcomes_of
 from selfmodel.studies.statistics import Interval
+from selfmodel.studies.style import figure_style, look, read_style
 from selfmodel.studies.tables import (
     FORMATS,
     ablation_scores,
@@ -136,6 +138,26 @@ def test_every_format_has_its_file():
     assert b"0.30000000000000004" in csv_bytes(frame_of([exact], KINDS["ablate"].columns))
     with pytest.raises(InputError, match="unknown table format 'xls'"):
         check_format("xls")
+
+
+def test_a_minus_and_a_bound_are_mathematics_in_latex_and_a_hyphen_is_none():
+    shown = [{"difference": "segment-prediction -0.051 (-.2 to 0.2)", "p": "< 0.0001*"}]
+    latex = table_files([table_of("a", [{"n": 1}], shown)], "latex")["a.tex"].decode()
+
+    assert "segment-prediction $-$0.051 ($-$.2 to 0.2) & $<$ 0.0001*" in latex
+
+
+def test_a_style_file_is_added_to_the_built_in_one_or_refused(tmp_path: Path):
+    path = tmp_path / "own.mplstyle"
+    path.write_text("axes.prop_cycle: cycler('color', ['red', 'blue'])\n")
+    with figure_style(path):
+        assert [look(number)["color"] for number in range(3)] == ["red", "blue", "red"]
+        assert mpl.rcParams["legend.frameon"] is False
+    assert look(0)["color"] != "red"
+    for text, said in (("font.size: large?", "font.size"), ("", "got no setting")):
+        path.write_text(text)
+        with pytest.raises(InputError, match=f"expected column, page, or a style file.*{said}"):
+            read_style(path)
 
 
 def test_what_is_unknown_is_null_in_json():

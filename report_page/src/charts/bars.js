@@ -18,7 +18,7 @@ export function bars(chart) {
           "div",
           { class: "tracks" },
           group.values.map((value, i) =>
-            value === null && several ? null : bar(value, i, share, chart.names[i]),
+            value === null && several ? null : bar(value, i, share, chart.names[i], group.notes[i]),
           ),
         ),
       ),
@@ -29,15 +29,15 @@ export function bars(chart) {
   return { element, table: () => table(chart) };
 }
 
-function bar(value, i, share, name) {
+function bar(value, i, share, name, note) {
   const zero = share(0);
   const at = value === null ? zero : share(value);
   const [left, right] = [Math.min(zero, at), Math.max(zero, at)];
   return h(
     "div",
     { class: "track", title: name },
-    h("div", { class: `fill s${i}`, style: { left: `${left}%`, width: `${right - left}%` } }),
-    h("span", { class: right > 80 ? "value inside" : "value", style: right > 80 ? { right: `${100 - right}%` } : { left: `${right}%` } }, value === null ? "diverged" : short(value)),
+    h("div", { class: note ? `fill s${i} noted` : `fill s${i}`, style: { left: `${left}%`, width: `${right - left}%` } }),
+    h("span", { class: right > 80 ? "value inside" : "value", style: right > 80 ? { right: `${100 - right}%` } : { left: `${right}%` } }, [value === null ? "diverged" : short(value), note].filter(Boolean).join(", ")),
   );
 }
 
@@ -49,9 +49,14 @@ function key(names) {
   );
 }
 
+function notes(chart, group) {
+  return chart.names.flatMap((name, i) => (group.notes[i] ? [`${name}: ${group.notes[i]}`] : [])).join("; ");
+}
+
 function table(chart) {
+  const noted = chart.groups.some((group) => group.notes.some(Boolean));
   return {
-    columns: ["", ...chart.names.map((name) => `${name}: ${chart.x_label}`)],
-    rows: chart.groups.map((group) => [group.label, ...group.values]),
+    columns: ["", ...chart.names.map((name) => `${name}: ${chart.x_label}`), ...(noted ? ["note"] : [])],
+    rows: chart.groups.map((group) => [group.label, ...group.values, ...(noted ? [notes(chart, group)] : [])]),
   };
 }
