@@ -31,15 +31,20 @@ class Room(SphinxDirective):
 def _lines(package: ModuleType) -> Iterator[str]:
     public = set(getattr(package, "__all__", ()))
     for module in (package, *_modules(package)):
-        names = [name for name in _defined(module) if not name.startswith("_")]
-        if public:
-            names = [name for name in names if name in public]
-        if names:
-            yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
-            yield from (f".. automodule:: {module.__name__}", f"   :members: {', '.join(names)}")
-            if module is not package and module.__name__.rpartition(".")[2] in public:
-                yield "   :no-index:"  # the package has a function with the name of its module
-            yield from ("```", "")
+        defined = {name: told for name, told in _defined(module) if not name.startswith("_")}
+        names = [name for name, told in defined.items() if name in public or (told and not public)]
+        if not names:
+            continue
+        members = ", ".join(name for name in names if defined[name])
+        yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
+        yield f".. automodule:: {module.__name__}"
+        yield f"   :members: {members}" if members else "   :no-members:"
+        if module is not package and module.__name__.rpartition(".")[2] in public:
+            yield "   :no-index:"  # the package has a function with the name of its module
+        for name in names:
+            if not defined[name]:
+                yield from ("", f".. autodata:: {module.__name__}.{name}")
+        yield from ("```", "")
 
 
 def _modules(package: ModuleType) -> Iterator[ModuleType]:
@@ -48,16 +53,21 @@ def _modules(package: ModuleType) -> Iterator[ModuleType]:
             yield importlib.import_module(found.name)
 
 
-def _defined(module: ModuleType) -> Iterator[str]:
-    """Yields the classes, functions and documented constants that a module defines."""
+def _defined(module: ModuleType) -> Iterator[tuple[str, bool]]:
+    """Yields the classes, functions and constants that a module defines, and whether it says what.
+
+    The docstring of a constant is the text after it.
+    """
     body = ast.parse(inspect.getsource(module)).body
     for statement, after in zip(body, [*body[1:], None], strict=True):
         if isinstance(statement, ast.ClassDef | ast.FunctionDef):
-            yield statement.name
-        elif isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
-            targets = statement.targets if isinstance(statement, ast.Assign) else ()
-            targets = [statement.target] if isinstance(statement, ast.AnnAssign) else targets
-            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            yield statement.name, True
+            continue
+        targets = statement.targets if isinstance(statement, ast.Assign) else ()
+        targets = [statement.target] if isinstance(statement, ast.AnnAssign) else targets
+        told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        names = (node for target in targets for node in ast.walk(target))
+        yield from ((node.id, told) for node in names if isinstance(node, ast.Name))
 
 
 def setup(sphinx: Sphinx) -> ExtensionMetadata:
