@@ -16,8 +16,10 @@ from sphinx.util.typing import ExtensionMetadata
 class Room(SphinxDirective):
     """Documents the modules of one package.
 
-    A package with ``__all__`` documents those names only. Each name is documented under the module
-    that defines it, because the docstring of a constant is in that module's source only.
+    Of a package with ``__all__``, these are the modules that define its names, with everything in
+    them that has a docstring, and those of its constants that have none: of what class they are.
+    Each name is documented under the module that defines it, because the docstring of a constant is
+    in that module's source only.
     """
 
     required_arguments = 1
@@ -32,18 +34,14 @@ def _lines(package: ModuleType) -> Iterator[str]:
     public = set(getattr(package, "__all__", ()))
     for module in (package, *_modules(package)):
         defined = {name: told for name, told in _defined(module) if not name.startswith("_")}
-        names = [name for name, told in defined.items() if name in public or (told and not public)]
-        if not names:
+        if not (public & set(defined) if public else any(defined.values())):
             continue
-        members = ", ".join(name for name in names if defined[name])
         yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
         yield f".. automodule:: {module.__name__}"
-        yield f"   :members: {members}" if members else "   :no-members:"
         if module is not package and module.__name__.rpartition(".")[2] in public:
             yield "   :no-index:"  # the package has a function with the name of its module
-        for name in names:
-            if not defined[name]:
-                yield from ("", f".. autodata:: {module.__name__}.{name}")
+        for name in sorted(public & {name for name, told in defined.items() if not told}):
+            yield from ("", f".. autodata:: {module.__name__}.{name}")
         yield from ("```", "")
 
 
