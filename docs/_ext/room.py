@@ -16,9 +16,10 @@ from sphinx.util.typing import ExtensionMetadata
 class Room(SphinxDirective):
     """Documents the modules of one package.
 
-    A package with ``__all__`` documents those names only. Each name is documented under the module
-    that defines it, because the docstring of a constant is in that module's source only; instances
-    without a docstring, such as fault kinds, are listed.
+    Of a package with ``__all__``, these are the modules that define its names, with everything in
+    them that has a docstring, and those of its constants that have none: of what class they are.
+    Each name is documented under the module that defines it, because the docstring of a constant is
+    in that module's source only.
     """
 
     required_arguments = 1
@@ -33,18 +34,16 @@ def _lines(package: ModuleType) -> Iterator[str]:
     public = set(getattr(package, "__all__", ()))
     instances = set(public)
     for module in (package, *_modules(package)):
-        names = [name for name in _defined(module) if not name.startswith("_")]
-        if public:
-            names = [name for name in names if name in public]
-            instances -= set(names)
-        if names:
-            yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
-            yield from (f".. automodule:: {module.__name__}", f"   :members: {', '.join(names)}")
-            if module is not package and module.__name__.rpartition(".")[2] in public:
-                yield "   :no-index:"  # the package has a function with the name of its module
-            yield from ("```", "")
-    if instances:
-        yield from ("", f"Instances: {', '.join(f'`{name}`' for name in sorted(instances))}.")
+        defined = {name: told for name, told in _defined(module) if not name.startswith("_")}
+        if not (public & set(defined) if public else any(defined.values())):
+            continue
+        yield from (f"## `{module.__name__}`", "", "```{eval-rst}")
+        yield f".. automodule:: {module.__name__}"
+        if module is not package and module.__name__.rpartition(".")[2] in public:
+            yield "   :no-index:"  # the package has a function with the name of its module
+        for name in sorted(public & {name for name, told in defined.items() if not told}):
+            yield from ("", f".. autodata:: {module.__name__}.{name}")
+        yield from ("```", "")
 
 
 def _modules(package: ModuleType) -> Iterator[ModuleType]:
@@ -53,16 +52,21 @@ def _modules(package: ModuleType) -> Iterator[ModuleType]:
             yield importlib.import_module(found.name)
 
 
-def _defined(module: ModuleType) -> Iterator[str]:
-    """Yields the classes, functions and documented constants that a module defines."""
+def _defined(module: ModuleType) -> Iterator[tuple[str, bool]]:
+    """Yields the classes, functions and constants that a module defines, and whether it says what.
+
+    The docstring of a constant is the text after it.
+    """
     body = ast.parse(inspect.getsource(module)).body
     for statement, after in zip(body, [*body[1:], None], strict=True):
         if isinstance(statement, ast.ClassDef | ast.FunctionDef):
-            yield statement.name
-        elif isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
-            targets = statement.targets if isinstance(statement, ast.Assign) else ()
-            targets = [statement.target] if isinstance(statement, ast.AnnAssign) else targets
-            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            yield statement.name, True
+            continue
+        targets = statement.targets if isinstance(statement, ast.Assign) else ()
+        targets = [statement.target] if isinstance(statement, ast.AnnAssign) else targets
+        told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        names = (node for target in targets for node in ast.walk(target))
+        yield from ((node.id, told) for node in names if isinstance(node, ast.Name))
 
 
 def setup(sphinx: Sphinx) -> ExtensionMetadata:
