@@ -12,7 +12,6 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path, PurePath
@@ -216,7 +215,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
 
     def as_file(self, settings: Settings, files: dict[str, str]) -> dict[str, Any]:
         """Returns the content of ``result.json``, with settings and digests of the logs."""
-        return as_json(msgspec.structs.replace(self, settings=asdict(settings), files=files))
+        return as_json(msgspec.structs.replace(self, settings=settings.as_json(), files=files))
 
 
 class SuspicionResult(Struct, frozen=True):

@@ -91,6 +91,10 @@ def diagnose_logs(
         settings = dataclasses.replace(settings, generations=options.generations)
     if options.population is not None:
         settings = settings.scaled(options.population)
+    if options.diagnostic_search is not None:
+        settings = dataclasses.replace(settings, diagnostic_search=options.diagnostic_search)
+    if options.max_simulated_steps is not None:
+        settings = dataclasses.replace(settings, max_simulated_steps=options.max_simulated_steps)
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
         inputs = set_up_diagnosis(

@@ -37,6 +37,7 @@ def ablate(options: Ablate) -> None:
         damages=[damage.strip() for damage in options.damages.split(",") if damage.strip()],
         kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
+        diagnostic_searches=options.diagnostic_search.split(","),
         gaps=inputs.numbers("--gap", options.gaps),
         seeds=options.every_seed,
         settings=options.settings,

@@ -60,7 +60,6 @@ class Problem:
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
         observer: Called with the progress of each stage.
-        has_test: Whether hypotheses are compared by a paired test.
     """
 
     table: LossTable
@@ -73,14 +72,12 @@ class Problem:
     calibrate: Calibrate | None = None
     healthy_parts: Sequence[TrialPart] = ()
     observer: Observer = ignore
-    has_test: bool = field(init=False)
     _is_comparable: bool = field(init=False)
     _refits: "dict[Hypothesis, Problem | None]" = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         jams = observed_jams([part.rows for part in self.trials], self.space.anatomy)
         self.space = self._told_apart(replace(self.space, observed=jams))
-        self.has_test = self.table.is_piecewise([part.trial for part in self.trials])
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
         is_comparable = self.table.is_piecewise(every) and self.table.uses_segments(every)

@@ -21,7 +21,7 @@ from selfmodel.faults.registry import kind_names, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import path_of
 from selfmodel.recovery.scores import Score
-from selfmodel.settings import Settings
+from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.cells import Cell
@@ -85,6 +85,7 @@ def ablation(
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
+    diagnostic_searches: str | Iterable[str] = STEPWISE,
     next_trial: str = BANK,
     bank: str | Path | None = None,
     score: str | Score | None = None,
@@ -92,7 +93,10 @@ def ablation(
     search: str | None = None,
     only: Share = ALL,
 ) -> Study:
-    """Returns a study in which every comparator diagnoses the same trials.
+    """Returns a study in which every comparator diagnoses the same trials at equal cost.
+
+    All comparators have the same search, and simulate as many control steps for each trial, at
+    most: without a limit in the settings, those of the paper's EA, a rollout for each evaluation.
 
     The diagnoses of a run need its trials, which need its gaits. With other choices of the next
     trial than the bank, a recovery needs the first gait alone.
@@ -110,6 +114,7 @@ def ablation(
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
+        diagnostic_searches: Searches of each comparator, of ``DIAGNOSTIC_SEARCHES``.
         next_trial: One of ``NEXT_TRIAL``.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: The fitness, or its name; None for that of the repair.
@@ -124,9 +129,16 @@ def ablation(
     damages = names_of(damages, "failures in notation", Hypothesis)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings = arguments.settings_of(settings)
+    if settings.max_simulated_steps is None:
+        limit = settings.evaluations * settings.steps
+        settings = dataclasses.replace(settings, max_simulated_steps=limit)
+    searches = names_of(diagnostic_searches, "searches of a diagnosis, such as ea")
+    for one in searches:
+        plugins.check_known("diagnostic search", one, DIAGNOSTIC_SEARCHES)
     chosen, by_bank = repair_parameters(repair, search, score), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
+    lists |= {"diagnostic searches": searches}
     _check(lists, cases, damages, next_trial, trials)
     if bank is not None and by_bank and repair != plugins.PAPER:
         raise InputError(
@@ -163,11 +175,17 @@ def ablation(
             return {"gait": gait(robot, seed % GAITS)}
         count = max(HEALTHY_TRIALS, trials)
         gaits = {f"gait-{number}": gait(robot, (seed + number) % GAITS) for number in range(count)}
-        run = {name: value for name, value in point.items() if name != "comparator"}
+        methods = ("comparator", "diagnostic_search")
+        run = {name: value for name, value in point.items() if name not in methods}
         function = f"{recoveries.__name__}:run_trials"
         return {"trials": Cell(function, _name(run), {**run, "shared": shared}, gaits, "trials")}
 
-    points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
+    points = [
+        {**run, "comparator": comparator, "diagnostic_search": one}
+        for run in runs
+        for comparator in comparators
+        for one in searches
+    ]
     function = "diagnose" if by_bank else "recover"
     return _study("ablate", folder, points, shared, needs, function=function)
 
@@ -237,7 +255,7 @@ def paper(
     """
     robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases, 1)
     seeds, comparators = whole_numbers("seeds", seeds, 0, 0), plugins.comparator_names(comparators)
-    settings = arguments.settings_of(settings)
+    settings = dataclasses.replace(arguments.settings_of(settings), diagnostic_search=EA)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)
     _check_cases("case of Table I", cases, TABLE_ONE)
@@ -302,7 +320,10 @@ def _name(run: Point) -> str:
     """Returns the name of a run or of a point, in which a colon of a plug-in's is quoted."""
     failure = quote(run["truth"], safe="=") if run["case"] is None else f"case{run['case']:02d}"
     name = f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
-    return f"{name}-{quote(run['comparator'], safe='=')}" if "comparator" in run else name
+    if "comparator" not in run:
+        return name
+    search = f"-{run['diagnostic_search']}".replace("+", "-") if "diagnostic_search" in run else ""
+    return f"{name}-{quote(run['comparator'], safe='=')}{search}"
 
 
 def _shared(
@@ -310,7 +331,7 @@ def _shared(
 ) -> dict[str, Any]:
     """Returns the parameters of all points: those of a recovery, with their defaults."""
     return {
-        "settings": dataclasses.asdict(settings),
+        "settings": settings.as_json(),
         "kinds": kind_names(kinds),
         **repair,
         "next_trial": next_trial,

@@ -8,7 +8,7 @@ import base64
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -40,7 +40,7 @@ from selfmodel.recovery.result import Event, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
+from selfmodel.settings import ADDED, Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import experiment as experiments
@@ -58,7 +58,7 @@ HEALTHY_TRIALS = 2
 ON_ROBOT = "evolution-on-robot"
 """In place of a comparator: the paper's control, the repair EA on the damaged robot."""
 
-DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
+DIAGNOSIS_SETTINGS = ("trials", "genes", "kept", *ADDED)
 """Names of the settings that do not affect a gait."""
 
 Parameters = Mapping[str, Any]
@@ -205,6 +205,13 @@ def run_trials(parameters: Parameters, needs: Folders, folder: Path) -> list[str
     return [trial.plan.name for trial in trials]
 
 
+def settings_of(parameters: Parameters) -> Settings:
+    """Returns the settings of a point, with its diagnostic search."""
+    settings = Settings(**parameters["shared"]["settings"])
+    search = parameters.get("diagnostic_search", settings.diagnostic_search)
+    return dataclasses.replace(settings, diagnostic_search=search)
+
+
 def truth_of(parameters: Parameters, robot: Robot) -> Hypothesis:
     """Returns the failure of the physical robot of a point."""
     kinds = plugins.kinds(parameters["shared"]["kinds"])
@@ -221,11 +228,11 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     search = DiagnosticSearch(
         Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
         chosen_comparator((), robot, trials, given=given).comparator,  # it refuses all at once
-        Settings(**shared["settings"]),
+        settings_of(parameters),
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],
     )
-    watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
+    watch = _DiagnosisWatch()
     diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
     return {"diagnoses": watch.rows(shared, robot, truth_of(parameters, robot), trials)}
 
@@ -238,7 +245,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     if parameters["comparator"] == ON_ROBOT:
         return _evolve_on_robot(parameters, needs)
     shared, entry = parameters["shared"], planned_entry(parameters)
-    robot, settings = entry.robot(), Settings(**shared["settings"])
+    robot, settings = entry.robot(), settings_of(parameters)
     design = plugins.design(shared["controller"], robot, shared["neurons"])
     truth, gait = truth_of(parameters, robot), read_controller(needs["gait"] / GAIT, robot)
     check_silent_neurons(design, silent_neurons(truth))
@@ -278,7 +285,6 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     for row in diagnoses:
         tried = recoveries[: row["trials"] - 1]
         row |= {"before": before, "after": after, "recovered": max(tried, default=None)}
-    diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
     own = {
         "robot": robot.name,
         "compared_by": recovery.comparator.comparator.name,
@@ -339,14 +345,10 @@ def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
 
 
 class _DiagnosisWatch:
-    """Keeps each diagnosis with what it took until then.
+    """Keeps each diagnosis with what it took until then."""
 
-    Args:
-        count: Returns the number of distinct hypotheses so far; None if it is unknown.
-    """
-
-    def __init__(self, count: Callable[[], int | None] = lambda: None) -> None:
-        self._count, self._costs = count, list[tuple[Diagnosis, Row]]()
+    def __init__(self) -> None:
+        self._costs = list[tuple[Diagnosis, Row]]()
         self._evaluations, self._seconds, self._start, self._diagnosing = 0, 0.0, 0.0, False
 
     def __call__(self, event: Event) -> None:
@@ -360,7 +362,8 @@ class _DiagnosisWatch:
                 self._seconds += perf_counter() - self._start
                 cost = {
                     "evaluations": self._evaluations,
-                    "distinct_hypotheses": self._count(),
+                    "distinct_hypotheses": event.cost.hypotheses,
+                    "simulated_steps": event.cost.control_steps,
                     "seconds": self._seconds,
                 }
                 self._costs.append((event, cost))

@@ -17,7 +17,10 @@ from selfmodel.files import read_file
 from selfmodel.studies import comparisons
 from selfmodel.studies.study import Row, rows_in, shared_in
 
-INTEGERS = ("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged")
+INTEGERS = (
+    *("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged"),
+    "simulated_steps",
+)
 """Columns of whole numbers, of which some may be unknown."""
 
 MAX_BYTES = 2**30
@@ -126,11 +129,11 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "ablate": Kind(
             "diagnoses",
-            "robot case truth gap seed next_trial comparator trials best correct distance "
-            "intact_distance verdict rivals evaluations distinct_hypotheses seconds before after "
-            "recovered repair search",
-            "repair search",
-            "robot truth gap seed comparator trials",
+            "robot case truth gap seed next_trial comparator diagnostic_search trials best correct "
+            "distance intact_distance verdict rivals evaluations distinct_hypotheses "
+            "simulated_steps seconds before after recovered repair search",
+            "diagnostic_search simulated_steps repair search",
+            "robot truth gap seed comparator diagnostic_search trials",
             _of_ablation,
         ),
         "rivals": Kind(
