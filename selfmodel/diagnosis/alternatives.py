@@ -29,8 +29,10 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     place of one of its faults, or are single faults or none; they have at most as many faults. The
     eight best by the surrogate are compared, with the severity of the other fault fitted, and the
     empty hypothesis. The lead is that of the loss, or that at a joint at which the two differ;
-    infinite over a neighbour of whose faults one corrects model error. They are sorted by total
-    loss.
+    infinite over a neighbour of whose faults one corrects model error. With fewer than
+    ``MIN_PIECES`` losses, as of a comparator with one distance per trial, there is no lead, unless
+    the best hypothesis reproduces the trials: among a hundred hypotheses, one has a small distance
+    by chance. They are sorted by total loss.
     """
     space = problem.space
     neighbours = dict.fromkeys(
@@ -43,8 +45,15 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
         for one in followed(few, "alternatives", problem.observer)
     ]
     others = [one for one in dict.fromkeys([*few, *fitted, INTACT]) if best.lacking(one)]
+    (losses,) = problem.losses([best])
+    is_decided = (
+        len(losses) >= significance.MIN_PIECES or losses.mean() <= significance.NEGLIGIBLE_LOSS
+    )
     leads = {}
     for one in by_total_loss(others, problem.losses):
+        if not is_decided:
+            leads[one] = 0.0
+            continue
         lead = significance.lead(*problem.losses([best, one]))
         if problem.has_joints:
             lead = max(lead, lead_at_joints(best, one, problem))

@@ -8,7 +8,6 @@ Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulat
 differences of two hypotheses' losses, over all times afterwards.
 """
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -111,7 +110,7 @@ class DiagnosticSearch:
         ``observer`` is called after each generation, and with the progress of each later stage.
         """
         limit, account = self._settings.max_simulated_steps, self.losses.account
-        account.limit = math.inf if limit is None else limit * len(trials)
+        account.limit = None if limit is None else limit * len(trials)
         try:
             diagnosis = self._searched(trials, seeds, rng, observer)
         except LimitReachedError:
@@ -169,7 +168,7 @@ class DiagnosticSearch:
         if INTACT not in known:
             raise InputError(
                 f"expected a limit of control steps with which a hypothesis can be simulated in "
-                f"all trials, got {account.limit:.0f} for {len(trials)}: give more"
+                f"all trials, got {account.limit} for {len(trials)}: give more"
             )
         totals = dict(zip(known, map(float, self.losses.distances(known, trials)), strict=True))
         ranked = by_distance(totals)
@@ -186,7 +185,7 @@ class DiagnosticSearch:
             verdict="not judged",
             test=significance.TEST,
             doubt=Doubt(
-                f"the limit of {account.limit:,.0f} simulated control steps ended the search",
+                f"the limit of {account.limit:,} simulated control steps ended the search",
                 "give more steps (--max-simulated-steps), or search fewer kinds of faults",
             ),
         )

@@ -1,6 +1,6 @@
 """Losses of hypotheses on logged trials, by a comparator."""
 
-import math
+import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -62,14 +62,19 @@ class Account:
     """What the comparisons of a diagnosis have simulated; refits of the self-model are no part.
 
     Attributes:
-        limit: Largest number of control steps.
+        limit: Largest number of control steps; None for any.
         steps: Control steps so far, of all hypotheses, trials and surrogates.
         hypotheses: Distinct hypotheses so far.
     """
 
-    limit: float = math.inf
+    limit: int | None = None
     steps: int = 0
     hypotheses: set[Hypothesis] = field(default_factory=set)
+
+    @property
+    def left(self) -> int:
+        """Control steps that may still be simulated."""
+        return sys.maxsize if self.limit is None else max(self.limit - self.steps, 0)
 
 
 class LossTable:
@@ -245,8 +250,8 @@ class LossTable:
         known, key = self._known, (trial.content, number)
         missing = list(dict.fromkeys(one for one in hypotheses if (*key, one) not in known))
         account, stats = self.account, self._simulator.stats
-        afforded = (account.limit - account.steps) // steps_of(section.request, trial)
-        possible = missing[: int(min(max(afforded, 0), len(missing)))]
+        afforded = account.left // steps_of(section.request, trial)
+        possible = missing[: min(afforded, len(missing))]
         size = largest_batch(self._simulator.robot, section.request, trial.trajectory.steps)
         for first in range(0, len(possible), size):
             batch, before = possible[first : first + size], stats.steps

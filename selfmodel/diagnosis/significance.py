@@ -53,7 +53,8 @@ MIN_Z_OF_CHANGE = 5.0
 The threshold is higher than for a fault, because each time and each candidate is tested."""
 
 MIN_PIECES = 8
-"""Pieces before and after a change, and known pieces of a joint, at least."""
+"""Pieces before and after a change, known pieces of a joint, and pieces that tell a hypothesis from
+its alternatives, at least."""
 
 CHANGE_TOLERANCE = 2.0
 """Loss that the bounds of the interval of a change may cost, in mean differences of a piece."""
