@@ -60,7 +60,7 @@ def diagnose(options: Diagnose) -> None:
     print_lines(
         f"{result.robot}, {counted(len(paths), 'log')}, {result.comparator}: "
         f"{result.evaluations} evaluations by the EA, {result.distinct_hypotheses} distinct "
-        f"hypotheses, {result.seconds:.1f} s.",
+        f"hypotheses, {diagnosis.cost.control_steps} simulated steps, {result.seconds:.1f} s.",
         f"Comparator {result.comparator}: {result.comparator_reason}.",
         text.verdict_sentences(diagnosis),
         text.fit_sentence(diagnosis),

@@ -217,7 +217,7 @@ class Diagnosis:
         residual: Signals and time of the loss that is left, if it is unexplained.
         doubt: Why the trials cannot be judged, if they cannot.
         probability: Probabilities of the best hypothesis and its neighbours, by their notation; see
-            ``verdict.probabilities``. None of a comparator without a test, without healthy trials,
+            ``verdict.probabilities``. None without healthy trials,
             and of trials that are not judged.
         cost: What the search has simulated.
         left_out: Faults of the best hypothesis of the search that an error of the self-model
