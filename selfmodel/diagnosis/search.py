@@ -4,8 +4,8 @@
 the local search from the best of the EA. The EA (the paper, section III) finds the neighbourhood.
 The local search tests every neighbour and keeps a fault only where the trials require it; with
 losses of many short segments it finds the same hypothesis from nearly every start. A comparator
-with one distance per trial has few pieces for the paired tests: one hypothesis is then better than
-another with a third of the distance. The local search:
+with one distance per trial has no paired test: a hypothesis is then better than another whose sum
+of distances is 10 % larger. The local search:
 
 1. **Starts**: the best hypotheses of the EA or of the last diagnosis, the empty hypothesis, and the
    ``STARTS`` best single faults by the surrogate comparator, one per kind and part. Severities are
