@@ -129,6 +129,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     unsearched: dict[str, Any] | None = None
     also_searched: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    cost: dict[str, int] = {}  # a struct copies it
     intact_distance: float | None
     reason: str | None = None
     summary: str = ""
