@@ -173,7 +173,7 @@ class TrialHeader:
 
 def parse_settings(data: bytes) -> Settings:
     """Returns the settings of a log; a missing setting has its default."""
-    values = msgspec.json.decode(data, type=dict[str, float | int])
+    values = msgspec.json.decode(data, type=dict[str, float | int | str | None])
     if unknown := values.keys() - {field.name for field in dataclasses.fields(Settings)}:
         raise ValueError(f"there is no setting {min(unknown)!r}")
     return msgspec.convert(values, Settings)

@@ -12,7 +12,6 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path, PurePath
@@ -137,6 +136,7 @@ class DiagnosisResult(Struct, frozen=True, kw_only=True):
     unsearched: dict[str, Any] | None = None
     also_searched: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    cost: dict[str, int] = {}  # a struct copies it
     intact_distance: float | None
     reason: str | None = None
     summary: str = ""
@@ -228,8 +228,8 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         self, settings: Settings, files: dict[str, str], of_repair: Settings | None = None
     ) -> dict[str, Any]:
         """Returns the content of ``result.json``, with settings and digests of the logs."""
-        own = UNSET if of_repair is None else asdict(of_repair)
-        facts = {"settings": asdict(settings), "repair_settings": own, "files": files}
+        own = UNSET if of_repair is None else of_repair.as_json()
+        facts = {"settings": settings.as_json(), "repair_settings": own, "files": files}
         return as_json(msgspec.structs.replace(self, **facts))
 
 

@@ -5,7 +5,7 @@ import json
 import platform
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, astuple
+from dataclasses import astuple
 from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
@@ -302,7 +302,7 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         log.attach(name, data)
     if controller:
         log.attach(records.CONTROLLER_FILE, controller)
-    log.attach(records.SETTINGS_FILE, json.dumps(asdict(header.settings), indent=1).encode())
+    log.attach(records.SETTINGS_FILE, json.dumps(header.settings.as_json(), indent=1).encode())
     if header.imported is not None:
         log.metadata(records.IMPORT, header.imported.facts)
         log.attach(records.MAPPING_FILE, header.imported.mapping.encode())

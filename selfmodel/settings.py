@@ -4,8 +4,9 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
-from selfmodel.errors import InputError, real_number, whole_number
+from selfmodel.errors import InputError, real_number, unknown_name, whole_number
 
 MAX_SETTINGS: Mapping[str, int] = MappingProxyType(
     {
@@ -18,9 +19,20 @@ MAX_SETTINGS: Mapping[str, int] = MappingProxyType(
 exhaust the memory."""
 
 
+EA, STEPWISE, EA_STEPWISE = "ea", "stepwise", "ea+stepwise"
+DIAGNOSTIC_SEARCHES = (EA_STEPWISE, STEPWISE, EA)
+"""Searches of a diagnosis: the paper's EA, the local search, and the local search from the best of
+the EA; the default is the first."""
+
+
+ADDED = ("diagnostic_search", "max_simulated_steps")
+"""Settings that logs of selfmodel 0.2 and before do not have: a log has them only if they are
+set."""
+
+
 @dataclass(frozen=True)
 class Settings:
-    """Run length, parameters of both EAs, and the number of recovery trials.
+    """Run length, parameters of both EAs, the search of a diagnosis, and the number of trials.
 
     Source: the paper, sections III and IV. Its surviving text has lost digits; the values of
     ``steps``, ``population``, ``generations`` and ``survivors`` are reconstructed.
@@ -42,6 +54,9 @@ class Settings:
         crossovers: Number of pairs of children with one-point crossover.
         genes: Number of genes of a diagnostic genome, the largest number of faults.
         kept: Number of hypotheses that a diagnosis reports and that seed the next diagnosis.
+        diagnostic_search: Search of a diagnosis, one of ``DIAGNOSTIC_SEARCHES``.
+        max_simulated_steps: Control steps that a diagnosis may simulate for each of its trials, in
+            its search and for its verdict; None for no limit.
 
     Raises:
         InputError: A setting is no number, out of range, or inconsistent with another setting. A
@@ -58,18 +73,16 @@ class Settings:
     crossovers: int = 12
     genes: int = 4
     kept: int = 10
+    diagnostic_search: str = EA_STEPWISE
+    max_simulated_steps: int | None = None
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            number = real_number if field.name == "mutation" else whole_number
-            value = number(field.name, getattr(self, field.name), getattr(Settings, field.name))
-            object.__setattr__(self, field.name, value)
-        for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name, most in MAX_SETTINGS.items():
-            if getattr(self, name) > most:
-                raise InputError(f"{name} must be at most {most}, got {getattr(self, name)}")
+        if self.diagnostic_search not in DIAGNOSTIC_SEARCHES:
+            raise unknown_name("diagnostic search", self.diagnostic_search, DIAGNOSTIC_SEARCHES)
+        if (most := self.max_simulated_steps) is not None:
+            steps = whole_number("max_simulated_steps", most, 10**6, least=1)
+            object.__setattr__(self, "max_simulated_steps", steps)
+        self._check_numbers()
         if self.steps < 2:
             raise InputError(
                 f"steps must be at least 2, so that there is a first and a last, got {self.steps}"
@@ -79,14 +92,33 @@ class Settings:
                 f"population must exceed the {self.survivors} survivors, got {self.population}: "
                 f"for another population use Settings().scaled({max(2, self.population)})"
             )
-        if not 0 <= self.mutation <= 1:
-            raise InputError(f"mutation is a probability in [0, 1], got {self.mutation}")
         if not 0 <= self.crossovers <= (self.population - self.survivors) // 2:
             raise InputError(
                 f"crossovers must be between 0 and the "
                 f"{(self.population - self.survivors) // 2} pairs of children, "
                 f"got {self.crossovers}"
             )
+
+    def _check_numbers(self) -> None:
+        for field in dataclasses.fields(self):
+            if field.name in ADDED:
+                continue
+            number = real_number if field.name == "mutation" else whole_number
+            value = number(field.name, getattr(self, field.name), getattr(Settings, field.name))
+            object.__setattr__(self, field.name, value)
+        for name in ("trials", "generations", "survivors", "tournament", "genes", "kept"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} must be at least 1, got {getattr(self, name)}")
+        for name, most in MAX_SETTINGS.items():
+            if getattr(self, name) > most:
+                raise InputError(f"{name} must be at most {most}, got {getattr(self, name)}")
+        if not 0 <= self.mutation <= 1:
+            raise InputError(f"mutation is a probability in [0, 1], got {self.mutation}")
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns the settings by name; those that came after format 0.2 only if they are set."""
+        new = [name for name in ADDED if getattr(self, name) == getattr(Settings, name)]
+        return {k: v for k, v in dataclasses.asdict(self).items() if k not in new}
 
     @property
     def evaluations(self) -> int:

@@ -32,7 +32,6 @@ class Room(SphinxDirective):
 
 def _lines(package: ModuleType) -> Iterator[str]:
     public = set(getattr(package, "__all__", ()))
-    instances = set(public)
     for module in (package, *_modules(package)):
         defined = {name: told for name, told in _defined(module) if not name.startswith("_")}
         if not (public & set(defined) if public else any(defined.values())):

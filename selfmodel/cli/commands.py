@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
-from selfmodel.settings import Settings
+from selfmodel.settings import EA, STEPWISE, Settings
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
@@ -55,6 +55,8 @@ class FromLogs(Command):
     calibrate: bool = True
     population: int | None = None
     generations: int | None = None
+    diagnostic_search: str | None = None
+    max_simulated_steps: int | None = None
     seed: int | None = None
     threads: int = 0
 
@@ -80,6 +82,8 @@ class Study(Computed):
     trials: int = Settings.trials
     population: int = Settings.population
     generations: int = Settings.generations
+    diagnostic_search: str = Settings.diagnostic_search
+    max_simulated_steps: int | None = None
 
     @property
     def settings(self) -> Settings:
@@ -141,6 +145,8 @@ class Recover(Robot):
     generations: int = Settings.generations
     repair_population: int | None = None
     repair_generations: int | None = None
+    diagnostic_search: str = Settings.diagnostic_search
+    max_simulated_steps: int | None = None
     out: Path | None = None
     threads: int = 0
     report: bool = False
@@ -309,6 +315,7 @@ class Ablate(Study, Repair):
     damages: str = ""
     kinds: str = "default"
     comparators: str = "all"
+    diagnostic_search: str = STEPWISE
     gaps: str = "0"
     next_trial: str = "bank"
     bank: Path | None = None
@@ -356,6 +363,7 @@ class RepeatPaper(Study):
 
     robots: str = "all"
     comparators: str = "forward-displacement,auto"
+    diagnostic_search: str = EA
 
 
 class Compare(Command):
@@ -384,7 +392,14 @@ class Check(Command):
 
 def settings_of(options: Study | Recover, steps: int) -> Settings:
     """Returns the parameters of a recovery in trials of that many steps."""
-    small = Settings(steps=steps, trials=options.trials, generations=options.generations)
+    small = Settings(
+        steps=steps,
+        trials=options.trials,
+        generations=options.generations,
+        # An ablation has several, in order.
+        diagnostic_search=options.diagnostic_search.split(",")[0],
+        max_simulated_steps=options.max_simulated_steps,
+    )
     return small.scaled(options.population)
 
 

@@ -60,7 +60,7 @@ def diagnose(options: Diagnose) -> None:
     print_lines(
         f"{result.robot}, {counted(len(paths), 'log')}, {result.comparator}: "
         f"{result.evaluations} evaluations by the EA, {result.distinct_hypotheses} distinct "
-        f"hypotheses, {result.seconds:.1f} s.",
+        f"hypotheses, {diagnosis.cost.control_steps} simulated steps, {result.seconds:.1f} s.",
         f"Comparator {result.comparator}: {result.comparator_reason}.",
         text.verdict_sentences(diagnosis),
         text.fit_sentence(diagnosis),
@@ -91,6 +91,10 @@ def diagnose_logs(
         settings = dataclasses.replace(settings, generations=options.generations)
     if options.population is not None:
         settings = settings.scaled(options.population)
+    if options.diagnostic_search is not None:
+        settings = dataclasses.replace(settings, diagnostic_search=options.diagnostic_search)
+    if options.max_simulated_steps is not None:
+        settings = dataclasses.replace(settings, max_simulated_steps=options.max_simulated_steps)
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
         inputs = set_up_diagnosis(

@@ -12,7 +12,6 @@ from selfmodel.robot.actuators import command_ranges, motor_joints
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import FixedBase, FreeBase, read_base
-from selfmodel.studies import plans
 from selfmodel.tasks import ROBOTS, Entry
 
 
@@ -37,7 +36,7 @@ def robots(options: Robots) -> None:
 
 def list_bodies(options: ListSuite) -> None:
     """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
-    found = [_domain_facts(domain) for domain in plans.DOMAINS]
+    found = [_domain_facts(domain) for domain in bodies.DOMAINS]
     if options.as_json:
         print_json({"domains": found})
         return
@@ -76,12 +75,12 @@ def _facts(entry: Entry) -> dict[str, Any]:
 
 
 def _domain_facts(domain: str) -> dict[str, Any]:
-    entry = arguments.robot_entry(plans.bodies_of([domain], None)[0])
+    entry = arguments.robot_entry(bodies.bodies_of([domain], None)[0])
     facts, robot = _facts(entry), entry.robot()
     return {
         "domain": domain,
-        "tasks": list(plans.DOMAINS[domain]),
-        "robots": list(plans.bodies_of([domain], plans.DOMAINS[domain])),
+        "tasks": list(bodies.DOMAINS[domain]),
+        "robots": list(bodies.bodies_of([domain], bodies.DOMAINS[domain])),
         **{parts: len(facts[parts]) for parts in ("joints", "hinges", "sensors", "motors")},
         "weights": facts["weights"],
         "physics_timestep": float(robot.model.opt.timestep),

@@ -25,7 +25,7 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.plugins import RETURN
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies import paper_page, plans, tables as formats
+from selfmodel.studies import bodies, paper_page, plans, tables as formats
 from selfmodel.studies.definition import read_study
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
@@ -54,6 +54,7 @@ def ablate(options: Ablate) -> None:
         damages=_damages(options),
         kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
+        diagnostic_searches=options.diagnostic_search.split(","),
         gaps=inputs.numbers("--gap", options.gaps),
         seeds=options.every_seed,
         settings=options.settings,
@@ -70,20 +71,20 @@ def ablate(options: Ablate) -> None:
 
 def run_suite(options: RunSuite) -> None:
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds."""
-    names = inputs.texts("--domains", options.domains, plans.DOMAINS)
+    names = inputs.texts("--domains", options.domains, bodies.DOMAINS)
     wanted = (
         None
         if options.tasks is None
-        else inputs.texts("--tasks", options.tasks, plans.tasks_of(names))
+        else inputs.texts("--tasks", options.tasks, bodies.tasks_of(names))
     )
-    bodies = plans.bodies_of(names, wanted)
+    chosen = bodies.bodies_of(names, wanted)
     # The last sample of a trial has no reward.
     length = options.steps or (EPISODE + 1 if options.score == RETURN else Settings.steps)
     settings = settings_of(options, length)
     study = plans.suite(
         options.out,
-        bodies=bodies,
-        cases=_cases(options, plans.known_cases(bodies)),
+        bodies=chosen,
+        cases=_cases(options, bodies.known_cases(chosen)),
         damages=_damages(options),
         seeds=options.every_seed,
         settings=settings,
@@ -106,7 +107,7 @@ def paper(options: RepeatPaper) -> None:
     study = plans.paper(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
-        cases=inputs.whole_numbers("--case", options.cases, plans.TABLE_ONE),
+        cases=inputs.whole_numbers("--case", options.cases, bodies.TABLE_ONE),
         seeds=options.every_seed,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         settings=options.settings,

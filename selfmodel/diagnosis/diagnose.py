@@ -17,20 +17,28 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis import significance
+from selfmodel.diagnosis.alternatives import best_severities
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Change, Diagnosis
+from selfmodel.diagnosis.diagnosis import Candidate, Change, Cost, Diagnosis, Doubt
 from selfmodel.diagnosis.joints import with_joint_faults
-from selfmodel.diagnosis.losses import LossFunction, LossTable, Timeline
+from selfmodel.diagnosis.losses import LimitReachedError, LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
-from selfmodel.diagnosis.search import LocalSearch, evolved, with_fitted_severities
+from selfmodel.diagnosis.search import (
+    LocalSearch,
+    by_distance,
+    chosen_of,
+    evolved,
+    with_fitted_severities,
+)
 from selfmodel.diagnosis.verdict import diagnosis_of
+from selfmodel.errors import InputError
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS, PAPER_KINDS, suitable
 from selfmodel.progress import Progress
-from selfmodel.settings import Settings
+from selfmodel.settings import EA, STEPWISE, Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPart, trial_names
 
@@ -44,13 +52,13 @@ SHORTLIST = 8
 class DiagnosticSearch:
     """Diagnoses logged trials; every loss is kept for the next diagnosis.
 
-    For a comparator with losses per segment or window, the best hypotheses of the EA are refined;
-    see ``search``. For another, the ranking is that of the EA.
+    The search is that of the settings; see ``search``. At their limit of simulated control steps it
+    ends with the best hypothesis so far, and the trials are ``not judged``.
 
     Args:
         simulator: The self-model.
         comparator: Distance between simulations and a trial.
-        settings: Parameters of the EA.
+        settings: The search, its limit, and the parameters of the EA.
         kinds: Fault kinds to search, as far as they apply to the robot; see ``HypothesisSpace.of``.
             If they include the default ones, unsearched kinds that predict the trials better are
             searched too, but for robots with a fixed base.
@@ -86,7 +94,6 @@ class DiagnosticSearch:
         is_whole = set(kinds).issuperset(suitable(DEFAULT_KINDS, anatomy))
         self._is_extended = is_whole and not simulator.robot.has_fixed_base
         self._healthy_trials = [*map(TrialPart, healthy_trials)]
-        self._proposed: set[Hypothesis] = set()
         self.losses = LossTable(simulator, comparator)
         self.evaluations = 0
 
@@ -102,7 +109,24 @@ class DiagnosticSearch:
         ``seeds`` are hypotheses of the initial population, in addition to random ones. The
         ``observer`` is called after each generation, and with the progress of each later stage.
         """
-        table, coarse_trials = surrogate = self.losses.surrogate(trials)
+        limit, account = self._settings.max_simulated_steps, self.losses.account
+        account.limit = None if limit is None else limit * len(trials)
+        try:
+            diagnosis = self._searched(trials, seeds, rng, observer)
+        except LimitReachedError:
+            diagnosis = self._unfinished(trials)
+        return replace(diagnosis, cost=Cost(len(account.hypotheses), account.steps))
+
+    def _searched(
+        self,
+        trials: Sequence[Trial],
+        seeds: Sequence[Hypothesis],
+        rng: np.random.Generator,
+        observer: Callable[[Generation | Progress], None],
+    ) -> Diagnosis:
+        """Returns the diagnosis by the search of the settings."""
+        self.losses.losses([INTACT], trials)  # with a limit, something to end with
+        surrogate, how = self.losses.surrogate(trials), self._settings.diagnostic_search
         space = self._space.including(seeds[:1])
         problem = Problem(
             self.losses,
@@ -115,14 +139,15 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
-        known = [one for one in seeds if problem.space.has(one)]
-        distances = partial(table.distances, trials=coarse_trials)
-        ranked, evaluations = evolved(
-            distances, problem.space, self._settings, known, rng, on_generation=observer
-        )
-        self.evaluations += evaluations
-        self._proposed.update(ranked)
-        if not problem.has_test:
+        ranked = [one for one in seeds if problem.space.has(one)]
+        if how != STEPWISE:
+            table, of_trials = (self.losses, trials) if how == EA else surrogate
+            distances = partial(table.distances, trials=of_trials)
+            ranked, evaluations = evolved(
+                distances, problem.space, self._settings, ranked, rng, on_generation=observer
+            )
+            self.evaluations += evaluations
+        if how == EA:
             return diagnosis_of(problem, ranked)
         starts = ranked[:REFINEMENT_STARTS]
         diagnosis = self._refined_diagnosis(starts, trials, problem)
@@ -133,6 +158,37 @@ class DiagnosticSearch:
         asked = self._space.kinds
         also = tuple(kind.name for kind in problem.space.kinds if kind not in asked)
         return replace(diagnosis, also_searched=also)
+
+    def _unfinished(self, trials: Sequence[Trial]) -> Diagnosis:
+        """Returns the diagnosis of a search that its limit has ended: the best so far.
+
+        The EA alone decides by the distance, as ever; the other searches by their tests.
+        """
+        known, account = self.losses.known(trials), self.losses.account
+        if INTACT not in known:
+            raise InputError(
+                f"expected a limit of control steps with which a hypothesis can be simulated in "
+                f"all trials, got {account.limit} for {len(trials)}: give more"
+            )
+        totals = dict(zip(known, map(float, self.losses.distances(known, trials)), strict=True))
+        ranked = by_distance(totals)
+        if self._settings.diagnostic_search != EA:
+            ranked = [chosen_of(known, partial(self.losses.losses, trials=trials)), *ranked]
+        return Diagnosis(
+            ranked=tuple(
+                Candidate(one, totals[one])
+                for one in best_severities(ranked)[: self._settings.kept]
+            ),
+            trials=len(trials),
+            intact_distance=totals[INTACT],
+            indistinguishable=(),
+            verdict="not judged",
+            test=significance.TEST,
+            doubt=Doubt(
+                f"the limit of {account.limit:,} simulated control steps ended the search",
+                "give more steps (--max-simulated-steps), or search fewer kinds of faults",
+            ),
+        )
 
     def _refined_diagnosis(
         self, starts: Sequence[Hypothesis], trials: Sequence[Trial], problem: Problem
@@ -148,8 +204,8 @@ class DiagnosticSearch:
 
     @property
     def distinct_hypotheses(self) -> int:
-        """Number of distinct hypotheses that were proposed, by all searches so far."""
-        return len(self._proposed)
+        """Number of distinct hypotheses that were simulated, by all diagnoses so far."""
+        return len(self.losses.account.hypotheses)
 
     def _refined(
         self, known: Iterable[Hypothesis], problem: Problem
@@ -162,9 +218,7 @@ class DiagnosticSearch:
         best = search.refined(known)
         if problem.has_joints:
             best = with_joint_faults(best, search)
-        compared = search.compared | {best, INTACT}
-        self._proposed |= compared | search.proposed
-        return best, compared
+        return best, search.compared | {best, INTACT}
 
     def _after_change(
         self,

@@ -111,6 +111,22 @@ class Doubt:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """What a search has simulated, with the surrogates and the tests of the verdict.
+
+    Refits of the self-model are no part of it. Of trials that are diagnosed one by one, it is the
+    cost of all diagnoses so far.
+
+    Attributes:
+        hypotheses: Distinct hypotheses.
+        control_steps: Control steps of their simulations.
+    """
+
+    hypotheses: int
+    control_steps: int
+
+
+@dataclass(frozen=True)
 class Change:
     """A change of the robot, or of its environment, at a time.
 
@@ -175,8 +191,8 @@ class Diagnosis:
 
     Attributes:
         ranked: Candidates, at least one. The first is the best: the hypothesis with the fewest
-            faults, each of which makes the prediction significantly better; for a comparator
-            without a significance test, the one with the smallest distance. The others follow by
+            faults, each of which makes the prediction significantly better; of the EA alone,
+            the one with the smallest distance. The others follow by
             distance, at equal distances by number of faults. Of hypotheses that differ in
             severities alone, only the first is ranked.
         trials: Number of trials.
@@ -201,8 +217,9 @@ class Diagnosis:
         residual: Signals and time of the loss that is left, if it is unexplained.
         doubt: Why the trials cannot be judged, if they cannot.
         probability: Probabilities of the best hypothesis and its neighbours, by their notation; see
-            ``verdict.probabilities``. None of a comparator without a test, without healthy trials,
+            ``verdict.probabilities``. None without healthy trials,
             and of trials that are not judged.
+        cost: What the search has simulated.
         left_out: Faults of the best hypothesis of the search that an error of the self-model
             explains as well; see ``adequacy.supported``. ``fit`` is then by the refitted model.
     """
@@ -224,6 +241,7 @@ class Diagnosis:
     doubt: Doubt | None = None
     probability: Mapping[str, float] = field(default_factory=dict)
     left_out: tuple[Hypothesis, ...] = ()
+    cost: Cost = Cost(0, 0)
 
     @property
     def best(self) -> Hypothesis:

@@ -1,8 +1,9 @@
 """Losses of hypotheses on logged trials, by a comparator."""
 
+import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from selfmodel.diagnosis.comparator import (
 )
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
@@ -52,6 +53,30 @@ class Timeline(NamedTuple):
     end: FloatArray
 
 
+class LimitReachedError(Exception):
+    """A comparison would simulate more than a diagnosis may."""
+
+
+@dataclass(eq=False)
+class Account:
+    """What the comparisons of a diagnosis have simulated; refits of the self-model are no part.
+
+    Attributes:
+        limit: Largest number of control steps; None for any.
+        steps: Control steps so far, of all hypotheses, trials and surrogates.
+        hypotheses: Distinct hypotheses so far.
+    """
+
+    limit: int | None = None
+    steps: int = 0
+    hypotheses: set[Hypothesis] = field(default_factory=set)
+
+    @property
+    def left(self) -> int:
+        """Control steps that may still be simulated."""
+        return sys.maxsize if self.limit is None else max(self.limit - self.steps, 0)
+
+
 class LossTable:
     """Losses of hypotheses on trials, by the content of the trial and the hypothesis.
 
@@ -61,19 +86,36 @@ class LossTable:
     a piece in it are simulated.
     """
 
-    def __init__(self, simulator: Simulator, comparator: Comparator) -> None:
-        self._simulator = simulator
+    def __init__(
+        self, simulator: Simulator, comparator: Comparator, account: Account | None = None
+    ) -> None:
+        self._simulator, self.account = simulator, account or Account()
         self._comparator = as_comparator(comparator, getattr(comparator, "name", repr(comparator)))
         self._prepared: dict[Hashable, PreparedPart] = {}
         self._known: dict[tuple[Hashable, int, Hypothesis], Losses] = {}
 
     def of_robot(self, robot: Robot) -> "LossTable":
         """Returns an empty table of the same comparator, with another self-model."""
-        return LossTable(Simulator(robot, self._simulator.threads), self._comparator)
+        simulator = Simulator(robot, self._simulator.threads)
+        return LossTable(simulator, self._comparator, self.account)
 
     def is_piecewise(self, trials: Sequence[Trial]) -> bool:
-        """Returns whether the distances are means of losses, so that paired tests are possible."""
-        return all(isinstance(self._of(trial), PiecewiseTrial) for trial in trials)
+        """Returns whether the distance of each trial is a mean of several losses."""
+        return all(self._pieces(trial) > 1 for trial in trials)
+
+    def _pieces(self, trial: Trial) -> int:
+        steps = piece_steps_of(self._of(trial))
+        return self.losses([INTACT], [trial]).shape[1] if steps is None else len(steps)
+
+    def known(self, trials: Parts) -> list[Hypothesis]:
+        """Returns the hypotheses whose losses on all trials are known."""
+        sections = [
+            (part.trial.content, number)
+            for part in map(whole, trials)
+            for number in range(len(getattr(self._of(part.trial), "sections", ())) or 1)
+        ]
+        first = [one for *key, one in self._known if tuple(key) == sections[0]]
+        return [one for one in first if all((*key, one) in self._known for key in sections)]
 
     def uses_segments(self, trials: Sequence[Trial]) -> bool:
         """Returns whether the comparator compares short predictions on all trials."""
@@ -147,8 +189,8 @@ class LossTable:
     def surrogate(self, trials: Sequence[Trial]) -> tuple["LossTable", Sequence[Trial]]:
         """Returns a table and trials that cost less and rank hypotheses about as these trials do.
 
-        A comparator without losses is its own surrogate: its hypotheses are not refined, so its
-        distances from the whole trials make the ranking. Otherwise it is the comparator's own
+        A comparator with one distance per trial is its own surrogate: that of a part of a trial
+        is another quantity. Otherwise it is the comparator's own
         surrogate (from ``MANY_TRIALS`` on, the surrogate of that one), or the comparator on the
         openings of the trials. A surrogate that refuses a trial, such as one with many late steps,
         is left out.
@@ -166,7 +208,7 @@ class LossTable:
     @cached_property
     def _cheaper(self) -> "LossTable | None":
         surrogate = getattr(self._comparator, "surrogate", None)
-        return None if surrogate is None else LossTable(self._simulator, surrogate)
+        return None if surrogate is None else LossTable(self._simulator, surrogate, self.account)
 
     def _opening(self, trial: Trial) -> Trial:
         """The first part of a trial, or the whole trial if the comparator refuses the part."""
@@ -207,11 +249,18 @@ class LossTable:
     ) -> list[Losses]:
         known, key = self._known, (trial.content, number)
         missing = list(dict.fromkeys(one for one in hypotheses if (*key, one) not in known))
+        account, stats = self.account, self._simulator.stats
+        afforded = account.left // steps_of(section.request, trial)
+        possible = missing[: min(afforded, len(missing))]
         size = largest_batch(self._simulator.robot, section.request, trial.trajectory.steps)
-        for first in range(0, len(missing), size):
-            batch = missing[first : first + size]
+        for first in range(0, len(possible), size):
+            batch, before = possible[first : first + size], stats.steps
             losses = self._simulated(batch, trial, section)
             known.update(((*key, one), losses[row]) for row, one in enumerate(batch))
+            account.steps += stats.steps - before
+            account.hypotheses.update(batch)
+        if len(possible) < len(missing):
+            raise LimitReachedError
         return [known[*key, one] for one in hypotheses]
 
     def _simulated(
@@ -241,6 +290,17 @@ class LossTable:
         if by_hinge is not None:
             by_hinge = np.where(diverged[:, np.newaxis], np.inf, by_hinge)
         return Losses(np.where(diverged, np.inf, total), losses.by_signal, by_hinge)
+
+
+def steps_of(request: Request, trial: Trial) -> int:
+    """Returns the control steps of one hypothesis in the simulation that a comparison requires."""
+    match request:
+        case ClosedLoop():
+            return trial.trajectory.steps
+        case Segments():
+            return len(request.starts) * request.horizon
+        case Ensemble():
+            return request.members * trial.trajectory.steps
 
 
 def simulate(

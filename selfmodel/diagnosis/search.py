@@ -1,14 +1,16 @@
 """The search for the best hypothesis: the diagnostic EA, and a local search from its best.
 
-The EA (the paper, section III) finds the neighbourhood. The local search tests every neighbour and
-keeps a fault only where the trials require it; with losses of many short segments it finds the same
-hypothesis from nearly every start, and with one distance per trial there is no local search and
-the EA decides alone. The local search:
+``Settings.diagnostic_search`` has the EA alone (``ea``), the local search alone (``stepwise``), or
+the local search from the best of the EA. The EA (the paper, section III) finds the neighbourhood.
+The local search tests every neighbour and keeps a fault only where the trials require it; with
+losses of many short segments it finds the same hypothesis from nearly every start. A comparator
+with one distance per trial has no paired test: a hypothesis is then better than another whose sum
+of distances is 10 % larger. The local search:
 
-1. **Starts**: the best hypotheses of the EA, the empty hypothesis, and the ``STARTS`` best single
-   faults by the surrogate comparator, one per kind and part. Severities are those of the
-   best levels by the surrogate (``with_fitted_severities``), and they are pruned: most end in the
-   same few hypotheses.
+1. **Starts**: the best hypotheses of the EA or of the last diagnosis, the empty hypothesis, and the
+   ``STARTS`` best single faults by the surrogate comparator, one per kind and part. Severities are
+   those of the best levels by the surrogate (``with_fitted_severities``), and they are pruned: most
+   end in the same few hypotheses.
 2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
    ``SHORTLIST_SIZE`` of them, the comparator chooses the best, with its best levels, until the
    total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A
@@ -67,7 +69,7 @@ SEVERITY_DECIMALS = 4
 
 
 def evolved(
-    distances: LossFunction,
+    distances: Callable[[Sequence[Hypothesis]], FloatArray],
     space: HypothesisSpace,
     settings: Settings,
     seeds: Sequence[Hypothesis],
@@ -109,13 +111,11 @@ class LocalSearch:
 
     Attributes:
         compared: Hypotheses that were compared with the trials.
-        proposed: Hypotheses that were compared by the surrogate.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.compared: set[Hypothesis] = set()
-        self.proposed: set[Hypothesis] = set()
         self._space, self._max_faults = problem.space, problem.settings.genes
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
@@ -124,8 +124,7 @@ class LocalSearch:
         return self.problem.losses(hypotheses)
 
     def coarse(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
-        """Returns the losses by the surrogate; the hypotheses count as proposed."""
-        self.proposed.update(hypotheses)
+        """Returns the losses by the surrogate."""
         return self.problem.coarse(hypotheses)
 
     def refined(self, known: Iterable[Hypothesis]) -> Hypothesis:
@@ -145,11 +144,7 @@ class LocalSearch:
             self.pruned(fitted(optimum, losses=self.coarse))
             for optimum in step([*local_optima], before=2)
         }
-        chosen = INTACT
-        for hypothesis in sorted(refits, key=lambda one: (len(one), self.total_loss(one), one)):
-            if significance.is_better(*self.losses([hypothesis, chosen])):
-                chosen = hypothesis
-        best = self.pruned(fitted(chosen, losses=self.losses))
+        best = self.pruned(fitted(chosen_of(refits, self.losses), losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
 
@@ -272,6 +267,15 @@ class LocalSearch:
 
     def _allowed(self, hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
         return [one for one in hypotheses if len(one) <= self._max_faults]
+
+
+def chosen_of(hypotheses: Iterable[Hypothesis], losses: LossFunction) -> Hypothesis:
+    """Returns the hypothesis with the fewest faults, each of which is a significant gain."""
+    chosen, totals = INTACT, {one: float(losses([one])[0].sum()) for one in hypotheses}
+    for hypothesis in sorted(totals, key=lambda one: (len(one), totals[one], one)):
+        if significance.is_better(*losses([hypothesis, chosen])):
+            chosen = hypothesis
+    return chosen
 
 
 def is_model_error(hypothesis: Hypothesis, fewer: Hypothesis, problem: Problem) -> bool:

@@ -66,6 +66,10 @@ LOSS_RATIO = 3.0
 """Ratio of mean losses that is significant whatever the standard error: a few segments are enough
 where the prediction is almost exact."""
 
+MIN_RATIO_OF_ONE = 1.1
+"""Ratio of two losses by which a hypothesis is better where there is one alone, as of a comparator
+with one distance per trial: a step of the search, and no proof."""
+
 FAULTY_RATIO = 2.5
 """Loss of a hypothesis with faults over that of healthy trials that is much. Faults make a motion
 harder to predict: a slipping foot, a body on the ground. So the excess alone does not count."""
@@ -96,7 +100,8 @@ def lead(one: FloatArray, other: FloatArray) -> float:
 
     Returns:
         The paired difference: 0 if the first one is not better, or diverged; infinite if the other
-        one diverged, or has ``LOSS_RATIO`` times the loss.
+        one diverged, or has ``LOSS_RATIO`` times the loss, of a single piece ``MIN_RATIO_OF_ONE``
+        times.
     """
     if not np.isfinite(one).all():
         return 0.0
@@ -104,7 +109,8 @@ def lead(one: FloatArray, other: FloatArray) -> float:
         return math.inf
     if not other.mean() > one.mean() + NEGLIGIBLE_LOSS:
         return 0.0
-    has_ratio = other.mean() > LOSS_RATIO * one.mean() + NEGLIGIBLE_LOSS
+    ratio = LOSS_RATIO if len(one) > 1 else MIN_RATIO_OF_ONE
+    has_ratio = other.mean() > ratio * one.mean() + NEGLIGIBLE_LOSS
     return math.inf if has_ratio else paired_z(other, one)
 
 

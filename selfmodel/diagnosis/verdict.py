@@ -51,9 +51,6 @@ STEEPNESS = 4.0
 of the verdict. In 52 diagnoses of known faults and missing ones, the most probable power is 2.5,
 with a limit of 1.6 it is 4.5: in 38 of them, of trials of 4 s, right hypotheses had up to 1.84."""
 
-EQUAL_DISTANCES = "equal distances"
-"""Name of the test for a comparator with one distance per trial."""
-
 NO_TEST = "none: every simulation diverged"
 """Name of the test of a diagnosis without a finite distance."""
 
@@ -88,13 +85,10 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Returns the diagnosis of a search.
 
-    A comparator with one distance per trial has no test: the best hypothesis, and those at the same
-    distance, are of those that were compared.
-
     Args:
         problem: The trials and their losses.
         compared: Every hypothesis that was compared with the trials: they are ranked.
-        best: The best of them by the paired tests; None for that with the smallest distance.
+        best: The best of them by the search; None for that with the smallest distance.
     """
     listed = list({*compared, INTACT})
     distances = problem.table.distances(listed, problem.trials)
@@ -108,24 +102,20 @@ def diagnosis_of(
     best, by_refit = supported(found, problem)
     totals.setdefault(best, float(problem.table.distances([best], problem.trials)[0]))
     order = best_severities([best, *ranked])
-    leads = leads_of(best, by_refit) if problem.has_test else {}
-    if problem.has_test:
-        alike, unsearched = indistinguishable(leads), unsearched_fault(best, by_refit)
-    else:
-        equal = [one for one in order if totals[one] == totals[best]]
-        alike, unsearched = [one for one in equal if best.lacking(one)], None
+    leads = leads_of(best, by_refit)
+    alike, unsearched = indistinguishable(leads), unsearched_fault(best, by_refit)
     fit = fit_of(best, by_refit)
     verdict = verdict_of(best, fit, alike, unsearched)
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
     doubt = None if verdict == "intact" else doubt_of(accused, fit, by_refit)
     probability: dict[str, float] = {}
-    if problem.has_test and doubt is None and fit.healthy_loss is not None:
+    if doubt is None and fit.healthy_loss is not None:
         nearest = best_severities([*alike, *sorted(leads, key=lambda one: leads[one])])
         misses = unsearched is not None or bool(fit.joints)
         some = {one: leads[one] for one in nearest}
         probability = probabilities(best, some, fit, misses=misses)
-    has_severities = problem.has_test and not best and doubt is None
+    has_severities = not best and doubt is None
     severities = (
         detectable_severities(best, problem.space, problem.losses, problem.observer)
         if has_severities
@@ -137,9 +127,9 @@ def diagnosis_of(
         intact_distance=totals[INTACT],
         indistinguishable=tuple(alike[:kept]),
         verdict=verdict if doubt is None else "not judged",
-        test=significance.TEST if problem.has_test else EQUAL_DISTANCES,
+        test=significance.TEST,
         unsearched=unsearched,
-        undetectable=tuple(undetectable(best, by_refit)[:kept]) if problem.has_test else (),
+        undetectable=tuple(undetectable(best, by_refit)[:kept]),
         detectable=tuple(severities),
         fit=fit,
         residual=_residual_of(best, by_refit) if verdict == "unexplained" else None,

@@ -18,7 +18,7 @@ import pandas as pd
 
 from selfmodel.settings import Settings
 from selfmodel.studies import figures, tables
-from selfmodel.studies.plans import TABLE_ONE
+from selfmodel.studies.bodies import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, methods_of, study_rows
 from selfmodel.studies.study import Row, grouped, shared_in

@@ -6,36 +6,40 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
 from selfmodel import arguments, plugins
-from selfmodel.arguments import AUTO, KindSource, comparator_choice, is_model, robot_entry
+from selfmodel.arguments import AUTO, KindSource, comparator_choice, robot_entry
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
-from selfmodel.controllers.controller import Design, check_silent_neurons
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.errors import (
     InputError,
     items_of,
     names_of,
     real_numbers,
-    unknown_name,
     whole_number,
     whole_numbers,
 )
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import kind_names, notation_kinds
-from selfmodel.faults.sensors import silent_neurons
+from selfmodel.faults.registry import kind_names
 from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import Score
-from selfmodel.settings import Settings
+from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
+from selfmodel.studies.bodies import (
+    DOMAINS,
+    TABLE_ONE,
+    Asked,
+    bodies_of,
+    check_cases,
+    failures_of,
+    judged,
+    known_cases,
+)
 from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import check_score
 from selfmodel.studies.recoveries import (
@@ -46,7 +50,7 @@ from selfmodel.studies.recoveries import (
     robot_key,
 )
 from selfmodel.studies.study import SHARED, Point, Study
-from selfmodel.tasks import ROBOTS, Entry, suite_bodies
+from selfmodel.tasks import ROBOTS
 
 BANK = "bank"
 NEXT_TRIAL = (BANK, *plugins.NEXT_TRIAL)
@@ -56,49 +60,10 @@ comparator; or, after the first trial, as in a recovery, by the diagnosis so far
 GAITS = 6
 """Number of gaits per robot in the bank."""
 
-TABLE_ONE: Mapping[int, str] = MappingProxyType(
-    {
-        1: "a lower leg breaks off",
-        2: "a whole leg breaks off",
-        3: "a touch sensor fails",
-        4: "2, and the touch sensor of another leg fails",
-        5: "an angle sensor fails",
-        6: "an upper-leg joint jams",
-        7: "2, and the upper-leg joint of another leg jams",
-        8: "7, and the angle sensor of a further leg fails",
-        9: "nothing fails",
-        10: "a hidden neuron fails",
-    }
-)
-"""Failures by their number in the paper's Table I."""
-
-CASE_NEEDS: Mapping[int, str] = MappingProxyType(
-    {
-        1: "a limb of two joints",
-        2: "a limb",
-        3: "a touch sensor at its first limb",
-        4: "a touch sensor at another than its first limb",
-        5: "an angle sensor at its first limb",
-        6: "a limb",
-        7: "two limbs",
-        8: "an angle sensor at a third limb",
-    }
-)
-"""What a robot without a case of Table I lacks."""
-
-DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {name: tuple(entry.suite) for name, entry in ROBOTS.items()}
-    | {f"{suite_bodies.PREFIX}{name}": tasks for name, tasks in suite_bodies.DOMAINS.items()}
-)
-"""Tasks of every domain, the default task first."""
-
 PAPER_COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
 """Comparators of the paper's experiment by default: the paper's, then selfmodel's."""
 
 Needs = Callable[[Point], Mapping[str, Cell]]
-
-Asked = tuple[int | None, str]
-"""A failure that is asked for: the number of a case, or None and a damage in notation."""
 
 Share = tuple[int, int]
 """``(i, n)``: share i of n of the runs, from 1, for n machines with a folder each."""
@@ -120,6 +85,7 @@ def ablation(
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
+    diagnostic_searches: str | Iterable[str] = STEPWISE,
     next_trial: str | NextTrial = BANK,
     bank: str | Path | None = None,
     score: str | Score | None = None,
@@ -128,7 +94,10 @@ def ablation(
     repair_settings: Settings | None = None,
     only: Share | str = ALL,
 ) -> Study:
-    """Returns a study in which every comparator diagnoses the same trials.
+    """Returns a study in which every comparator diagnoses the same trials at equal cost.
+
+    All comparators have the same search, and simulate as many control steps for each trial, at
+    most: without a limit in the settings, those of the paper's EA, a rollout for each evaluation.
 
     The diagnoses of a run need its trials, which need its gaits. With other choices of the next
     trial than the bank, a recovery needs the first gait alone.
@@ -146,6 +115,7 @@ def ablation(
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
+        diagnostic_searches: Searches of each comparator, of ``DIAGNOSTIC_SEARCHES``.
         next_trial: One of ``NEXT_TRIAL``, a function as for ``selfmodel.recover``, or its name.
         bank: Folder of gaits, ``ROBOT-K.npz``; None to evolve them.
         score: The fitness, or its name; None for that of the repair.
@@ -163,9 +133,16 @@ def ablation(
     next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
+    if settings.max_simulated_steps is None:
+        limit = settings.evaluations * settings.steps
+        settings = dataclasses.replace(settings, max_simulated_steps=limit)
+    searches = names_of(diagnostic_searches, "searches of a diagnosis, such as ea")
+    for one in searches:
+        plugins.check_known("diagnostic search", one, DIAGNOSTIC_SEARCHES)
     chosen, by_bank = repair_parameters(repair, search, score, repair_settings), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
+    lists |= {"diagnostic searches": searches}
     _check(lists, cases, damages, next_trial, trials)
     if bank is not None and by_bank and (repair, repair_settings) != (None, None):
         raise InputError(
@@ -175,7 +152,7 @@ def ablation(
     entries = {robot: robot_entry(robot) for robot in robots}
     models = {robot: recoveries.planned(robot, entry) for robot, entry in entries.items()}
     failures = {
-        robot: _failures(robot, entry, cases, damages, kinds) for robot, entry in entries.items()
+        robot: failures_of(robot, entry, cases, damages, kinds) for robot, entry in entries.items()
     }
     for entry in entries.values():
         check_score(chosen["score"], entry)
@@ -202,7 +179,8 @@ def ablation(
             return {"gait": gait(robot, seed % GAITS)}
         count = max(HEALTHY_TRIALS, trials)
         gaits = {f"gait-{number}": gait(robot, (seed + number) % GAITS) for number in range(count)}
-        run = {name: value for name, value in point.items() if name != "comparator"}
+        methods = ("comparator", "diagnostic_search")
+        run = {name: value for name, value in point.items() if name not in methods}
         function = f"{recoveries.__name__}:run_trials"
         # Of the kinds, only those of the failure determine its trials.
         parameters = {**run, SHARED: shared}
@@ -212,7 +190,12 @@ def ablation(
         modules = plugins.modules_of({"kinds": ",".join(used)})
         return {"trials": Cell(function, _name(run), parameters, gaits, "trials", modules)}
 
-    points = [{**run, "comparator": comparator} for run in runs for comparator in comparators]
+    points = [
+        {**run, "comparator": comparator, "diagnostic_search": one}
+        for run in runs
+        for comparator in comparators
+        for one in searches
+    ]
     function = "diagnose" if by_bank else "recover"
     return _study("ablate", folder, points, shared, needs, function=function)
 
@@ -257,15 +240,15 @@ def suite(
     chosen = repair_parameters(repair, search, score, repair_settings)
     entries = {body: robot_entry(body) for body in bodies}
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
-    _check_cases("case of these bodies", cases, known_cases(bodies))
+    check_cases("case of these bodies", cases, known_cases(bodies))
     asked: list[Asked] = [*((case, "") for case in cases), *((None, one) for one in damages)]
     failures: dict[str, list[tuple[int | None, str, str]]] = {}
     for body, entry in entries.items():
         check_score(chosen["score"], entry)
         design = plugins.design(controller, entry.robot(), neurons)
-        failures[body] = _judged(body, entry, design, asked, kinds)
+        failures[body] = judged(body, entry, design, asked, kinds)
     for number, damage in enumerate(damages, start=len(cases)):
-        reasons = [judged[number][2] for judged in failures.values()]
+        reasons = [found[number][2] for found in failures.values()]
         if reasons and all(reasons):
             raise InputError(f"no body can have {damage}: {reasons[0]}")
     points = [
@@ -296,10 +279,10 @@ def paper(
     """
     robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases, 1)
     seeds, comparators = whole_numbers("seeds", seeds, 0, 0), plugins.comparator_names(comparators)
-    settings = arguments.settings_of(settings)
+    settings = dataclasses.replace(arguments.settings_of(settings), diagnostic_search=EA)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)
-    _check_cases("case of Table I", cases, TABLE_ONE)
+    check_cases("case of Table I", cases, TABLE_ONE)
     for comparator in comparators:
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")
@@ -366,7 +349,10 @@ def _name(run: Point) -> str:
     """Returns the name of a run or of a point, in which a colon of a plug-in's is quoted."""
     failure = quote(run["truth"], safe="=") if run["case"] is None else f"case{run['case']:02d}"
     name = f"{robot_key(run['robot'])}-{failure}-gap{run['gap']!r}-seed{run['seed']:03d}"
-    return f"{name}-{quote(run['comparator'], safe='=')}" if "comparator" in run else name
+    if "comparator" not in run:
+        return name
+    search = f"-{run['diagnostic_search']}".replace("+", "-") if "diagnostic_search" in run else ""
+    return f"{name}-{quote(run['comparator'], safe='=')}{search}"
 
 
 def _shared(
@@ -374,7 +360,7 @@ def _shared(
 ) -> dict[str, Any]:
     """Returns the parameters of all points: those of a recovery, with their defaults."""
     return {
-        "settings": dataclasses.asdict(settings),
+        "settings": settings.as_json(),
         "kinds": kind_names(kinds),
         **repair,
         "next_trial": next_trial,
@@ -419,48 +405,6 @@ def _check_any(cases: Sequence[int] | None, damages: Sequence[str]) -> None:
         raise InputError("expected at least one case or one damage of a study, got neither")
 
 
-def _failures(
-    robot: str, entry: Entry, cases: Sequence[int] | None, damages: Sequence[str], kinds: str
-) -> list[tuple[int | None, str]]:
-    """Returns the failures of a robot: the number in Table I, or None, and the notation."""
-    searched, anatomy = plugins.kinds(kinds), entry.robot().anatomy
-    HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
-    _check_cases(f"case of {robot}", cases or (), entry.cases)
-    numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
-    named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
-    return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
-
-
-def _judged(
-    robot: str, entry: Entry, design: Design, asked: Iterable[Asked], kinds: str
-) -> list[tuple[int | None, str, str]]:
-    """Returns failures as ``_failures`` does, each with the reason why it does not apply, or ""."""
-    judged: list[tuple[int | None, str, str]] = []
-    for case, damage in asked:
-        try:
-            judged.append((case, _applied(robot, entry, design, (case, damage), kinds), ""))
-        except InputError as error:
-            judged.append((case, damage, str(error)))
-    return judged
-
-
-def _applied(robot: str, entry: Entry, design: Design, asked: Asked, kinds: str) -> str:
-    """Returns a failure in notation; refuses one that the robot or its controllers cannot have."""
-    case, damage = asked
-    if case is not None and case not in entry.cases:
-        raise InputError(f'"{TABLE_ONE[case]}" needs {CASE_NEEDS[case]}, which {robot} lacks')
-    cases, damages = ((), (damage,)) if case is None else ((case,), ())
-    ((_, truth),) = _failures(robot, entry, cases, damages, kinds)
-    check_silent_neurons(design, silent_neurons(parse(truth, entry.robot().anatomy)))
-    return truth
-
-
-def _check_cases(what: str, cases: Sequence[int], known: Iterable[int]) -> None:
-    names = list(map(str, known))
-    for case in cases:
-        plugins.check_known(what, str(case), names)
-
-
 def share_of(only: object) -> Share:
     """Returns a share, given as a pair or as the text ``i/n``, or raises ``InputError``."""
     pair = only.split("/") if isinstance(only, str) else items_of(only)
@@ -471,48 +415,3 @@ def share_of(only: object) -> Share:
             f"Python only=(2, 8), got {only!r:.80}"
         )
     return whole[0], whole[1]
-
-
-def known_cases(bodies: Sequence[str]) -> tuple[int, ...]:
-    """Returns the numbers of the cases that apply to at least one body."""
-    return tuple(sorted({case for body in bodies for case in robot_entry(body).cases}))
-
-
-def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str, ...]:
-    """Returns the unique names of the robots of domains and tasks.
-
-    Args:
-        domains: Names in ``DOMAINS``, or paths of MJCF or URDF files. The prefix of a domain of the
-            suite may be omitted unless another robot has the same name.
-        tasks: Names of tasks; a domain contributes the tasks that it has. None for the default
-            task of each domain.
-    """
-    bodies: list[str] = []
-    for given in domains:
-        domain = given if is_model(given) else _domain(given)
-        every = DOMAINS.get(domain, ())
-        chosen = every[:1] if tasks is None else [task for task in every if task in tasks]
-        if every and not chosen:
-            raise InputError(
-                f"{domain} has none of the tasks {', '.join(tasks or ())}: it has "
-                f"{', '.join(every)}"
-            )
-        is_body = domain in ROBOTS or not every
-        bodies += [domain] if is_body else [f"{domain}-{task}" for task in chosen]
-    known = tasks_of(domains)
-    for task in tasks or ():
-        plugins.check_known("task of these domains", task, known)
-    return tuple(dict.fromkeys(bodies))
-
-
-def tasks_of(domains: Sequence[str]) -> tuple[str, ...]:
-    """Returns the names of the tasks of domains; see ``bodies_of``."""
-    every = [DOMAINS[_domain(given)] for given in domains if not is_model(given)]
-    return tuple(sorted({task for tasks in every for task in tasks}))
-
-
-def _domain(given: str) -> str:
-    domain = given if given in DOMAINS else f"{suite_bodies.PREFIX}{given}"
-    if domain not in DOMAINS:
-        raise unknown_name("domain", given, DOMAINS)
-    return domain

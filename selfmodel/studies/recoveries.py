@@ -8,7 +8,7 @@ import base64
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -45,7 +45,7 @@ from selfmodel.recovery.result import Event, Recovery, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
+from selfmodel.settings import ADDED, Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import experiment as experiments
@@ -69,7 +69,7 @@ ON_ROBOT = "evolution-on-robot"
 REPAIR = "repair_settings"
 """Parameter with the settings of the repair, where they are others."""
 
-DIAGNOSIS_SETTINGS = ("trials", "genes", "kept")
+DIAGNOSIS_SETTINGS = ("trials", "genes", "kept", *ADDED)
 """Names of the settings that do not affect a gait."""
 
 Parameters = Mapping[str, Any]
@@ -133,14 +133,17 @@ def repair_parameters(
         "repair": repair,
         "search": plugins.search_name(repair, search, None),
         "score": plugins.score_named(score) or plugins.DEFAULT_SCORES[repair],
-        **({} if settings is None else {REPAIR: dataclasses.asdict(settings)}),
+        **({} if settings is None else {REPAIR: settings.as_json()}),
     }
 
 
-def settings_of(shared: Parameters) -> tuple[Settings, Settings | None]:
-    """Returns the settings of recoveries, and those of their repair; None for the same."""
-    own = shared.get(REPAIR)
-    return Settings(**shared["settings"]), None if own is None else Settings(**own)
+def settings_of(parameters: Parameters) -> tuple[Settings, Settings | None]:
+    """Returns the settings of a point, and those of its repair; None for the same."""
+    shared = parameters["shared"]
+    settings, own = Settings(**shared["settings"]), shared.get(REPAIR)
+    search = parameters.get("diagnostic_search", settings.diagnostic_search)
+    settings = dataclasses.replace(settings, diagnostic_search=search)
+    return settings, None if own is None else Settings(**own)
 
 
 def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
@@ -151,7 +154,7 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
         shared: Parameters of the recoveries, of which some determine the gait.
         seed: Seed of all random numbers.
     """
-    own, of_repair = settings_of(shared)
+    own, of_repair = settings_of({"shared": shared})
     settings = dataclasses.asdict(own.of_repair(of_repair)).items()
     parameters = {
         **robot,
@@ -254,11 +257,11 @@ def diagnose(parameters: Parameters, needs: Folders, _folder: Path) -> Rows:
     search = DiagnosticSearch(
         Simulator(dataclasses.replace(robot, mjcf=mjcf), threads=1),
         chosen,
-        Settings(**shared["settings"]),
+        settings_of(parameters)[0],
         plugins.kinds(shared["kinds"]),
         healthy_trials=logged[:HEALTHY_TRIALS],
     )
-    watch = _DiagnosisWatch(lambda: search.distinct_hypotheses)
+    watch = _DiagnosisWatch()
     diagnose_trials(trials, search, parameters["seed"], watch, after={1, len(trials)})
     rows = watch.rows(shared, robot, truth_of(parameters, robot), trials)
     return {"diagnoses": [{**row, **_named(parameters)} for row in rows]}
@@ -279,7 +282,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     if parameters["comparator"] == ON_ROBOT:
         return _evolve_on_robot(parameters, needs)
     shared, entry = parameters["shared"], planned_entry(parameters)
-    robot, (settings, of_repair) = entry.robot(), settings_of(shared)
+    robot, (settings, of_repair) = entry.robot(), settings_of(parameters)
     if REASON in parameters:
         return {"recoveries": [{"robot": robot.name}]}
     design = plugins.design(shared["controller"], robot, shared["neurons"])
@@ -319,7 +322,6 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         tried = recoveries[: row["trials"] - 1]
         found = {"before": before, "after": after, "recovered": max(tried, default=None)}
         row |= {**found, **_named(parameters)}
-    diagnoses[-1]["distinct_hypotheses"] = recovery.distinct_hypotheses
     own = {
         "robot": robot.name,
         **_named(parameters),
@@ -407,14 +409,10 @@ def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:
 
 
 class _DiagnosisWatch:
-    """Keeps each diagnosis with what it took until then.
+    """Keeps each diagnosis with what it took until then."""
 
-    Args:
-        count: Returns the number of distinct hypotheses so far; None if it is unknown.
-    """
-
-    def __init__(self, count: Callable[[], int | None] = lambda: None) -> None:
-        self._count, self._costs = count, list[tuple[Diagnosis, Row]]()
+    def __init__(self) -> None:
+        self._costs = list[tuple[Diagnosis, Row]]()
         self._evaluations, self._seconds, self._start, self._diagnosing = 0, 0.0, 0.0, False
 
     def __call__(self, event: Event) -> None:
@@ -428,7 +426,8 @@ class _DiagnosisWatch:
                 self._seconds += perf_counter() - self._start
                 cost = {
                     "evaluations": self._evaluations,
-                    "distinct_hypotheses": self._count(),
+                    "distinct_hypotheses": event.cost.hypotheses,
+                    "simulated_steps": event.cost.control_steps,
                     "seconds": self._seconds,
                 }
                 self._costs.append((event, cost))

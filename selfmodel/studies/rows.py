@@ -20,7 +20,7 @@ from selfmodel.studies.study import Row, rows_in, shared_in
 
 INTEGERS = (
     *("case", "seed", "trials", "rivals", "evaluations", "distinct_hypotheses", "diverged"),
-    *("control_steps", "return_most", "fell_at_step"),
+    *("control_steps", "simulated_steps", "return_most", "fell_at_step"),
 )
 """Columns of whole numbers, of which some may be unknown."""
 
@@ -130,11 +130,11 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "ablate": Kind(
             "diagnoses",
-            "robot case truth gap seed next_trial comparator comparator_name trials best correct "
-            "distance intact_distance verdict rivals evaluations distinct_hypotheses seconds "
-            "before after recovered repair search",
-            "comparator_name repair search",
-            "robot truth gap seed comparator trials",
+            "robot case truth gap seed next_trial comparator comparator_name diagnostic_search "
+            "trials best correct distance intact_distance verdict rivals evaluations "
+            "distinct_hypotheses simulated_steps seconds before after recovered repair search",
+            "comparator_name diagnostic_search simulated_steps repair search",
+            "robot truth gap seed comparator diagnostic_search trials",
             _of_ablation,
         ),
         "rivals": Kind(

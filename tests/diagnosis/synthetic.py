@@ -64,7 +64,7 @@ class Synthetic(Problem):
         hinges: HingeLosses | None = None,
         hinges_before: HingeLosses | None = None,
     ) -> None:
-        self.space, self.settings, self.has_test = space, Settings(genes=most), True
+        self.space, self.settings = space, Settings(genes=most)
         self.trials, self.healthy_trials, self._observed = ["damaged"], [], ["healthy"]
         self.losses, self.observer, self.calibrate = losses, ignore, None
         self.coarse = coarse or losses

@@ -116,7 +116,7 @@ def test_the_output_has_the_names_of_python_and_keys_of_0_1_are_read():
     assert set(values) == {
         *("diagnosis", "verdict", "indistinguishable", "undetectable", "test", "unsearched"),
         *("intact_distance", "reason", "fit", "change", "residual", "doubt", "detectable"),
-        *("probability", "also_searched", "left_out"),
+        *("probability", "also_searched", "left_out", "cost"),
     }
     assert values["undetectable"] == [f"{BEST}+sensor:back_left_touch"]
     assert values["reason"] is values["fit"] is values["change"] is values["residual"] is None

@@ -8,7 +8,8 @@ import pytest
 from selfmodel.arguments import robot_entry
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
-from selfmodel.studies.plans import ablation, bodies_of, known_cases, paper, suite
+from selfmodel.studies.bodies import bodies_of, known_cases
+from selfmodel.studies.plans import ablation, paper, suite
 from selfmodel.studies.recoveries import ON_ROBOT, planned
 from selfmodel.studies.study import Study
 from tests.cli.test_studies import BIPED
