@@ -12,6 +12,7 @@ from selfmodel.robot.actuators import command_ranges, motor_joints
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import FixedBase, FreeBase, read_base
+from selfmodel.studies import bodies
 from selfmodel.tasks import ROBOTS, Entry
 
 

@@ -113,7 +113,7 @@ def failures_of(
 def judged(
     robot: str, entry: Entry, design: Design, asked: Iterable[Asked], kinds: str
 ) -> list[tuple[int | None, str, str]]:
-    """Returns failures as ``failures_of`` does, each with the reason why it does not apply, or ""."""
+    """Returns failures as ``failures_of`` does, each with the reason why it cannot be, or ""."""
     judged: list[tuple[int | None, str, str]] = []
     for case, damage in asked:
         try:
