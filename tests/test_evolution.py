@@ -32,7 +32,7 @@ def evolved(seed: int = 0) -> tuple[Evolution, list[Generation]]:
 
 
 def test_the_defaults_are_the_papers_numbers():
-    assert dataclasses.asdict(Settings()) == {
+    assert Settings().as_json() == {
         "steps": 1000,
         "trials": 3,
         "population": 100,

@@ -30,7 +30,7 @@ from selfmodel.studies.rows import (
     whole,
 )
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
-from selfmodel.studies.study import Row, grouped
+from selfmodel.studies.study import Row, grouped, shared_in
 from selfmodel.studies.style import figure_style
 from selfmodel.tasks.suite_bodies import EPISODE
 
@@ -57,7 +57,8 @@ def ablation_scores(rows: Sequence[Row]) -> list[Row]:
         ``robot``, ``gap``, ``comparator``, ``method``, ``trials``; ``runs`` and ``right``, numbers
         of diagnoses; ``correct``, their proportion with Wilson's interval; ``time``, the seconds
         over those of ``REFERENCE`` on the same runs; ``recovery``, the score of the best recovery
-        trial over that before the failure. The last two are None without such runs.
+        trial over that before the failure; ``simulated_steps``, the median of the control steps
+        that the diagnoses simulated. The last three are None without such runs.
     """
     named = [{**row, "method": name} for row, name in zip(rows, methods_of(rows), strict=True)]
     # Times are compared on the same search.
@@ -73,6 +74,7 @@ def ablation_scores(rows: Sequence[Row]) -> list[Row]:
             for row in own
             if (one := tuple(map(row.get, run))) in reference
         ]
+        steps = [row["simulated_steps"] for row in own if row.get("simulated_steps")]
         recoveries = [
             (row["recovered"], row["before"])
             for row in own
@@ -84,6 +86,7 @@ def ablation_scores(rows: Sequence[Row]) -> list[Row]:
                 **_right(own),
                 "time": ratio(*zip(*times, strict=True)) if times else None,
                 "recovery": ratio(*zip(*recoveries, strict=True)) if recoveries else None,
+                "simulated_steps": median(steps) if steps else None,
             }
         )
     return scores
@@ -239,9 +242,21 @@ def ablation_results(folder: Path, style: str | Path | None = None) -> Results:
         facts,
         [_score_table(scores)],
         _score_table(shown),
-        "With 95 % intervals; time as a multiple of the paper's comparator's.",
+        _ablation_legend(shared_in(folder)),
         _files("ablate", facts) | {f"figures/{name}": data for name, data in drawn.items()},
         [f"warning: {warning}" for warning in warnings],
+    )
+
+
+def _ablation_legend(shared: Mapping[str, Any]) -> str:
+    """Returns what the columns are, and at which cost the comparators are compared."""
+    limit = shared.get("settings", {}).get("max_simulated_steps")
+    text = "With 95 % intervals; time as a multiple of the paper's comparator's."
+    if limit is None:
+        return text
+    return (
+        f"{text} A diagnosis simulated at most {limit:,} control steps for each trial, whatever "
+        f"the comparator and the search; simulated steps: the median."
     )
 
 
@@ -289,6 +304,7 @@ def _files(name: str, facts: Mapping[str, Any]) -> dict[str, bytes]:
 
 def _score_table(scores: Sequence[Row]) -> Table:
     has_recovery = any(one["recovery"] for one in scores)
+    has_steps = any(one["simulated_steps"] for one in scores)
     texts = [
         {
             "robot": one["robot"],
@@ -298,6 +314,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
             "right": f"{one['right']} of {one['runs']}",
             "right, %": _interval(one["correct"], 100, ".0f"),
             "time": _interval(one["time"]),
+            **({"simulated steps": f"{one['simulated_steps'] or 0:,.0f}"} if has_steps else {}),
             **({"recovered ÷ before": _interval(one["recovery"])} if has_recovery else {}),
         }
         for one in scores
