@@ -133,9 +133,11 @@ def ablation(
     next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
-    if settings.max_simulated_steps is None:
-        limit = settings.evaluations * settings.steps
-        settings = dataclasses.replace(settings, max_simulated_steps=limit)
+    limit = settings.max_simulated_steps or settings.evaluations * settings.steps
+    # The searches are an axis: a folder may get further ones.
+    settings = dataclasses.replace(
+        settings, diagnostic_search=Settings.diagnostic_search, max_simulated_steps=limit
+    )
     searches = names_of(diagnostic_searches, "searches of a diagnosis, such as ea")
     for one in searches:
         plugins.check_known("diagnostic search", one, DIAGNOSTIC_SEARCHES)

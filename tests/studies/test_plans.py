@@ -1,6 +1,7 @@
 """Promises of what a study consists of: its robots, failures, gaits, and shares."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,20 @@ def test_the_diagnoses_of_a_run_need_its_trials_which_need_gaits_of_the_bank(tmp
     assert alone.needs["gait"].place == trials.needs["gait-0"].place
     # The trials of a recovery exclude the failing one.
     assert alone.parameters["shared"]["settings"]["trials"] == 1
+
+
+def test_the_searches_of_an_ablation_are_an_axis_at_one_limit_which_may_be_extended(tmp_path: Path):
+    (first,) = ablated(tmp_path, settings=replace(SMALL, diagnostic_search="stepwise")).cells()
+    study = ablated(tmp_path, diagnostic_searches=["ea", "stepwise"])
+    assert values(study, "diagnostic_search") == ["ea", "stepwise"]
+    _, same = study.cells()
+    assert same.place == first.place
+    limit = same.parameters["shared"]["settings"]["max_simulated_steps"]
+    assert limit == SMALL.evaluations * SMALL.steps
+    own = ablated(tmp_path, settings=replace(SMALL, max_simulated_steps=7)).cells()[0]
+    assert own.parameters["shared"]["settings"]["max_simulated_steps"] == 7
+    with pytest.raises(InputError, match="stepwise"):
+        ablated(tmp_path, diagnostic_searches="steps")
 
 
 PLUG_INS = """
