@@ -191,6 +191,8 @@ def evaluate(
         trial = Trial(plan, robot.name, collect(robot.anatomy.names, samples), plan.name)
         value, fall = chosen.of_trial(robot, INTACT, trial), fall_of(robot, INTACT, trial)
         rewards = sum(stepped.rewards)
+        # The environment's own rewards: of its faults and its target, which the robot lacks.
+        value = rewards if score == plugins.RETURN else value
         found.append(Episode(plan.steps, value, rewards, trial.displacement, fall))
     return tuple(found)
 

@@ -10,6 +10,7 @@ from selfmodel.cli.commands import Check
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.errors import InputError, WorkError
 from selfmodel.plugins import check_known
+from selfmodel.testing.diagnosis import ContractError
 
 _SAME, _ALONE, _KEPT = "equal arguments, equal results", "no dependence on the batch", "no change"
 CHECKS: Mapping[str, tuple[Callable[..., None], tuple[str, ...]]] = MappingProxyType(
@@ -60,7 +61,7 @@ def check(options: Check) -> None:
     function, rules = CHECKS[what]
     try:
         function(name, **given)
-    except ValueError as error:
+    except (ContractError, InputError) as error:
         raise WorkError(f"{what} {name}: {error}") from error
     except Exception as error:  # a plug-in may raise any exception
         print_notes(*"".join(traceback.format_exception(error)).splitlines())

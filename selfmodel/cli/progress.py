@@ -15,9 +15,8 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import counted
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress, time_left, timed
-from selfmodel.recovery.falls import fall_text
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins, TrialScore
-from selfmodel.recovery.scores import DISPLACEMENT, value_text
+from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.studies.grid import CellEnds, GridBegins
 from selfmodel.trials.trial import Trial
@@ -113,12 +112,7 @@ def _trial_lines(event: Trial | TrialScore) -> list[str]:
         # A base that is fixed or not observed has no displacement.
         way = f"{went:.3f} m forward" if went and math.isfinite(went) else steps
         return [f"trial {event.plan.name}: {way}"]
-    score, trial = event.score, event.trial
-    if score is DISPLACEMENT and event.fall is None:
-        return []
-    text = value_text(event.value, score.unit, score.most(trial.trajectory.steps))
-    result = f"{score.name} {text}{fall_text(event.fall)}"
-    return [f"trial {trial.plan.name} by {event.hypothesis}: {result}"]
+    return [] if event.score is DISPLACEMENT and event.fall is None else [str(event)]
 
 
 def _fit_lines(fit: Calibration) -> list[str]:
@@ -156,7 +150,7 @@ class GridDisplay(Display):
     def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         if isinstance(event, GridBegins):
-            if event.earlier:
+            if event.earlier and (self.bar or not event.finished):
                 self.print_lines(event.earlier)
             self.done, self.total = event.finished, event.total
             if self.bar:

@@ -10,7 +10,8 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
-from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.recovery.falls import fall_text
+from selfmodel.recovery.scores import DISPLACEMENT, Score, value_text
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
@@ -60,6 +61,11 @@ class TrialScore:
     score: Score
     value: float
     fall: int | None
+
+    def __str__(self) -> str:
+        most = self.score.most(self.trial.trajectory.steps)
+        result = f"{self.score.name} {value_text(self.value, self.score.unit, most)}"
+        return f"trial {self.trial.plan.name} by {self.hypothesis}: {result}{fall_text(self.fall)}"
 
 
 Event = (

@@ -55,7 +55,8 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     if not tables:
         raise InputError(
             f"{folder}: expected the folder of a run with its trials and diagnoses.json, or of a "
-            f"campaign with a table such as results.csv, got neither"
+            f"campaign with a table such as results.csv, got neither; of a study in Python, write "
+            f"its tables first, with write_files(folder, ablation_results(folder).files)"
         )
     every = {**other_lists(folder), **tables}
     shown = tuple(Table.of(encodable(name), records) for name, records in every.items())

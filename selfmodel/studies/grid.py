@@ -64,7 +64,8 @@ class GridBegins:
     earlier: str = ""
 
     def __str__(self) -> str:
-        return f"{self.finished} of {self.total} were done before"
+        done = f"{self.finished} of {self.total} were done before"
+        return "; ".join(filter(None, (self.earlier, done)))
 
 
 @dataclass(frozen=True)

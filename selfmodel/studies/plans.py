@@ -111,7 +111,7 @@ def ablation(
         cases: Numbers of failures of Table I; None for all that apply to each robot.
         comparators: Comparators, their names, or ``package.module:object``.
         gaps: Levels of the reality gap.
-        seeds: Seeds, one run each.
+        seeds: Seeds, one run each: ``range(3)`` for three; a number is one seed.
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.

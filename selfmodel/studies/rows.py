@@ -189,7 +189,8 @@ class LoadedStudy:
     def _right(self) -> list[tuple[str, int, int]]:
         """Returns the right diagnoses of all and their number, by robot and comparator."""
         axes = [name for name in ("robot", "comparator") if name in self.rows]
-        groups = self.rows.groupby(axes) if "correct" in self.rows else ()
+        is_known = "correct" in self.rows  # not of a failure that a body cannot have
+        groups = self.rows[self.rows["correct"].notna()].groupby(axes) if is_known else ()
         return [(", ".join(key), int(own["correct"].sum()), len(own)) for key, own in groups]
 
     def to_pandas(self) -> pd.DataFrame:
@@ -233,7 +234,7 @@ def load(path: str | Path) -> LoadedStudy:
     Example::
 
         study = selfmodel.studies.load("runs/ablation")
-        study.rows.groupby("comparator")["correct"].mean()
+        study.rows.groupby("robot")["correct"].mean()
 
     Args:
         path: Folder of ``selfmodel ablate``, ``paper`` or ``suite run``, finished or not; its

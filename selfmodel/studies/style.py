@@ -40,6 +40,17 @@ PANEL = 3.0
 FONT = 10.0
 """Size of the font in ``STYLE``, with which the sizes of figures are stated, points."""
 
+DEFAULT_SIZES: Mapping[str, float] = MappingProxyType(
+    {
+        "axes.titlesize": 11,
+        "axes.labelsize": 10,
+        "figure.titlesize": 11,
+        "figure.labelsize": 10,
+        "legend.fontsize": 9,
+    }
+)
+"""Sizes of texts in ``STYLE``, points."""
+
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 _styled: ContextVar[bool] = ContextVar("styled", default=False)
 
@@ -98,7 +109,10 @@ def read_style(style: str | Path | None) -> Mapping[str, Any]:
         raise InputError(f"{path}: expected {what}, got {reason}") from error
     if not own:
         raise InputError(f"{path}: expected {what}, got no setting, such as `font.size: 8`")
-    return {str(name): value for name, value in own.items()}
+    named = {str(name): value for name, value in own.items()}
+    # The size of the font rules the sizes that the style leaves open.
+    scale = named.get("font.size", FONT) / FONT
+    return {name: scale * DEFAULT_SIZES[name] for name in DEFAULT_SIZES if scale != 1} | named
 
 
 @figure_style()

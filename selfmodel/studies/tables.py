@@ -16,6 +16,7 @@ import pandas as pd
 
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError
+from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
 from selfmodel.studies import figures
@@ -228,8 +229,9 @@ class Results:
     notes: Sequence[str] = field(default=())
 
 
-def ablation_results(folder: Path, style: str | Path | None = None) -> Results:
+def ablation_results(folder: str | Path, style: str | Path | None = None) -> Results:
     """Returns the results of an ablation, with its figures in a style; see ``figure_style``."""
+    folder = path_of(folder, "the folder of a study")
     rows = study_rows("ablate", folder)
     scores = ablation_scores(rows)
     counts = {one["trials"] for one in scores}
@@ -435,8 +437,9 @@ def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
     return {f"{table.name}.{suffix}": write(table) for table in tables if len(table.records)}
 
 
-def write_files(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+def write_files(folder: str | Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Writes files, by their path in a folder, which is made if missing; returns their paths."""
+    folder = path_of(folder, "the folder of a study")
     for name, data in files.items():
         make_folder((folder / name).parent, folder)
         replace_file(folder / name, data)

@@ -48,10 +48,14 @@ BATCH_STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""
 
 
+class ContractError(ValueError):
+    """A plug-in breaks a rule of its contract, which the message names."""
+
+
 def require(holds: object, breach: str) -> None:
-    """Raises ``ValueError``, as every breach of a contract does, unless a rule holds."""
+    """Raises ``ContractError`` unless a rule holds."""
     if not holds:
-        raise ValueError(breach)
+        raise ContractError(breach)
 
 
 def check_comparator(
@@ -386,7 +390,7 @@ def _check_words(kind: FaultKind, candidates: tuple[Fault, ...]) -> None:
     try:
         words = {fault.part: fault.words for fault in candidates}
     except (LookupError, ValueError) as error:
-        raise ValueError(
+        raise ContractError(
             f"expected words of {kind.name} with part, severity, amount, degrees, side and at, got "
             f"{kind.words!r}: {error!r}"
         ) from error
