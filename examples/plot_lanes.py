@@ -14,7 +14,8 @@ from pathlib import Path
 
 from selfmodel.cli.render import GL, choose_gl
 
-os.environ[GL] = choose_gl()  # before MuJoCo is imported, which reads it
+# Before MuJoCo is imported, which reads it.
+os.environ[GL] = choose_gl("install EGL or OSMesa")
 
 import mujoco
 import numpy as np

@@ -157,7 +157,7 @@ def name_of(parameter: str, found: object, home: str = "") -> str:
     if names:
         return names[0]
     places = [
-        (module != (home or found.__module__), -module.count("."), module, name)
+        (module != (home or getattr(found, "__module__", "")), -module.count("."), module, name)
         for module, loaded in list(sys.modules.items())
         if module not in ("__main__", "__mp_main__")
         for name, one in list(getattr(loaded, "__dict__", {}).items())

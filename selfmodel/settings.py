@@ -56,7 +56,7 @@ class Settings:
         kept: Number of hypotheses that a diagnosis reports and that seed the next diagnosis.
         diagnostic_search: Search of a diagnosis, one of ``DIAGNOSTIC_SEARCHES``.
         max_simulated_steps: Control steps that a diagnosis may simulate for each of its trials, in
-            its search and for its verdict; None for no limit.
+            its search and for its verdict, at least ``steps``; None for no limit.
 
     Raises:
         InputError: A setting is no number, out of range, or inconsistent with another setting. A
@@ -80,7 +80,7 @@ class Settings:
         if self.diagnostic_search not in DIAGNOSTIC_SEARCHES:
             raise unknown_name("diagnostic search", self.diagnostic_search, DIAGNOSTIC_SEARCHES)
         if (most := self.max_simulated_steps) is not None:
-            steps = whole_number("max_simulated_steps", most, 10**6, least=1)
+            steps = whole_number("max_simulated_steps", most, 10**6, least=self.steps)
             object.__setattr__(self, "max_simulated_steps", steps)
         self._check_numbers()
         if self.steps < 2:

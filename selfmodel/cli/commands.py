@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
-from selfmodel.settings import EA, STEPWISE, Settings
+from selfmodel.settings import STEPWISE, Settings
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
@@ -82,8 +82,6 @@ class Study(Computed):
     trials: int = Settings.trials
     population: int = Settings.population
     generations: int = Settings.generations
-    diagnostic_search: str = Settings.diagnostic_search
-    max_simulated_steps: int | None = None
 
     @property
     def settings(self) -> Settings:
@@ -94,6 +92,13 @@ class Study(Computed):
     def every_seed(self) -> range:
         """The seeds of the study."""
         return range(self.seed, self.seed + self.seeds)
+
+
+class Searched(Command):
+    """The search of a diagnosis, and its limit."""
+
+    diagnostic_search: str = Settings.diagnostic_search
+    max_simulated_steps: int | None = None
 
 
 class Repair(Command):
@@ -114,7 +119,7 @@ class Robots(Command):
     model_settings: list[str] | None = None
 
 
-class Recover(Robot):
+class Recover(Robot, Searched):
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller.
 
     The physical robot is a simulated one with the failure of --case or --damage, which the
@@ -145,8 +150,6 @@ class Recover(Robot):
     generations: int = Settings.generations
     repair_population: int | None = None
     repair_generations: int | None = None
-    diagnostic_search: str = Settings.diagnostic_search
-    max_simulated_steps: int | None = None
     out: Path | None = None
     threads: int = 0
     report: bool = False
@@ -304,7 +307,7 @@ class ExportTable(Command):
     out: Path
 
 
-class Ablate(Study, Repair):
+class Ablate(Study, Repair, Searched):
     """Compare comparators on the same trials: robots x cases x gaps x seeds.
 
     The results are the rates of correct diagnoses, with 95 % intervals. An interrupted ablation
@@ -336,7 +339,7 @@ class ListSuite(Command):
     """List the domains with their tasks, cases, joints, sensors, motors and time steps."""
 
 
-class RunSuite(Study, Repair):
+class RunSuite(Study, Repair, Searched):
     """Fail and recover bodies of the suite, selfmodel's and your own: bodies x cases x seeds.
 
     An interrupted study is continued by the same command.
@@ -363,7 +366,6 @@ class RepeatPaper(Study):
 
     robots: str = "all"
     comparators: str = "forward-displacement,auto"
-    diagnostic_search: str = EA
 
 
 class Compare(Command):
@@ -392,14 +394,11 @@ class Check(Command):
 
 def settings_of(options: Study | Recover, steps: int) -> Settings:
     """Returns the parameters of a recovery in trials of that many steps."""
-    small = Settings(
-        steps=steps,
-        trials=options.trials,
-        generations=options.generations,
-        # An ablation has several, in order.
-        diagnostic_search=options.diagnostic_search.split(",")[0],
-        max_simulated_steps=options.max_simulated_steps,
-    )
+    small = Settings(steps=steps, trials=options.trials, generations=options.generations)
+    if isinstance(options, Searched):
+        small = replace(small, max_simulated_steps=options.max_simulated_steps)
+    if isinstance(options, Recover | RunSuite):  # the searches of an ablation are an axis
+        small = replace(small, diagnostic_search=options.diagnostic_search)
     return small.scaled(options.population)
 
 

@@ -54,7 +54,7 @@ def ablate(options: Ablate) -> None:
         damages=_damages(options),
         kinds=options.kinds,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
-        diagnostic_searches=options.diagnostic_search.split(","),
+        diagnostic_searches=[one.strip() for one in options.diagnostic_search.split(",")],
         gaps=inputs.numbers("--gap", options.gaps),
         seeds=options.every_seed,
         settings=options.settings,

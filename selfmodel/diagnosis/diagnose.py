@@ -8,7 +8,7 @@ Source: Page, "Continuous inspection schemes", Biometrika 41 (1954), the cumulat
 differences of two hypotheses' losses, over all times afterwards.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -95,6 +95,7 @@ class DiagnosticSearch:
         self._is_extended = is_whole and not simulator.robot.has_fixed_base
         self._healthy_trials = [*map(TrialPart, healthy_trials)]
         self.losses = LossTable(simulator, comparator)
+        self._ended: tuple[Hypothesis | None, Collection[Hypothesis]] | None = None
         self.evaluations = 0
 
     def __call__(
@@ -109,6 +110,7 @@ class DiagnosticSearch:
         ``seeds`` are hypotheses of the initial population, in addition to random ones. The
         ``observer`` is called after each generation, and with the progress of each later stage.
         """
+        self._ended = None
         limit, account = self._settings.max_simulated_steps, self.losses.account
         account.limit = None if limit is None else limit * len(trials)
         try:
@@ -148,6 +150,7 @@ class DiagnosticSearch:
             )
             self.evaluations += evaluations
         if how == EA:
+            self._ended = None, ranked
             return diagnosis_of(problem, ranked)
         starts = ranked[:REFINEMENT_STARTS]
         diagnosis = self._refined_diagnosis(starts, trials, problem)
@@ -160,20 +163,24 @@ class DiagnosticSearch:
         return replace(diagnosis, also_searched=also)
 
     def _unfinished(self, trials: Sequence[Trial]) -> Diagnosis:
-        """Returns the diagnosis of a search that its limit has ended: the best so far.
+        """Returns the diagnosis at the limit: by what the search has compared until then.
 
-        The EA alone decides by the distance, as ever; the other searches by their tests.
+        The EA alone decides by the distance, as ever; the other searches by their tests. Where the
+        search itself has ended, what was simulated for the verdict does not count.
         """
         known, account = self.losses.known(trials), self.losses.account
+        best, compared = self._ended or (None, known)
         if INTACT not in known:
             raise InputError(
                 f"expected a limit of control steps with which a hypothesis can be simulated in "
                 f"all trials, got {account.limit} for {len(trials)}: give more"
             )
+        known = [one for one in known if one in compared or one == INTACT]
         totals = dict(zip(known, map(float, self.losses.distances(known, trials)), strict=True))
         ranked = by_distance(totals)
         if self._settings.diagnostic_search != EA:
-            ranked = [chosen_of(known, partial(self.losses.losses, trials=trials)), *ranked]
+            best = best or chosen_of(known, partial(self.losses.compared, trials=trials))
+            ranked = [best, *ranked]
         return Diagnosis(
             ranked=tuple(
                 Candidate(one, totals[one])
@@ -198,7 +205,7 @@ class DiagnosticSearch:
             alone = LocalSearch(problem).best_alone
             if after := self._after_change(alone, starts, trials, problem, is_refined=False):
                 return after
-        best, compared = self._refined(starts, problem)
+        best, compared = self._ended = self._refined(starts, problem)
         after = self._after_change(best, starts, trials, problem)
         return after or diagnosis_of(problem, compared, best)
 

@@ -244,6 +244,11 @@ class Diagnosis:
     cost: Cost = Cost(0, 0)
 
     @property
+    def is_unfinished(self) -> bool:
+        """Whether the limit of simulated control steps ended the search or the verdict."""
+        return self.doubt is not None and self.fit is None
+
+    @property
     def best(self) -> Hypothesis:
         """The best hypothesis."""
         return self.ranked[0].hypothesis

@@ -147,6 +147,15 @@ class LossTable:
             [np.array([row.total[pieces] for row in rows]) for rows, pieces in rows_of], axis=1
         )
 
+    def compared(self, hypotheses: Sequence[Hypothesis], trials: Parts) -> FloatArray:
+        """Returns the losses by which hypotheses are compared, ``(n, pieces)``.
+
+        Of a comparator with one distance per trial, it is their sum, one piece.
+        """
+        losses = self.losses(hypotheses, trials)
+        is_piecewise = self.is_piecewise([whole(one).trial for one in trials])
+        return losses if is_piecewise else losses.sum(axis=1, keepdims=True)
+
     def by_signal(self, hypothesis: Hypothesis, trials: Parts) -> Mapping[str, FloatArray]:
         """Returns the part of each signal in each loss of a hypothesis, ``(pieces,)`` each.
 

@@ -72,13 +72,11 @@ class Problem:
     calibrate: Calibrate | None = None
     healthy_parts: Sequence[TrialPart] = ()
     observer: Observer = ignore
-    _has_pieces: bool = field(init=False)
     _is_comparable: bool = field(init=False)
     _refits: "dict[Hypothesis, Problem | None]" = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         jams = observed_jams([part.rows for part in self.trials], self.space.anatomy)
-        self._has_pieces = self.table.is_piecewise([part.trial for part in self.trials])
         self.space = self._told_apart(replace(self.space, observed=jams))
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
@@ -143,19 +141,13 @@ class Problem:
         return self._refits[hypothesis]
 
     def losses(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
-        """Returns the losses on the trials to explain, ``(n, pieces)``.
-
-        Of a comparator with one distance per trial, it is their sum, one piece.
-        """
-        return self._together(self.table.losses(hypotheses, self.trials))
+        """Returns the losses on the trials to explain, ``(n, pieces)``."""
+        return self.table.compared(hypotheses, self.trials)
 
     def coarse(self, hypotheses: Sequence[Hypothesis]) -> FloatArray:
         """Returns the losses on the same trials by the surrogate, ``(n, fewer pieces)``."""
         table, trials = self.surrogate
-        return self._together(table.losses(hypotheses, trials))
-
-    def _together(self, losses: FloatArray) -> FloatArray:
-        return losses if self._has_pieces else losses.sum(axis=1, keepdims=True)
+        return table.compared(hypotheses, trials)
 
     def healthy(self, hypotheses: Sequence[Hypothesis]) -> FloatArray | None:
         """Returns the losses on healthy trials, ``(n, healthy pieces)``.

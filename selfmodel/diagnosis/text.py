@@ -76,8 +76,10 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
             return _unexplained(diagnosis)
         case "not judged":
             what = "it is not known whether the robot has a fault"
-            model = "an error in the simulation model could explain these logs too"
-            return [what, model], (diagnosis.doubt or NO_DOUBT).remedy
+            why = "an error in the simulation model could explain these logs too"
+            if diagnosis.is_unfinished:
+                why = f"the search ended at its limit, with {in_words(diagnosis.best)} as its best"
+            return [what, why], (diagnosis.doubt or NO_DOUBT).remedy
 
 
 def in_words(hypothesis: Hypothesis) -> str:
@@ -254,6 +256,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
             return f"Unexplained: {_missing(diagnosis)}"
         case "not judged":
             reason = f"Not judged: {(diagnosis.doubt or NO_DOUBT).reason}"
+            if diagnosis.is_unfinished:
+                return f"{reason}; {best} is the best hypothesis until then."
             return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
 
 

@@ -133,11 +133,10 @@ def ablation(
     next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
-    limit = settings.max_simulated_steps or settings.evaluations * settings.steps
     # The searches are an axis: a folder may get further ones.
-    settings = dataclasses.replace(
-        settings, diagnostic_search=Settings.diagnostic_search, max_simulated_steps=limit
-    )
+    _check_search(settings, Settings.diagnostic_search, "give diagnostic_searches")
+    limit = settings.max_simulated_steps or settings.evaluations * settings.steps
+    settings = dataclasses.replace(settings, max_simulated_steps=limit)
     searches = names_of(diagnostic_searches, "searches of a diagnosis, such as ea")
     for one in searches:
         plugins.check_known("diagnostic search", one, DIAGNOSTIC_SEARCHES)
@@ -281,7 +280,9 @@ def paper(
     """
     robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases, 1)
     seeds, comparators = whole_numbers("seeds", seeds, 0, 0), plugins.comparator_names(comparators)
-    settings = dataclasses.replace(arguments.settings_of(settings), diagnostic_search=EA)
+    settings = arguments.settings_of(settings)
+    _check_search(settings, EA, "the paper has the EA alone")
+    settings = dataclasses.replace(settings, diagnostic_search=EA)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)
     check_cases("case of Table I", cases, TABLE_ONE)
@@ -298,6 +299,14 @@ def paper(
     ]
     shared = {**_shared(settings, "paper", chosen), "calibrated": False}
     return _study("paper", folder, points, shared, _one_gait(models, shared))
+
+
+def _check_search(settings: Settings, known: str, remedy: str) -> None:
+    if settings.diagnostic_search not in (known, Settings.diagnostic_search):
+        raise InputError(
+            f"expected settings of a study with no diagnostic_search of their own, got "
+            f"{settings.diagnostic_search}: {remedy}"
+        )
 
 
 def _one_gait(models: Mapping[str, Mapping[str, str]], shared: Mapping[str, Any]) -> Needs:

@@ -188,9 +188,14 @@ class LoadedStudy:
 
     def _right(self) -> list[tuple[str, int, int]]:
         """Returns the right diagnoses of all and their number, by robot and comparator."""
-        axes = [name for name in ("robot", "comparator") if name in self.rows]
-        is_known = "correct" in self.rows  # not of a failure that a body cannot have
-        groups = self.rows[self.rows["correct"].notna()].groupby(axes) if is_known else ()
+        if "correct" not in self.rows:
+            return []
+        rows = self.rows[self.rows["correct"].notna()]  # a body cannot have every failure
+        if "comparator" in rows:
+            rows = rows.assign(method=methods_of(rows.to_dict("records")))
+        axes = [name for name in ("robot", "method", "trials") if name in rows]
+        axes = axes if self.kind == "ablate" else axes[: 2 if "method" in rows else 1]
+        groups = rows.astype(dict.fromkeys(axes, str)).groupby(axes)
         return [(", ".join(key), int(own["correct"].sum()), len(own)) for key, own in groups]
 
     def to_pandas(self) -> pd.DataFrame:

@@ -48,7 +48,10 @@ def sources_of(modules: tuple[str, ...]) -> dict[str, str]:
         while todo:
             name = todo.pop()
             path = _file(name) if _is_beside(name, module, root) else None
-            if path is not None and (key := path.relative_to(root).as_posix()) not in digests:
+            # A namespace package may have several folders.
+            key = f"{name.replace('.', '/')}{'/' if path and path.stem == '__init__' else '.'}"
+            key += "__init__.py" if key.endswith("/") else "py"
+            if path is not None and key not in digests:
                 digests[key], imports = _read(path, name)
                 todo += imports
             if "." in name:

@@ -112,7 +112,17 @@ def read_style(style: str | Path | None) -> Mapping[str, Any]:
     named = {str(name): value for name, value in own.items()}
     # The size of the font rules the sizes that the style leaves open.
     scale = named.get("font.size", FONT) / FONT
-    return {name: scale * DEFAULT_SIZES[name] for name in DEFAULT_SIZES if scale != 1} | named
+    sized = {name: scale * DEFAULT_SIZES[name] for name in DEFAULT_SIZES if scale != 1} | named
+    try:
+        with mpl.rc_context():
+            use_style(dict(sized))
+            figure = Figure()
+            figure.suptitle("a figure")
+            figure.savefig(io.BytesIO(), format="png")
+    except (ValueError, RuntimeError, MemoryError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"{path}: no figure can be drawn in this style: {reason}") from error
+    return sized
 
 
 @figure_style()

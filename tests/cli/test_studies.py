@@ -16,7 +16,7 @@ QUICK = ("--comparator", "forward-displacement")
 PAPER = ("paper", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
 ABLATE = ("ablate", "--robots", "quadruped", "--comparator", "forward-displacement", *TINY)
 SUITE = ("suite", "run", "--domains", "walker,biped.xml", "--cases", "1", *QUICK, *TINY)
-FRICTION = ("--damage", "friction=0.4", "--kinds", "paper,friction")
+FRICTION = ("--damage", "friction=0.4", "--kinds", "paper,friction", "--repair", "paper")
 
 THEIRS = """
 from dataclasses import dataclass
@@ -134,7 +134,7 @@ def test_a_failure_ends_with_status_one_and_one_json_object(
     found = json.loads(told.stdout)
     assert [row["comparator"] for row in found["rows"]] == ["forward-displacement"]
     (failure,) = found["failures"]
-    assert failure["run"] == "quadruped-case03-gap0.0-seed000-theirs%3APICKY"
+    assert failure["run"] == "quadruped-case03-gap0.0-seed000-theirs%3APICKY-stepwise"
     assert "this trial does not please" in failure["error"]
     assert "1 failed, the first of them quadruped-case03" in told.stderr
     drawn = {"out/figures/gap.png", "out/figures/cases-quadruped-1.svg"}

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.comparators import FORWARD_DISPLACEMENT, NOISY_TRANSFER, SEGMENT_PREDICTION
 from selfmodel.diagnosis.comparator import Comparator, Prepared
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -131,14 +131,15 @@ def test_no_search_simulates_more_than_its_limit_and_one_that_reaches_it_does_no
 
 
 def test_a_limit_with_which_nothing_can_be_simulated_is_refused(quadruped: Robot):
-    settings = dataclasses.replace(SMALL, max_simulated_steps=59)
-    with pytest.raises(InputError, match="59"):
-        diagnosed(quadruped, FORWARD_DISPLACEMENT, settings, "intact")
+    # An ensemble has more rollouts than one.
+    settings = dataclasses.replace(SMALL, max_simulated_steps=60)
+    with pytest.raises(InputError, match="got 60 for 1"):
+        diagnosed(quadruped, NOISY_TRANSFER, settings, "intact")
 
 
 @pytest.mark.parametrize(
     ("wrong", "named"),
-    [({"diagnostic_search": "steps"}, "stepwise"), ({"max_simulated_steps": 0}, "1")],
+    [({"diagnostic_search": "steps"}, "stepwise"), ({"max_simulated_steps": 59}, "60 or above")],
 )
 def test_an_unknown_search_or_limit_is_refused(wrong: dict[str, object], named: str):
     with pytest.raises(InputError, match=named):

@@ -47,17 +47,19 @@ def test_the_diagnoses_of_a_run_need_its_trials_which_need_gaits_of_the_bank(tmp
 
 
 def test_the_searches_of_an_ablation_are_an_axis_at_one_limit_which_may_be_extended(tmp_path: Path):
-    (first,) = ablated(tmp_path, settings=replace(SMALL, diagnostic_search="stepwise")).cells()
+    (first,) = ablated(tmp_path, settings=SMALL).cells()
     study = ablated(tmp_path, diagnostic_searches=["ea", "stepwise"])
     assert values(study, "diagnostic_search") == ["ea", "stepwise"]
     _, same = study.cells()
     assert same.place == first.place
     limit = same.parameters["shared"]["settings"]["max_simulated_steps"]
     assert limit == SMALL.evaluations * SMALL.steps
-    own = ablated(tmp_path, settings=replace(SMALL, max_simulated_steps=7)).cells()[0]
-    assert own.parameters["shared"]["settings"]["max_simulated_steps"] == 7
+    own = ablated(tmp_path, settings=replace(SMALL, max_simulated_steps=700)).cells()[0]
+    assert own.parameters["shared"]["settings"]["max_simulated_steps"] == 700
     with pytest.raises(InputError, match="stepwise"):
         ablated(tmp_path, diagnostic_searches="steps")
+    with pytest.raises(InputError, match="diagnostic_searches"):
+        ablated(tmp_path, settings=replace(SMALL, diagnostic_search="ea"))
 
 
 PLUG_INS = """
