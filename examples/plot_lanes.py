@@ -12,7 +12,7 @@ import os
 import sys
 from pathlib import Path
 
-from selfmodel.cli.render import GL, choose_gl
+from selfmodel.opengl import GL, choose_gl
 
 # Before MuJoCo is imported, which reads it.
 os.environ[GL] = choose_gl("install EGL or OSMesa")

@@ -11,7 +11,11 @@ from selfmodel.comparators import FORWARD_DISPLACEMENT, NOISY_TRANSFER, SEGMENT_
 from selfmodel.diagnosis.comparator import Comparator, Prepared
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.diagnosis.text import verdict_sentences
 from selfmodel.errors import InputError
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
@@ -128,6 +132,36 @@ def test_no_search_simulates_more_than_its_limit_and_one_that_reaches_it_does_no
     assert found.cost.control_steps > limit * trials - 100 or found.doubt is None
     assert (found.verdict == "not judged") == (found.doubt is not None)
     assert found.doubt is None or f"{limit * trials:,}" in found.doubt.reason
+
+
+@pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SEGMENT_PREDICTION])
+@pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
+def test_a_limit_that_is_reached_in_the_verdict_changes_no_best_hypothesis(
+    quadruped: Robot, comparator: Comparator, search: str
+):
+    settings = dataclasses.replace(SMALL, diagnostic_search=search)
+    damage = "break:front_left_knee"
+    whole, _ = diagnosed(quadruped, comparator, settings, damage)
+    limit = whole.cost.control_steps - 1
+    limited = dataclasses.replace(settings, max_simulated_steps=limit)
+    found, _ = diagnosed(quadruped, comparator, limited, damage)
+    assert (found.best, found.verdict) == (whole.best, "not judged")
+    assert "best hypothesis until then" in verdict_sentences(found)
+
+
+def test_one_distance_a_trial_is_compared_by_its_sum_and_many_losses_one_by_one(quadruped: Robot):
+    trials = [
+        trial_of(quadruped, "intact", one, steps=60) for one in random_controllers(quadruped, 3)
+    ]
+    hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
+    table = LossTable(Simulator(quadruped, 1), ByDistance())
+    losses = table.losses(hypotheses, trials)
+    assert losses.shape == (2, 3)
+    np.testing.assert_array_equal(table.compared(hypotheses, trials)[:, 0], losses.sum(axis=1))
+    many = LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+    np.testing.assert_array_equal(
+        many.compared(hypotheses, trials), many.losses(hypotheses, trials)
+    )
 
 
 def test_a_limit_with_which_nothing_can_be_simulated_is_refused(quadruped: Robot):
