@@ -31,7 +31,8 @@ def diagnosis(
     return selfmodel.diagnose(
         trials,
         healthy=healthy,
-        **{"settings": SMALL, "calibrate": False, "comparator": FORWARD_DISPLACEMENT, **options},
+        **{"settings": SMALL, "calibrate": False, "kinds": "paper"}
+        | {"comparator": FORWARD_DISPLACEMENT, **options},
     )
 
 
@@ -45,7 +46,8 @@ def recovered(folder: Path, **options: object) -> selfmodel.Recovery:
     healthy = selfmodel.simulated_robot("quadruped")
     damaged = selfmodel.simulated_robot("quadruped", KNEE)
     given = {"settings": SMALL, "calibrate": False, "comparator": FORWARD_DISPLACEMENT}
-    return selfmodel.recover(healthy, damaged, "quadruped", folder, **given, **options)
+    given |= {"kinds": "paper"}
+    return selfmodel.recover(healthy, damaged, "quadruped", folder, **given | options)
 
 
 @pytest.fixture
@@ -83,6 +85,7 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path, reference: self
     done = command(
         *("diagnose", str(BEFORE), str(AFTER), "--no-calibrate", "--json"),
         *("--population", "4", "--generations", "1", "--comparator", "forward-displacement"),
+        *("--kinds", "paper"),
         cwd=tmp_path,
     )
 

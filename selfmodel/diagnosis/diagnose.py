@@ -19,7 +19,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.alternatives import best_severities
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import Candidate, Change, Cost, Diagnosis, Doubt
+from selfmodel.diagnosis.diagnosis import ENDED, Candidate, Change, Cost, Diagnosis, Doubt
 from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LimitReachedError, LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
@@ -192,7 +192,7 @@ class DiagnosticSearch:
             verdict="not judged",
             test=significance.TEST,
             doubt=Doubt(
-                f"the limit of {account.limit:,} simulated control steps ended the search",
+                f"the limit of {account.limit:,} {ENDED}",
                 "give more steps (--max-simulated-steps), or search fewer kinds of faults",
             ),
         )

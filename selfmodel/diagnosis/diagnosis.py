@@ -102,6 +102,10 @@ class Residual:
     end: float
 
 
+ENDED = "simulated control steps ended the search"
+"""End of the reason of a doubt where a limit was reached."""
+
+
 @dataclass(frozen=True)
 class Doubt:
     """The reason for which trials cannot be judged, a clause, and what to do about it."""
@@ -246,7 +250,7 @@ class Diagnosis:
     @property
     def is_unfinished(self) -> bool:
         """Whether the limit of simulated control steps ended the search or the verdict."""
-        return self.doubt is not None and self.fit is None
+        return self.doubt is not None and self.doubt.reason.endswith(ENDED)
 
     @property
     def best(self) -> Hypothesis:

@@ -75,7 +75,7 @@ def diagnosed(
 
 
 @pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
-@pytest.mark.parametrize("trials", [1, 2])
+@pytest.mark.parametrize("trials", [1, pytest.param(2, marks=pytest.mark.search)])
 def test_the_same_distance_with_and_without_losses_is_the_same_diagnosis_at_the_same_cost(
     quadruped: Robot, search: str, trials: int
 ):
