@@ -20,7 +20,7 @@ from tests.helpers.hostile import lacking
 
 LOGS = Path(__file__).parent / "data" / "logs-0.1" / "recovery" / "trials"
 BEFORE, AFTER = LOGS / "00-before.mcap", LOGS / "01-after.mcap"
-SMALL = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
+SMALL = selfmodel.Settings(steps=60, trials=1, generations=1, diagnostic_search="ea").scaled(4)
 KNEE = "break:front_left_knee"
 
 
@@ -85,7 +85,7 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path, reference: self
     done = command(
         *("diagnose", str(BEFORE), str(AFTER), "--no-calibrate", "--json"),
         *("--population", "4", "--generations", "1", "--comparator", "forward-displacement"),
-        *("--kinds", "paper"),
+        *("--kinds", "paper", "--diagnostic-search", "ea"),
         cwd=tmp_path,
     )
 

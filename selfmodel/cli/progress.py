@@ -150,12 +150,10 @@ class GridDisplay(Display):
     def __call__(self, event: GridBegins | CellEnds) -> None:
         """Displays an event."""
         if isinstance(event, GridBegins):
-            if event.earlier and (self.bar or not event.finished):
-                self.print_lines(event.earlier)
             self.done, self.total = event.finished, event.total
             if self.bar:
                 self.bar.add_task("", total=event.total, completed=event.finished)
-            elif event.finished:
+            if event.earlier or (event.finished and not self.bar):
                 self.print_lines(str(event))
             return
         self.done = event.number

@@ -19,7 +19,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.alternatives import best_severities
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnosis import ENDED, Candidate, Change, Cost, Diagnosis, Doubt
+from selfmodel.diagnosis.diagnosis import Candidate, Change, Cost, Diagnosis, Doubt
 from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LimitReachedError, LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
@@ -179,7 +179,8 @@ class DiagnosticSearch:
         totals = dict(zip(known, map(float, self.losses.distances(known, trials)), strict=True))
         ranked = by_distance(totals)
         if self._settings.diagnostic_search != EA:
-            best = best or chosen_of(known, partial(self.losses.compared, trials=trials))
+            if best is None:
+                best = chosen_of(known, partial(self.losses.compared, trials=trials))
             ranked = [best, *ranked]
         return Diagnosis(
             ranked=tuple(
@@ -192,8 +193,9 @@ class DiagnosticSearch:
             verdict="not judged",
             test=significance.TEST,
             doubt=Doubt(
-                f"the limit of {account.limit:,} {ENDED}",
+                f"the limit of {account.limit:,} simulated control steps ended the search",
                 "give more steps (--max-simulated-steps), or search fewer kinds of faults",
+                is_limit=True,
             ),
         )
 

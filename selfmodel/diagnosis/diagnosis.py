@@ -102,16 +102,16 @@ class Residual:
     end: float
 
 
-ENDED = "simulated control steps ended the search"
-"""End of the reason of a doubt where a limit was reached."""
-
-
 @dataclass(frozen=True)
 class Doubt:
-    """The reason for which trials cannot be judged, a clause, and what to do about it."""
+    """The reason for which trials cannot be judged, a clause, and what to do about it.
+
+    ``is_limit`` is whether the limit of simulated control steps ended the search or the verdict.
+    """
 
     reason: str
     remedy: str
+    is_limit: bool = False
 
 
 @dataclass(frozen=True)
@@ -246,11 +246,6 @@ class Diagnosis:
     probability: Mapping[str, float] = field(default_factory=dict)
     left_out: tuple[Hypothesis, ...] = ()
     cost: Cost = Cost(0, 0)
-
-    @property
-    def is_unfinished(self) -> bool:
-        """Whether the limit of simulated control steps ended the search or the verdict."""
-        return self.doubt is not None and self.doubt.reason.endswith(ENDED)
 
     @property
     def best(self) -> Hypothesis:

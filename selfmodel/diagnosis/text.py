@@ -75,11 +75,14 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "unexplained":
             return _unexplained(diagnosis)
         case "not judged":
-            what = "it is not known whether the robot has a fault"
+            what, doubt = (
+                "it is not known whether the robot has a fault",
+                diagnosis.doubt or NO_DOUBT,
+            )
             why = "an error in the simulation model could explain these logs too"
-            if diagnosis.is_unfinished:
+            if doubt.is_limit:
                 why = f"the search ended at its limit, with {in_words(diagnosis.best)} as its best"
-            return [what, why], (diagnosis.doubt or NO_DOUBT).remedy
+            return [what, why], doubt.remedy
 
 
 def in_words(hypothesis: Hypothesis) -> str:
@@ -255,8 +258,9 @@ def _verdict(diagnosis: Diagnosis) -> str:
         case "unexplained":
             return f"Unexplained: {_missing(diagnosis)}"
         case "not judged":
-            reason = f"Not judged: {(diagnosis.doubt or NO_DOUBT).reason}"
-            if diagnosis.is_unfinished:
+            doubt = diagnosis.doubt or NO_DOUBT
+            reason = f"Not judged: {doubt.reason}"
+            if doubt.is_limit:
                 return f"{reason}; {best} is the best hypothesis until then."
             return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
 

@@ -193,8 +193,8 @@ class LoadedStudy:
         rows = self.rows[self.rows["correct"].notna()]  # a body cannot have every failure
         if "comparator" in rows:
             rows = rows.assign(method=methods_of(rows.to_dict("records")))
-        axes = [name for name in ("robot", "method", "trials") if name in rows]
-        axes = axes if self.kind == "ablate" else axes[: 2 if "method" in rows else 1]
+        axes = [name for name in ("robot", "method") if name in rows]
+        axes += ["trials"] if self.kind == "ablate" else []
         groups = rows.astype(dict.fromkeys(axes, str)).groupby(axes)
         return [(", ".join(key), int(own["correct"].sum()), len(own)) for key, own in groups]
 

@@ -15,7 +15,10 @@ from tests.helpers.drivers import random_repertoire
 from tests.helpers.policies import save_policy
 
 FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--no-calibrate", "--json")
-QUICK = ("recover", "quadruped", "--case", "1", *FEW, "--comparator", "forward-displacement")
+QUICK = (
+    *("recover", "quadruped", "--case", "1", *FEW, "--comparator", "forward-displacement"),
+    *("--diagnostic-search", "ea"),
+)
 
 
 @pytest.fixture(scope="module")

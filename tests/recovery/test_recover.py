@@ -51,7 +51,7 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 from tests.helpers.memory import in_memory
 
-TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60)
+TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60, diagnostic_search="ea")
 TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
 
 
