@@ -11,7 +11,7 @@ NEEDED = (
     *("selfmodel/py.typed", "selfmodel/__init__.pyi", "selfmodel/robot/__init__.pyi"),
     *("selfmodel/tasks/quadruped.xml", "selfmodel/tasks/hexapod.xml"),
     *("selfmodel/cli/foxglove-layout.json", "selfmodel/cli/options.toml"),
-    "selfmodel/studies/figures.mplstyle",
+    "selfmodel/figures.mplstyle",
     "selfmodel/studies/paper_page.md",
     "selfmodel/report/template.html",
 )

@@ -22,7 +22,7 @@ are a file: plug-ins, arguments, the public functions, and contract checks."""
 
 VOCABULARY = (
     *("arrays", "errors", "files", "isolation", "settings", "evolution", "progress", "rotation"),
-    *("opengl", "plots", "version"),
+    *("opengl", "style", "version"),
 )
 """The files beside the rooms, which every room may import."""
 

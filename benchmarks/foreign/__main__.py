@@ -21,7 +21,7 @@ from benchmarks.foreign.scoring import (
     table,
     write_csv,
 )
-from selfmodel.studies.style import files_of
+from selfmodel.style import files_of
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.foreign.scoring import calibration_error, row_of
 from selfmodel.studies.statistics import proportion
-from selfmodel.studies.style import COLOURS, REFERENCE, figure_style
+from selfmodel.style import COLOURS, REFERENCE, figure_style
 
 
 @figure_style()

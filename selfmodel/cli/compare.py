@@ -14,7 +14,7 @@ from selfmodel.studies import figures, tables as formats
 from selfmodel.studies.comparisons import p_text
 from selfmodel.studies.rows import LoadedStudy, load, whole
 from selfmodel.studies.study import Row
-from selfmodel.studies.style import figure_style, read_style
+from selfmodel.style import figure_style, read_style
 
 COMPARISON = "comparison"
 """Folder of the files, in the folder of a study."""

@@ -29,7 +29,7 @@ from selfmodel.studies import bodies, paper_page, plans, tables as formats
 from selfmodel.studies.definition import read_study
 from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
-from selfmodel.studies.style import figure_style, read_style
+from selfmodel.style import figure_style, read_style
 from selfmodel.tasks import ROBOTS
 from selfmodel.tasks.suite_bodies import EPISODE
 

@@ -293,7 +293,7 @@ class Diagnosis:
 
     def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
         """Returns the ranking as a ``matplotlib.figure.Figure``: distances, best first."""
-        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+        from selfmodel.style import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
 
         title = f"{self.best}, {self.verdict}"
         names = [str(candidate.hypothesis) for candidate in self.ranked]

@@ -210,7 +210,7 @@ class Recovery:
 
     def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
         """Returns the scores of the trials, and those predicted, as a ``matplotlib`` figure."""
-        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+        from selfmodel.style import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
 
         names = [trial.plan.name for trial in self.trials]
         predicted = ("predicted by the self-model", self.predicted)

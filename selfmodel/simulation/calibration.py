@@ -116,7 +116,7 @@ class Calibration:
 
     def plot(self) -> Any:  # noqa: ANN401  # matplotlib is slow to import
         """Returns the factors with intervals of two deviations as a ``matplotlib`` figure."""
-        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+        from selfmodel.style import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
 
         rows, title = self.rows(), f"calibration of {self.robot.name}"
         factors, spread = self.parameters.factors, np.exp(2 * self.deviations)

@@ -19,7 +19,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
 from selfmodel.studies.rows import failure_of, methods_of, whole
 from selfmodel.studies.study import Row, grouped
-from selfmodel.studies.style import (
+from selfmodel.style import (
     COLOURS,
     REFERENCE,
     Style,

@@ -22,8 +22,8 @@ from selfmodel.studies.bodies import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, methods_of, study_rows
 from selfmodel.studies.study import Row, grouped, shared_in
-from selfmodel.studies.style import files_of
 from selfmodel.studies.tables import Table, table_of
+from selfmodel.style import files_of
 from selfmodel.tasks import ROBOTS
 
 NOT_RESTORED: Mapping[str, tuple[int, ...]] = MappingProxyType(

@@ -207,7 +207,7 @@ class LoadedStudy:
 
         For rows without diagnoses, the marginal means of their methods.
         """
-        from selfmodel.plots import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
+        from selfmodel.style import values_by_name  # noqa: PLC0415  # matplotlib is slow to import
 
         right, means = self._right(), whole(self.marginal_means())
         if not right:

@@ -32,7 +32,7 @@ from selfmodel.studies.rows import (
 )
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped, shared_in
-from selfmodel.studies.style import figure_style
+from selfmodel.style import figure_style
 from selfmodel.tasks.suite_bodies import EPISODE
 
 TRIAL_COLUMNS = (

@@ -16,7 +16,6 @@ from selfmodel.studies import figures, tables as module
 from selfmodel.studies.comparisons import compare
 from selfmodel.studies.rows import KINDS, frame_of, outcomes_of
 from selfmodel.studies.statistics import Interval
-from selfmodel.studies.style import figure_style, look, read_style
 from selfmodel.studies.tables import (
     FORMATS,
     ablation_scores,
@@ -27,6 +26,7 @@ from selfmodel.studies.tables import (
     table_files,
     table_of,
 )
+from selfmodel.style import figure_style, look, read_style
 from tests.helpers.study_rows import body, diagnosis
 
 TABLE = table_of(

@@ -1,9 +1,9 @@
-"""Style of the figures of studies: fonts and sizes from a file, panels, labels, and files."""
+"""Style of figures: fonts and sizes from a file, panels, labels, files, and values by name."""
 
 import io
 import math
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -39,17 +39,6 @@ PANEL = 3.0
 
 FONT = 10.0
 """Size of the font in ``STYLE``, with which the sizes of figures are stated, points."""
-
-DEFAULT_SIZES: Mapping[str, float] = MappingProxyType(
-    {
-        "axes.titlesize": 11,
-        "axes.labelsize": 10,
-        "figure.titlesize": 11,
-        "figure.labelsize": 10,
-        "legend.fontsize": 9,
-    }
-)
-"""Sizes of texts in ``STYLE``, points."""
 
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 _styled: ContextVar[bool] = ContextVar("styled", default=False)
@@ -112,7 +101,9 @@ def read_style(style: str | Path | None) -> Mapping[str, Any]:
     named = {str(name): value for name, value in own.items()}
     # The size of the font rules the sizes that the style leaves open.
     scale = named.get("font.size", FONT) / FONT
-    sized = {name: scale * DEFAULT_SIZES[name] for name in DEFAULT_SIZES if scale != 1} | named
+    usual = mpl.rc_params_from_file(STYLE, use_default_template=False).items()
+    sizes = {str(name): scale * value for name, value in usual if str(name).endswith("size")}
+    sized = (sizes if scale != 1 else {}) | named
     try:
         with mpl.rc_context():
             use_style(dict(sized))
@@ -217,3 +208,47 @@ def folded(text: str) -> str:
     """Returns a text on lines that a figure of a given width has room for."""
     width = _width.get()
     return text if width is None else textwrap.fill(text, int(width * len(text) / _inches(text)))
+
+
+@figure_style()
+def values_by_name(
+    title: str,
+    x_label: str,
+    names: Sequence[str],
+    values: Sequence[float],
+    *,
+    ends: Sequence[tuple[float, float]] | None = None,
+    others: tuple[str, Sequence[float]] | None = None,
+    reference: float | None = None,
+) -> Figure:
+    """Returns a figure of values, the first above: bars from 0, or points with intervals.
+
+    Args:
+        title: Title of the figure.
+        x_label: Quantity and unit of the values.
+        names: Name of each value.
+        values: The values; one that is not finite is left out.
+        ends: Ends of the interval of each value, which is then a point.
+        others: Label of other values of the same names, drawn as open points, and these.
+        reference: Value that a vertical line marks.
+    """
+    places = np.arange(len(names))
+    shown = np.where(np.isfinite(values), values, np.nan)
+    size = (3.5 + 0.07 * max(map(len, names), default=0), 1.1 + 0.27 * len(names))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots()
+    if ends is None:
+        axes.barh(places, np.nan_to_num(shown), height=0.6)
+    else:
+        bars = np.abs(np.transpose(ends) - shown)
+        axes.errorbar(shown, places, xerr=bars, fmt="o", capsize=2)
+    if others is not None:
+        axes.plot(others[1], places, "o", mfc="white", color="0.2", label=others[0])
+        figure.legend(loc="outside lower center")
+    if reference is not None:
+        axes.axvline(reference, color="0.35", linestyle="--", linewidth=1.0)
+    axes.set_yticks(places, names)
+    axes.set(title=title, xlabel=x_label)
+    axes.invert_yaxis()
+    axes.grid(axis="x")
+    return figure
