@@ -29,20 +29,16 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     place of one of its faults, or are single faults or none; they have at most as many faults. The
     eight best by the surrogate are compared, with the severity of the other fault fitted, and the
     empty hypothesis. The lead is that of the loss, or that at a joint at which the two differ;
-    infinite over a neighbour of whose faults one corrects model error. With a
-    single loss, as of a comparator with one distance per trial, there is no lead over any
-    neighbour, one with more faults included, unless the best hypothesis reproduces the trials:
-    among a hundred hypotheses, one has a small distance by chance. They are sorted by total loss.
+    infinite over a neighbour of whose faults one corrects model error. They are sorted by total
+    loss.
     """
     space = problem.space
     neighbours = dict.fromkeys(
         [*space.with_one_less(best), *space.with_one_replaced(best), *space.with_one_more(INTACT)]
     )
-    (losses,) = problem.losses([best])
-    is_decided = len(losses) > 1 or losses.mean() <= significance.NEGLIGIBLE_LOSS
 
     def is_rival(one: Hypothesis) -> bool:
-        return (len(one) <= len(best) and bool(best.lacking(one))) if is_decided else one != best
+        return len(one) <= len(best) and bool(best.lacking(one))
 
     rivals = [*filter(is_rival, neighbours)]
     few = best_severities(by_total_loss(rivals, problem.coarse))[: search.SHORTLIST_SIZE]
@@ -53,9 +49,6 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     others = [*filter(is_rival, dict.fromkeys([*few, *fitted, INTACT]))]
     leads = {}
     for one in by_total_loss(others, problem.losses):
-        if not is_decided:
-            leads[one] = 0.0
-            continue
         lead = significance.lead(*problem.losses([best, one]))
         if problem.has_joints:
             lead = max(lead, lead_at_joints(best, one, problem))

@@ -24,7 +24,8 @@ for a hypothesis with faults. ``ambiguous``: other hypotheses are indistinguisha
 healthy robot, or significantly worse than with a fault of an unsearched kind, so a fault is
 missing; requires a trial of the healthy robot. A diagnosis is also ``unexplained`` if the
 simulation of every hypothesis diverged. ``not judged``: a fault or an error of the self-model
-explains the trials, and the healthy trials do not decide between them; see ``adequacy``."""
+explains the trials, and neither the healthy trials nor the comparator decide between them; see
+``adequacy``."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,14 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from selfmodel.diagnosis import search, significance
-from selfmodel.diagnosis.adequacy import doubt_of, fit_of, is_too_high, supported, unlikeness
+from selfmodel.diagnosis.adequacy import (
+    doubt_of,
+    fit_of,
+    is_too_high,
+    supported,
+    unlikeness,
+    unreproduced,
+)
 from selfmodel.diagnosis.alternatives import (
     best_severities,
     detectable_severities,
@@ -71,7 +78,7 @@ def verdict_of(
 
     ``alike`` are the hypotheses that are indistinguishable from the best, ``unsearched`` is the
     best one with a fault of an unsearched kind, if that is better. ``diagnosis_of`` says
-    ``not judged`` in place of an accusation that the healthy trials do not carry.
+    ``not judged`` in place of a verdict that the trials do not carry.
     """
     if unsearched is not None or is_too_high(fit) or fit.joints:
         return "unexplained"
@@ -108,7 +115,9 @@ def diagnosis_of(
     verdict = verdict_of(best, fit, alike, unsearched)
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
-    doubt = None if verdict == "intact" else doubt_of(accused, fit, by_refit)
+    doubt = unreproduced(fit, by_refit)
+    if doubt is None and verdict != "intact":
+        doubt = doubt_of(accused, fit, by_refit)
     probability: dict[str, float] = {}
     if doubt is None and fit.healthy_loss is not None:
         nearest = best_severities([*alike, *sorted(leads, key=lambda one: leads[one])])

@@ -1,6 +1,7 @@
-"""Tests of the verdict: intact, explained, ambiguous, unexplained.
+"""Tests of the verdict: intact, explained, ambiguous, unexplained, not judged.
 
-There is no reality gap, so an unexplained trial is due to the searched hypotheses.
+There is no reality gap but where a test makes one, so an unexplained trial is due to the searched
+hypotheses.
 """
 
 import dataclasses
@@ -11,7 +12,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from selfmodel.comparators import FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel import plugins
+from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.adequacy import is_too_high
 from selfmodel.diagnosis.comparator import Comparator
@@ -20,6 +22,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_RATIO, TEST
+from selfmodel.diagnosis.text import summary
 from selfmodel.diagnosis.verdict import (
     WINDOW,
     diagnosis_of,
@@ -29,6 +32,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import KINDS, PAPER_KINDS
+from selfmodel.physical.simulated import draw_gap
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -127,6 +131,36 @@ def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, befo
     found = diagnosed(quadruped, [trial(quadruped, CASES[10], gait, steps=120)], before)
 
     assert found.verdict == "unexplained"
+
+
+WHOLE = sorted(name for name in COMPARATORS if not name.startswith("segment-prediction"))
+
+
+@pytest.mark.parametrize("truth", ["intact", "break:front_left_knee"])
+@pytest.mark.parametrize("name", WHOLE)
+def test_whole_trials_that_no_hypothesis_reproduces_are_not_judged(
+    quadruped: Robot, gait: Controller, name: str, truth: str
+):
+    gap = draw_gap(quadruped, 0.1, np.random.default_rng(0))
+    healthy, damaged = (
+        trial(quadruped, text, gait, steps=60, gap=gap) for text in ("intact", truth)
+    )
+    found = diagnosed(quadruped, [damaged], [healthy], comparator=plugins.comparator(name))
+
+    assert found.verdict == "not judged"
+    assert found.probability == {}
+    assert "segment-prediction" in summary(found)[1]
+
+
+@pytest.mark.parametrize("name", [one for one in WHOLE if one != "noisy-transfer"])
+def test_whole_trials_that_a_hypothesis_reproduces_are_judged(
+    quadruped: Robot, gait: Controller, name: str
+):
+    truth = parse("break:front_left_knee", quadruped.anatomy)
+    damaged = trial(quadruped, str(truth), gait, steps=60)
+    found = diagnosed(quadruped, [damaged], comparator=plugins.comparator(name), seeds=[truth])
+
+    assert (found.best, found.doubt) == (truth, None)
 
 
 class OfJams:

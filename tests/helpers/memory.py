@@ -6,6 +6,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import RunTrial
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Stage, Trial, TrialPlan
 
@@ -28,7 +29,8 @@ def trial_of(
     steps: int,
     name: str = "",
     stage: Stage = "after",
+    gap: RealityGap | None = None,
 ) -> Trial:
     """Returns a trial of a robot with faults; its name, and path, are its stage and the faults."""
     plan = TrialPlan(name or f"{stage}-{truth}", stage, driver, steps, 0)
-    return in_memory(robot)(SimulatedRobot(robot, parse(truth, robot.anatomy)), plan)
+    return in_memory(robot)(SimulatedRobot(robot, parse(truth, robot.anatomy), gap), plan)
