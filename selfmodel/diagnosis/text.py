@@ -237,7 +237,7 @@ def _limits(rows: Sequence[DetectableSeverity]) -> str:
     for row in rows:
         sides = (("up to", row.below), ("from", row.above))
         limits = " or ".join(f"{word} {value:.4g}" for word, value in sides if value is not None)
-        parts.setdefault(limits or "no severity", []).append(row.part)
+        parts.setdefault(limits or "no severity", []).append(row.part or "centre of mass")
     return ", ".join(
         f"{limits} ({', '.join(names)})" if len(parts) > 1 else limits
         for limits, names in parts.items()

@@ -1,4 +1,4 @@
-"""Motors and sensors of an MJCF: position servos, command ranges, angle and touch sensors."""
+"""Motors and sensors of an MJCF: physics of joints, servos, command ranges, sensors."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 import mujoco
 import numpy as np
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, listed, unknown_name
 from selfmodel.robot.actuators import ancestors, command_range, command_ranges
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
@@ -21,6 +21,14 @@ _NO_BIAS, _AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_A
 
 _INHERITING = ("position", "intvelocity")
 """Actuators that may have the range of their joint as command range."""
+
+MIN_PERIOD = 10
+"""Physics steps of the undamped oscillation of a servo, below which there is a note. Of 80 random
+gaits of a hexapod with 18 servos, the best lost 41 % of its displacement at a quarter of the time
+step with servos of 8 steps, 21 % with 17."""
+
+_MAX_LISTED = 6
+"""Joints that a note names."""
 
 _SITE_MARGIN = 0.005
 """Distance by which a touch site extends beyond the geoms of its body, m."""
@@ -38,6 +46,51 @@ def _drives_hinge(model: mujoco.MjModel, motor: int, bias: int) -> bool:
 
 def _hinges(model: mujoco.MjModel) -> list[str]:
     return [model.joint(int(joint)).name for joint in np.flatnonzero(model.jnt_type == _HINGE)]
+
+
+def set_physics(work: Work) -> None:
+    """Sets the time step, the contacts and the hinges to the values of the settings."""
+    settings, hinges = work.settings, _hinges(work.model)
+    joints = [joint for joint in work.root.iter("joint") if joint.get("name") in hinges]
+    for attribute, values in (
+        ("armature", settings.armature),
+        ("damping", settings.damping),
+        ("frictionloss", settings.friction),
+    ):
+        check_patterns(values, hinges)
+        for joint in joints:
+            value = value_of(values, joint.get("name", ""))
+            if value is not None:
+                joint.set(attribute, repr(value))
+    if settings.timestep is not None:
+        work.section("option").set("timestep", repr(settings.timestep))
+    if settings.solref is not None:
+        for geom in work.root.iter("geom"):
+            geom.set("solref", format_numbers(np.array(settings.solref)))
+
+
+def note_stiff_servos(work: Work) -> None:
+    """Adds a note on the servos that are too stiff for the physics time step."""
+    model = work.model
+    timestep, periods, lacking = model.opt.timestep, dict[str, float](), 0.0
+    for motor in range(model.nu):
+        if not (model.actuator_gainprm[motor, 0] > 0 and _drives_hinge(model, motor, _AFFINE)):
+            continue
+        joint = int(model.actuator_trnid[motor, 0])
+        inertia = model.dof_M0[model.jnt_dofadr[joint]]
+        stiffness = model.actuator_gainprm[motor, 0] * model.actuator_gear[motor, 0] ** 2
+        period = 2 * np.pi * np.sqrt(inertia / stiffness) / timestep
+        if period < MIN_PERIOD:
+            periods[model.joint(joint).name] = period
+            lacking = max(lacking, inertia * ((MIN_PERIOD / period) ** 2 - 1))
+    if periods:
+        least = min(periods.values())
+        work.notes.append(
+            f"servos of {listed([*periods], _MAX_LISTED)} are stiff for a physics time step of "
+            f"{timestep:g} s: they oscillate within {least:.1f} steps, and the motion may depend "
+            f"on the step; set timestep to {timestep * least / MIN_PERIOD:.2g}, or armature, the "
+            f"inertia of the rotors at their joints, to {lacking:.2g} kg m² more"
+        )
 
 
 def add_servos(work: Work) -> None:

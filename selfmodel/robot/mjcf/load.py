@@ -134,6 +134,7 @@ def _adapted(name: str, work: Work) -> Message:
     pose.carry_hinges(work)
     meshes.replace_missing_meshes(work)
     meshes.reduce_meshes(work)
+    equipment.set_physics(work)
     check_usable(work.model)
     timestep = _control_timestep(work)
     structure.remove_hidden_state(work)
@@ -148,6 +149,7 @@ def _adapted(name: str, work: Work) -> Message:
     if settings.reach:
         equipment.limit_reach(work)
     equipment.add_command_ranges(work)
+    equipment.note_stiff_servos(work)
     attributes = {"name": name, "mjcf": work.text, "control_timestep": timestep}
     files = untrusted.named_files(work.root, work.assets)
     return Message({**attributes, "notes": work.notes}, files)
@@ -164,12 +166,12 @@ def _control_timestep(work: Work) -> float:
     if control / physics > MAX_SUBSTEPS:
         raise InputError(
             f"expected at most {MAX_SUBSTEPS} physics steps in a control step of {control} s, got "
-            f"{control / physics:.3g}: give the MJCF a larger <option timestep>"
+            f"{control / physics:.3g}: set a larger timestep"
         )
     if physics > MAX_CONTROL_TIMESTEP:
         raise InputError(
             f"expected a physics time step of at most {MAX_CONTROL_TIMESTEP:g} s, got "
-            f"{physics:.6g} s: give the MJCF a smaller <option timestep>"
+            f"{physics:.6g} s: set a smaller timestep"
         )
     if wanted is None:
         return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics

@@ -27,6 +27,9 @@ FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y
 MAX_CONTROL_TIMESTEP = 10.0
 """Upper bound of the control time step, s."""
 
+MIN_TIMESTEP = 1e-6
+"""Smallest physics time step, s."""
+
 NO_KEYFRAME = "none"
 """Value of ``keyframe`` for the reference pose of the MJCF."""
 
@@ -34,6 +37,7 @@ JointValues = Mapping[str, float]
 """Values by name of a joint or pattern such as ``*_knee``; the last that fits counts."""
 
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+Time = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
 Pattern = Annotated[str, Meta(max_length=200)]
 Positive = Mapping[Pattern, Annotated[float, Meta(gt=0, le=MAX_VALUE)]]
 NotNegative = Mapping[Pattern, Annotated[float, Meta(ge=0, le=MAX_VALUE)]]
@@ -59,6 +63,11 @@ class MjcfSettings:
         effort: Largest torques instead of the effort limits of a URDF, N m.
         pose: Joint angles of the initial pose of a URDF, rad; of other joints, the angle in the
             range of the joint that is nearest to 0.
+        armature: Inertias of rotors, seen at their hinges, kg m².
+        damping: Damping of hinges, N m s/rad.
+        friction: Dry friction of hinges, N m.
+        timestep: Physics time step, s; None for that of the file, 0.002 s for a URDF.
+        solref: Time constant of contacts, s, and their damping ratio, for all geoms.
         reach: Largest distances of the commands of position servos from the initial pose, rad; the
             commands of other joints span their ranges.
         base: ``free`` for a base with a free joint, ``fixed`` for a base that is fixed to the
@@ -78,6 +87,11 @@ class MjcfSettings:
     kd: NotNegative = field(default_factory=dict)
     effort: NotNegative = field(default_factory=dict)
     pose: Angles = field(default_factory=dict)
+    armature: NotNegative = field(default_factory=dict)
+    damping: NotNegative = field(default_factory=dict)
+    friction: NotNegative = field(default_factory=dict)
+    timestep: Annotated[float, Meta(ge=MIN_TIMESTEP, le=MAX_CONTROL_TIMESTEP)] | None = None
+    solref: tuple[Time, Time] | None = None
     reach: Positive = field(default_factory=dict)
     base: Literal["free", "fixed"] | None = None
     base_height: Finite | None = None
@@ -160,6 +174,11 @@ _NEEDED: Mapping[str, str] = {
     "kp": f"{_GAIN}kp = 40 or kp = {{knee = 40}}",
     "kd": f"{_LIMIT}kd = 1 or kd = {{knee = 1}}",
     "effort": f"{_LIMIT}effort = 20 or effort = {{knee = 20}}",
+    "armature": f"{_LIMIT}armature = 0.005 or armature = {{knee = 0.005}}",
+    "damping": f"{_LIMIT}damping = 0.1 or damping = {{knee = 0.1}}",
+    "friction": f"{_LIMIT}friction = 0.05 or friction = {{knee = 0.05}}",
+    "timestep": f"a number from {MIN_TIMESTEP:g} to {MAX_CONTROL_TIMESTEP:g} s",
+    "solref": "a time constant, s, and a damping ratio, both above 0, such as [0.01, 1]",
     "pose": "an angle for each joint, a number, such as pose = {knee = -1.5}",
     "reach": f"{_GAIN}reach = 0.5 or reach = {{knee = 0.5}}",
     "base": "one of free, fixed",
@@ -168,7 +187,7 @@ _NEEDED: Mapping[str, str] = {
 }
 """What a setting needs, for error messages."""
 
-_BY_JOINT = ("kp", "kd", "effort", "reach")
+_BY_JOINT = ("kp", "kd", "effort", "armature", "damping", "friction", "reach")
 """Settings for which one number is for all joints."""
 
 _MAX_QUOTED = 200

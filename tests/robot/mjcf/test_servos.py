@@ -1,6 +1,7 @@
 """Tests of the settings with a value for each joint: servos of torque motors, and their reach."""
 
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -43,6 +44,36 @@ def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(
     assert model.actuator_gear[:, 0].tolist() == [1, 1]
     assert model.actuator_forcerange.tolist() == [limits, [-7, 7]]
     assert np.array_equal(model.actuator_ctrlrange, model.jnt_range[model.actuator_trnid[:, 0]])
+
+
+def test_the_physics_of_joints_and_contacts_is_that_of_the_settings(tmp_path: Path):
+    settings = ("armature=0.01", 'damping={left_hip=0.2, "right*"=0.3}', "friction=0.04")
+    model = loaded(tmp_path, mjcf(), *settings, "timestep=0.001", "solref=[0.03, 0.9]")
+    left, right = (model.joint(f"{side}_hip").dofadr[0] for side in ("left", "right"))
+
+    assert model.opt.timestep == 0.001
+    assert (model.geom_solref == (0.03, 0.9)).all()
+    assert (model.dof_armature[left], model.dof_armature[right]) == (0.01, 0.01)
+    assert (model.dof_damping[left], model.dof_damping[right]) == (0.2, 0.3)
+    assert (model.dof_frictionloss[left], model.dof_frictionloss[right]) == (0.04, 0.04)
+    assert not model.dof_damping[:6].any()
+
+
+@pytest.mark.parametrize("remedy", ["timestep", "armature"])
+def test_stiff_servos_have_a_note_whose_remedies_end_it(remedy: str, tmp_path: Path):
+    def notes(*given: str) -> list[str]:
+        path = written(tmp_path, mjcf(motors=TORQUE_MOTORS))
+        extra = {key: value for one in given for key, value in parse_setting(one).items()}
+        return [one for one in load_mjcf(path, read_settings(path, extra)).notes if "stiff" in one]
+
+    stiff = ("kp=9e4", "kd=2")
+    (note,) = notes(*stiff)
+    before, after = note.split(f"{remedy}", maxsplit=1)
+    number = float(re.findall(r"to ([\d.e-]+)", after)[0].rstrip("."))
+
+    assert "left_hip, right_hip" in before.replace(" and ", ", ")
+    assert notes(*GAINS) == []
+    assert notes(*stiff, f"{remedy}={number * (0.95 if remedy == 'timestep' else 1.05)}") == []
 
 
 def test_a_motor_with_dynamics_stays(tmp_path: Path):
