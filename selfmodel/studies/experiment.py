@@ -1,11 +1,12 @@
-"""Recovery of a simulated physical robot with known faults: definition, score, run, correctness."""
+"""Recovery in a folder, and that of a simulated robot with known faults: definition, score, run."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,8 @@ from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.recover import RecoveryLoop, random_stream
+from selfmodel.recovery.recover import NextTrial, RecoveryLoop, random_stream
+from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import (
@@ -53,49 +55,60 @@ TIME = "time"
 """Name of the column of a table with the time of each row, s."""
 
 
-@dataclass(frozen=True, eq=False)
-class Experiment:
-    """Definition of a recovery with known truth.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecoveryDefinition:
+    """Definition of a recovery.
 
     The fields of the same names are those of ``RecoveryLoop``.
 
     Attributes:
         robot: The nominal robot.
-        case: Number of the failure in Table I; None for a failure that is not in it.
-        truth: Faults of the physical robot after the failure.
-        folder: Folder of the run.
-        gap: Level of the reality gap.
+        folder: Folder of the run, new or empty.
         calibrated: Whether the self-model is fitted to the trials before the failure.
-        next_trial: Choice of each trial after the failing one, by name; see
+        next_trial: Choice of each trial after the failing one, a function or its name; see
             ``plugins.next_trial``.
-        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
-            the model; unused with a reality gap.
-        repair: Name of the repair, ``robust`` or ``paper``.
-        search: Name of the search of the repair; None for its own.
+        repair: Name of the repair, such as ``robust``.
+        search: Search of the repair, or its name; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
         repair_settings: Parameters of the repair; None for ``settings``.
     """
 
     robot: Robot
-    case: int | None
-    truth: Hypothesis
     choose_comparator: ComparatorChoice
     settings: Settings
     seed: int
     threads: int
     folder: Path
     gait: Controller | None = None
-    gap: float = 0.0
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
-    next_trial: str = "repair"
+    next_trial: NextTrial | str = "repair"
     design: Design | None = None
     score: Score = UPRIGHT
-    physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
     repair: str = plugins.ROBUST
-    search: str | None = None
+    search: MakeSearch | str | None = None
     repertoire: Repertoire | None = None
     repair_settings: Settings | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Experiment(RecoveryDefinition):
+    """Definition of a recovery with known truth, whose choices have names.
+
+    Attributes:
+        case: Number of the failure in Table I; None for a failure that is not in it.
+        truth: Faults of the physical robot after the failure.
+        gap: Level of the reality gap.
+        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
+            the model; unused with a reality gap.
+    """
+
+    case: int | None
+    truth: Hypothesis
+    gap: float = 0.0
+    next_trial: str = "repair"
+    search: str | None = None
+    physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,47 +123,74 @@ class Outcome:
 
 def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     """Runs an experiment. The algorithm has access to the trials, not to the truth."""
-    start = perf_counter()
-    robot, truth, threads = experiment.robot, experiment.truth, experiment.threads
-    simulator = Simulator(robot, threads)
+    start, stats = perf_counter(), SimulationStats()
+    robot, truth = experiment.robot, experiment.truth
     gap = draw_reality(robot, experiment.seed, experiment.gap)
-    physical: list[PhysicalRobot] = [
+    healthy, damaged = (
         SimulatedRobot(robot, hidden, gap, stream)
         if experiment.physical is None or gap.level
         else experiment.physical(robot, hidden)
         for stream, hidden in enumerate((INTACT, truth))
-    ]
-    healthy, damaged = physical
-    check_measurable(experiment.score, robot, observed_of(healthy, damaged))
-    journal = create_journal(
-        experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
-    hidden: dict[Stage, str] = {"before": str(INTACT), "after": str(truth), "recovery": str(truth)}
-    recovery = RecoveryLoop(
-        simulator=simulator,
-        choose_comparator=experiment.choose_comparator,
-        run_trial=TrialRunner(
-            journal.trials, robot, experiment.settings, hidden=hidden, gap=gap.text
-        ),
-        store_diagnosis=journal.add,
-        settings=experiment.settings,
-        seed=experiment.seed,
-        on_event=on_event,
-        gait=experiment.gait,
-        design=experiment.design,
-        kinds=experiment.kinds,
-        calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
-        if experiment.calibrated
-        else None,
-        next_trial=plugins.next_trial(experiment.next_trial),
-        score=experiment.score,
-        make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),
-        repair_settings=experiment.repair_settings,
-    ).run(healthy, damaged)
+    recovery = run_recovery(
+        *(experiment, healthy, damaged, on_event),
+        stats=stats,
+        hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
+        gap=gap.text,
+    )
     seconds = perf_counter() - start
-    judge = Simulator(robot, threads)  # scoring is no cost of the recovery
+    judge = Simulator(robot, experiment.threads)  # scoring is no cost of the recovery
     correct = is_correct(recovery.diagnosis.best, truth, recovery.trials[1:], judge)
-    return Outcome(recovery, correct, simulator.stats, seconds)
+    return Outcome(recovery, correct, stats, seconds)
+
+
+def run_recovery(
+    definition: RecoveryDefinition,
+    healthy: PhysicalRobot,
+    damaged: PhysicalRobot,
+    on_event: Callable[[Event], None],
+    *,
+    stats: SimulationStats | None = None,
+    hidden: Mapping[Stage, str] = MappingProxyType({}),
+    gap: str | None = None,
+) -> Recovery:
+    """Runs a recovery in its folder; refuses what is wrong before there is a folder.
+
+    Args:
+        definition: What to run.
+        healthy: The physical robot before its failure.
+        damaged: The physical robot after its failure.
+        on_event: Called with the progress of the recovery.
+        stats: Counts the simulations of the self-model; None to count nothing.
+        hidden: As of ``TrialRunner``.
+        gap: As of ``TrialRunner``.
+    """
+    robot, settings, threads = definition.robot, definition.settings, definition.threads
+    check_measurable(definition.score, robot, observed_of(healthy, damaged))
+    make_repair = plugins.repair(definition.repair, definition.search, definition.repertoire)
+    next_trial = plugins.next_trial(definition.next_trial)
+    journal = create_journal(
+        definition.folder, robot.anatomy, definition.kinds, calibrated=definition.calibrated
+    )
+    return RecoveryLoop(
+        simulator=Simulator(robot, threads, stats),
+        choose_comparator=definition.choose_comparator,
+        run_trial=TrialRunner(journal.trials, robot, settings, hidden=hidden, gap=gap),
+        store_diagnosis=journal.add,
+        settings=settings,
+        seed=definition.seed,
+        on_event=on_event,
+        gait=definition.gait,
+        design=definition.design,
+        kinds=definition.kinds,
+        calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
+        if definition.calibrated
+        else None,
+        next_trial=next_trial,
+        score=definition.score,
+        make_repair=make_repair,
+        repair_settings=definition.repair_settings,
+    ).run(healthy, damaged)
 
 
 def draw_reality(robot: Robot, seed: int, level: float) -> RealityGap:
