@@ -8,7 +8,6 @@ import dataclasses
 from datetime import datetime
 from os.path import relpath
 from pathlib import Path
-from typing import Any
 
 from selfmodel import arguments, plugins
 from selfmodel.arrays import finite_or_none
@@ -18,7 +17,7 @@ from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
-from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
+from selfmodel.diagnosis.diagnosis import output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -26,8 +25,8 @@ from selfmodel.faults.sensors import silent_neurons
 from selfmodel.files import file_digest
 from selfmodel.logs import results
 from selfmodel.logs.files import replace_file
-from selfmodel.recovery.falls import fall_text
 from selfmodel.recovery.repertoire import self_model_digest
+from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
@@ -63,7 +62,7 @@ def recover(options: Recover) -> None:
         if options.as_json:
             print_json(results.as_json(result))
         else:
-            _print(result, outcome.recovery.diagnosis, folder)
+            _print(result, outcome.recovery, folder)
     if options.report:
         subject = subject_of_run(folder, experiment.threads, options.comparator, experiment.kinds)
         replace_file(folder / REPORT, html_of(report_of(subject)))
@@ -193,18 +192,16 @@ def recovery_result(experiment: Experiment, outcome: Outcome) -> results.Recover
     )
 
 
-def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) -> None:
+def _print(found: results.RecoveryResult, recovery: Recovery, folder: Path) -> None:
     """Prints the trials, the last diagnosis, and the true hypothesis."""
-    values, score, evaluations = results.as_json(found), found.score, found.evaluations
-    column, key, subject = f"{score.name}, {score.unit}", "score", f"The score {score.name} was"
-    if score.name == DISPLACEMENT.name:
-        column, key, subject = "forward, m", "displacement", "The robot went"
+    diagnosis, score, evaluations = recovery.diagnosis, found.score, found.evaluations
+    is_way = score.name == DISPLACEMENT.name
+    subject = "The robot went" if is_way else f"The score {score.name} was"
     ways = (score.before, score.after, score.recovered)
     before, after, recovered = (value_text(value, score.unit, score.most) for value in ways)
-    rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in values["trials"]]
-    columns = ("trial", "best hypothesis so far", column.removesuffix(", "))
+    columns, *rows = recovery.table
     trials = folding(columns, rows, title="physical trials", texts=2)
-    print_tables(trials, ranking_table(values, found.truth))
+    print_tables(trials, ranking_table(results.as_json(found), found.truth))
     gap = f", at a reality gap of {found.gap:g}" if found.gap else ""
     verdict = right_or_wrong(str(diagnosis.best), found.truth, correct=found.correct)
     print_lines(
@@ -218,9 +215,3 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
         f"hypotheses in {found.seconds:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",
     )
-
-
-def _result(trial: dict[str, Any], key: str) -> str:
-    """Returns the result of a trial, with its early end or its fall."""
-    end = f", ended at step {trial['steps']}" if trial["ended_early"] else ""
-    return f"{trial[key]:.3f}{fall_text(trial['fell_at_step'])}{end}"
