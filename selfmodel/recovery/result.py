@@ -234,7 +234,8 @@ class Recovery:
         return values_by_name(str(self.diagnosis.best), label, names, self.scores, others=predicted)
 
     def _rows(self) -> list[dict[str, Any]]:
-        columns = zip(self.trials, self.tried, self.scored, self.predicted, strict=True)
+        forecasts = self.predicted, self.robust_means
+        columns = zip(self.trials, self.tried, self.scored, *forecasts, strict=True)
         return [
             {
                 "trial": trial.plan.name,
@@ -243,8 +244,11 @@ class Recovery:
                 "displacement": finite_or_none(trial.displacement),
                 "score": finite_or_none(score.value),
                 "predicted_score": finite_or_none(predicted),
+                "robust_mean": finite_or_none(mean),
+                "steps": trial.trajectory.steps,
+                "ended_early": trial.early_end != "",
                 "fell_at_step": score.fall,
                 "log": trial.path,
             }
-            for trial, tried, score, predicted in columns
+            for trial, tried, score, predicted, mean in columns
         ]

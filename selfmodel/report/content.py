@@ -199,7 +199,9 @@ def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
             score = score_label(result.score.name, result.score.unit)
             score = f"score: {score}" if score in row else score  # of a plug-in
             found = results.get(one.name)
-            for title, name in {score: "score", **TRIAL_COLUMNS}.items():
+            has_task = any(one.reward_sum is not None for one in results.values())
+            task = {"return": "reward_sum"} if has_task else {}
+            for title, name in {score: "score", **task, **TRIAL_COLUMNS}.items():
                 row[title] = getattr(found, name, None)
         rows.append(row)
     return charts.Table.of("Trials", rows)

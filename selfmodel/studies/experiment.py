@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -10,15 +10,20 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import convert
 
 from selfmodel import plugins
 from selfmodel.arguments import fitted, read_logs
+from selfmodel.arrays import finite_or_none
 from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.diagnosis.choice import ComparatorChoice
+from selfmodel.diagnosis.diagnosis import output_of
+from selfmodel.diagnosis.text import summary
 from selfmodel.errors import InputError, check_type
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
+from selfmodel.logs import results
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.recordings.recording import TABLE
@@ -27,7 +32,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.recovery.recover import NextTrial, RecoveryLoop, random_stream
 from selfmodel.recovery.repair import MakeSearch
-from selfmodel.recovery.repertoire import Repertoire
+from selfmodel.recovery.repertoire import Repertoire, self_model_digest
 from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import (
     TRACKING,
@@ -39,6 +44,7 @@ from selfmodel.recovery.scores import (
     upright_within,
 )
 from selfmodel.recovery.tracking import Reference, following, tracking
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import RealityGap
@@ -99,8 +105,8 @@ class Experiment(RecoveryDefinition):
         case: Number of the failure in Table I; None for a failure that is not in it.
         truth: Faults of the physical robot after the failure.
         gap: Level of the reality gap.
-        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
-            the model; unused with a reality gap.
+        entry: The robot's task, and its physical robot beyond a simulation of the model, which is
+            unused with a reality gap; None for a robot without.
     """
 
     case: int | None
@@ -108,15 +114,19 @@ class Experiment(RecoveryDefinition):
     gap: float = 0.0
     next_trial: str = "repair"
     search: str | None = None
-    physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
+    entry: Entry | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of an experiment: simulations of the self-model, and wall time, s, of the recovery."""
+    """Result of an experiment: simulations of the self-model, and wall time, s, of the recovery.
+
+    ``returns`` has the return of each trial, NaN for a robot without a task.
+    """
 
     recovery: Recovery
     correct: bool
+    returns: tuple[float, ...]
     stats: SimulationStats
     seconds: float
 
@@ -126,10 +136,11 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     start, stats = perf_counter(), SimulationStats()
     robot, truth = experiment.robot, experiment.truth
     gap = draw_reality(robot, experiment.seed, experiment.gap)
+    entry = experiment.entry or Entry(lambda: robot)
     healthy, damaged = (
         SimulatedRobot(robot, hidden, gap, stream)
-        if experiment.physical is None or gap.level
-        else experiment.physical(robot, hidden)
+        if entry.physical is None or gap.level
+        else entry.physical(robot, hidden)
         for stream, hidden in enumerate((INTACT, truth))
     )
     recovery = run_recovery(
@@ -141,7 +152,59 @@ def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     seconds = perf_counter() - start
     judge = Simulator(robot, experiment.threads)  # scoring is no cost of the recovery
     correct = is_correct(recovery.diagnosis.best, truth, recovery.trials[1:], judge)
-    return Outcome(recovery, correct, stats, seconds)
+    task = entry.episode_return
+    returns = recovery.scores_by(task, robot) if task else (math.nan,) * len(recovery.trials)
+    return Outcome(recovery, correct, returns, stats, seconds)
+
+
+def result_of(experiment: Experiment, outcome: Outcome) -> results.RecoveryResult:
+    """Returns the outcome of an experiment as ``recover --json`` prints it."""
+    recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
+    design = experiment.design or network_for(experiment.robot)
+    values = recovery.to_dict()
+    return results.RecoveryResult(
+        robot=experiment.robot.name,
+        model=self_model_digest(experiment.robot),
+        case=experiment.case,
+        truth=str(experiment.truth),
+        comparator=recovery.comparator.comparator.name,
+        comparator_reason=recovery.comparator.reason,
+        kinds=tuple(kind.name for kind in experiment.kinds),
+        gap=experiment.gap,
+        next_trial=experiment.next_trial,
+        repair=experiment.repair,
+        search=plugins.search_name(experiment.repair, experiment.search, gaits),
+        repertoire=asdict(gaits.origin) if gaits else None,
+        controller=design.name,
+        neurons=design.hidden,
+        seed=experiment.seed,
+        trials=tuple(
+            convert({**row, "return": finite_or_none(reward)}, results.TrialResult)
+            for row, reward in zip(values["trials"], outcome.returns, strict=True)
+        ),
+        **output_of(recovery.diagnosis),
+        summary=" ".join(summary(recovery.diagnosis)),
+        calibration=recovery.calibration.to_dict() if recovery.calibration else None,
+        correct=outcome.correct,
+        displacement=values["displacement"],
+        score=results.ScoreResult(
+            name=recovery.score.name,
+            unit=recovery.score.unit,
+            before=finite_or_none(recovery.scores[0]),
+            after=finite_or_none(recovery.scores[1]),
+            recovered=finite_or_none(recovery.best_score),
+            most=recovery.score.most(experiment.settings.steps),
+        ),
+        fell=recovery.fell,
+        recovery=recovery.recovery,
+        physical_trials=len(recovery.trials) - 2,
+        evaluations={
+            **values["evaluations"],
+            "simulated_steps": stats.steps,
+            "diverged": stats.diverged,
+        },
+        seconds=outcome.seconds,
+    )
 
 
 def run_recovery(
