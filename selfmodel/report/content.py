@@ -267,20 +267,24 @@ def searches_section(searches: Sequence[Search]) -> Section | None:
     shown = tuple(
         charts.LineChart(
             title=title,
-            x_label="generation",
+            x_label="evaluations",
             y_label=y_label,
             series=tuple(
                 charts.Series(
                     name=f"{number}. {one.hypothesis or 'diagnosis'}",
-                    x=tuple(map(float, range(1, len(one.best) + 1))),
+                    x=tuple(map(float, one.evaluations)),
                     y=one.best,
                 )
                 for number, one in enumerate((one for one in searches if one.kind == kind), start=1)
             ),
         )
         for kind, title, y_label in (
-            ("repair", "Repair: best score by generation", "best score"),
-            ("diagnostic", "Diagnosis: best fitness by generation", "best fitness, minus distance"),
+            ("repair", "Repair: best score by evaluations", "best score"),
+            (
+                "diagnostic",
+                "Diagnosis: best fitness by evaluations",
+                "best fitness, minus distance",
+            ),
         )
         if any(one.kind == kind and one.best for one in searches)
     )
