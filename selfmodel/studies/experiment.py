@@ -370,11 +370,6 @@ def _limited(name: str, limits: Sequence[float | None]) -> Score:
 
 def check_score(name: str, entry: Entry) -> None:
     """Checks that a robot has a score of that name, which can be measured on it."""
-    if name == VELOCITY:
-        raise InputError(
-            f"--score {VELOCITY} is of the velocity that a policy is commanded: give --controller "
-            f"policy.toml with the term velocity, or another score"
-        )
     if name != TRACKING:
         robot = entry.robot()
         check_measurable(plugins.score(name, robot.name, entry), robot)
