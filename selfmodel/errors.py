@@ -38,7 +38,7 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
         known: Every valid name.
     """
     names = [str(item) for item in known]
-    nearest = [one for one in _nearest(str(name), names) if one != name]
+    nearest = _nearest(str(name), names)
     hint = f"did you mean {listed(nearest)}? " if nearest else ""
     return InputError(f"unknown {what} {name!r}: {hint}the known ones are {listed(names)}")
 
