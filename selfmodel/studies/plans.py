@@ -13,6 +13,7 @@ from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, robot_entry
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.losses import check_limit, still_trial
 from selfmodel.errors import (
     InputError,
     items_of,
@@ -159,6 +160,9 @@ def ablation(
     }
     for entry in entries.values():
         check_score(chosen["score"], entry)
+        still = still_trial(entry.robot(), settings.steps)
+        for name in comparators:
+            check_limit(limit, comparator_choice(name), still, entry.robot())
     runs = [
         _point(models[robot], case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
