@@ -30,7 +30,7 @@ from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.studies.experiment import RecoveryDefinition, choose_score, run_recovery
+from selfmodel.studies.experiment import Experiment, choose_score, run_recovery
 from selfmodel.trials.trial import Trial, by_stage
 
 
@@ -322,7 +322,7 @@ def recover(
     repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
     score = score or plugins.DEFAULT_SCORES[repair]
     score, gait = choose_score(score, entry, drawn, steps=chosen.steps, seed=seed, gait=gait)
-    definition = RecoveryDefinition(
+    experiment = Experiment(
         robot=robot,
         choose_comparator=arguments.comparator_choice(comparator),
         settings=chosen,
@@ -340,7 +340,7 @@ def recover(
         repertoire=arguments.repertoire_of(repertoire, robot, drawn),
         repair_settings=repair_settings,
     )
-    return run_recovery(definition, healthy, damaged, on_event)
+    return run_recovery(experiment, healthy, damaged, on_event)
 
 
 @dataclass(frozen=True, eq=False)

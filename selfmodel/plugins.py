@@ -322,10 +322,10 @@ def repaired_around(
     return name, inner.design, inner
 
 
-def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
+def search_name(repair: str, search: MakeSearch | str | None, repertoire: Repertoire | None) -> str:
     """Returns the name of a repair's search: as given, of the repertoire, CMA-ES or the EA."""
     if search is not None:
-        return search
+        return name_of("search", search)
     if repertoire is not None:
         return REPERTOIRE
     return "ea" if repair == PAPER else "cma-es"

@@ -62,19 +62,23 @@ TIME = "time"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RecoveryDefinition:
-    """Definition of a recovery.
+class Experiment:
+    """Definition of a recovery, of a simulated robot with known faults or of other robots.
 
     The fields of the same names are those of ``RecoveryLoop``.
 
     Attributes:
         robot: The nominal robot.
-        folder: Folder of the run, new or empty.
+        folder: Folder of the run.
+        case: Number of the failure in Table I; None for a failure that is not in it.
+        truth: Faults of the simulated physical robot after the failure.
+        gap: Level of its reality gap.
+        entry: Its task, and its physical robot beyond a simulation of the model, which is unused
+            with a reality gap; None for a robot without.
         calibrated: Whether the self-model is fitted to the trials before the failure.
-        next_trial: Choice of each trial after the failing one, a function or its name; see
-            ``plugins.next_trial``.
+        next_trial: Choice of each trial after the failing one; see ``plugins.next_trial``.
         repair: Name of the repair, such as ``robust``.
-        search: Search of the repair, or its name; None for its own.
+        search: Search of the repair; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
         repair_settings: Parameters of the repair; None for ``settings``.
     """
@@ -85,6 +89,10 @@ class RecoveryDefinition:
     seed: int
     threads: int
     folder: Path
+    case: int | None = None
+    truth: Hypothesis = INTACT
+    gap: float = 0.0
+    entry: Entry | None = None
     gait: Controller | None = None
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
@@ -95,26 +103,6 @@ class RecoveryDefinition:
     search: MakeSearch | str | None = None
     repertoire: Repertoire | None = None
     repair_settings: Settings | None = None
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Experiment(RecoveryDefinition):
-    """Definition of a recovery with known truth, whose choices have names.
-
-    Attributes:
-        case: Number of the failure in Table I; None for a failure that is not in it.
-        truth: Faults of the physical robot after the failure.
-        gap: Level of the reality gap.
-        entry: The robot's task, and its physical robot beyond a simulation of the model, which is
-            unused with a reality gap; None for a robot without.
-    """
-
-    case: int | None
-    truth: Hypothesis
-    gap: float = 0.0
-    next_trial: str = "repair"
-    search: str | None = None
-    entry: Entry | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +159,7 @@ def result_of(experiment: Experiment, outcome: Outcome) -> results.RecoveryResul
         comparator_reason=recovery.comparator.reason,
         kinds=tuple(kind.name for kind in experiment.kinds),
         gap=experiment.gap,
-        next_trial=experiment.next_trial,
+        next_trial=plugins.name_of("next_trial", experiment.next_trial),
         repair=experiment.repair,
         search=plugins.search_name(experiment.repair, experiment.search, gaits),
         repertoire=asdict(gaits.origin) if gaits else None,
@@ -208,7 +196,7 @@ def result_of(experiment: Experiment, outcome: Outcome) -> results.RecoveryResul
 
 
 def run_recovery(
-    definition: RecoveryDefinition,
+    experiment: Experiment,
     healthy: PhysicalRobot,
     damaged: PhysicalRobot,
     on_event: Callable[[Event], None],
@@ -217,42 +205,33 @@ def run_recovery(
     hidden: Mapping[Stage, str] = MappingProxyType({}),
     gap: str | None = None,
 ) -> Recovery:
-    """Runs a recovery in its folder; refuses what is wrong before there is a folder.
+    """Runs a recovery of a robot before and after its failure; ``stats`` counts its simulations.
 
-    Args:
-        definition: What to run.
-        healthy: The physical robot before its failure.
-        damaged: The physical robot after its failure.
-        on_event: Called with the progress of the recovery.
-        stats: Counts the simulations of the self-model; None to count nothing.
-        hidden: As of ``TrialRunner``.
-        gap: As of ``TrialRunner``.
+    What is wrong is refused before there is a folder. ``hidden`` and ``gap`` are for the logs; see
+    ``TrialRunner``.
     """
-    robot, settings, threads = definition.robot, definition.settings, definition.threads
-    check_measurable(definition.score, robot, observed_of(healthy, damaged))
-    make_repair = plugins.repair(definition.repair, definition.search, definition.repertoire)
-    next_trial = plugins.next_trial(definition.next_trial)
-    journal = create_journal(
-        definition.folder, robot.anatomy, definition.kinds, calibrated=definition.calibrated
-    )
+    robot, settings, threads = experiment.robot, experiment.settings, experiment.threads
+    check_measurable(experiment.score, robot, observed_of(healthy, damaged))
+    make_repair = plugins.repair(experiment.repair, experiment.search, experiment.repertoire)
+    next_trial, kinds = plugins.next_trial(experiment.next_trial), experiment.kinds
+    calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads, known={})
+    journal = create_journal(experiment.folder, robot.anatomy, kinds, calibrated=calibrated)
     return RecoveryLoop(
         simulator=Simulator(robot, threads, stats),
-        choose_comparator=definition.choose_comparator,
+        choose_comparator=experiment.choose_comparator,
         run_trial=TrialRunner(journal.trials, robot, settings, hidden=hidden, gap=gap),
         store_diagnosis=journal.add,
         settings=settings,
-        seed=definition.seed,
+        seed=experiment.seed,
         on_event=on_event,
-        gait=definition.gait,
-        design=definition.design,
-        kinds=definition.kinds,
-        calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
-        if definition.calibrated
-        else None,
+        gait=experiment.gait,
+        design=experiment.design,
+        kinds=kinds,
+        calibrate=partial(fit, observer=on_event) if calibrated else None,
         next_trial=next_trial,
-        score=definition.score,
+        score=experiment.score,
         make_repair=make_repair,
-        repair_settings=definition.repair_settings,
+        repair_settings=experiment.repair_settings,
     ).run(healthy, damaged)
 
 

@@ -71,6 +71,9 @@ ON_ROBOT = "evolution-on-robot"
 REPAIR = "repair_settings"
 """Parameter with the settings of the repair, where they are others."""
 
+TRIAL_COLUMNS = ("stage", "hypothesis", "score", "robust_mean", "displacement", "fell_at_step")
+"""Columns of a trial of a recovery that are those of its result."""
+
 DIAGNOSIS_SETTINGS = ("trials", "genes", "kept", *ADDED)
 """Names of the settings that do not affect a gait."""
 
@@ -345,15 +348,10 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         {
             "robot": robot.name,
             "number": number,
-            "stage": one.stage,
-            "hypothesis": one.hypothesis,
-            "score": one.score,
+            **{name: getattr(one, name) for name in TRIAL_COLUMNS},
             "predicted": one.predicted_score,
-            "robust_mean": one.robust_mean,
-            "displacement": one.displacement,
             "return": one.reward_sum,
             "upright": finite_or_none(walked),
-            "fell_at_step": one.fell_at_step,
         }
         for number, (one, walked) in enumerate(
             zip(result.trials or (), recovery.scores_by(UPRIGHT, robot), strict=True)
