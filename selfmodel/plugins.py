@@ -139,11 +139,9 @@ REGISTRIES: Mapping[str, Registry] = MappingProxyType(
             "kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")
         ),
         "search": Registry(
-            *(
-                "search",
-                "selfmodel.searches",
-                {**SEARCHES, REPERTOIRE: "needs gaits: give a repertoire"},
-            ),
+            what="search",
+            group="selfmodel.searches",
+            known={**SEARCHES, REPERTOIRE: "needs gaits: give a repertoire"},
             takes=("length", "settings", "rng", "seeds"),
         ),
     }

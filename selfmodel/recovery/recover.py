@@ -211,9 +211,9 @@ class RecoveryLoop:
         healthy_trials, nominal = self.trials, self.simulator
         # Refused before the failure.
         check_measurable(self.score, nominal.robot, observed_in(healthy_trials[0]))
-        self.choose_comparator(nominal.robot, healthy_trials)
-        limit = self.settings.max_simulated_steps
-        check_limit(limit, self.choose_comparator, healthy_trials[0], nominal.robot)
+        choose, limit = self.choose_comparator, self.settings.max_simulated_steps
+        choose(nominal.robot, healthy_trials)
+        check_limit(limit, choose, healthy_trials[0], nominal.robot)
         calibration = self.calibrate(healthy_trials) if self.calibrate else None
         if calibration is not None:
             self.on_event(calibration)
