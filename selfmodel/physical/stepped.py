@@ -146,10 +146,10 @@ class Stepped:
 
 def _same_body(model: mujoco.MjModel, own: mujoco.MjModel) -> bool:
     """Returns whether two models have the same body; their ground and targets may differ."""
-    names = "body_mass body_inertia geom_type geom_contype jnt_type actuator_dyntype".split()
+    names = ("body_mass", "body_inertia", "geom_type", "geom_contype", "jnt_type")
     limbs = [one.geom_size[one.geom_bodyid > 0] for one in (model, own)]
     same = [np.array_equal(getattr(model, name), getattr(own, name)) for name in names]
-    return all(same) and np.array_equal(*limbs)
+    return model.na == own.na and all(same) and np.array_equal(*limbs)
 
 
 def _layout(model: mujoco.MjModel) -> tuple[list[str], int]:
