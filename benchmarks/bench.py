@@ -44,7 +44,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Run, Simulator
 from selfmodel.studies.experiment import Experiment, run
-from selfmodel.tasks import ROBOTS, entry, suite_bodies
+from selfmodel.tasks import ROBOTS, Entry, entry, suite_bodies
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
 
@@ -283,7 +283,7 @@ def one_recovery() -> dict[str, float]:
             calibrated=False,
             score=DISPLACEMENT,
             repair=plugins.PAPER,
-            physical=TimedRobot,
+            entry=Entry(lambda: robot, physical=TimedRobot),
         )
         outcome = run(experiment, lambda _event: None)
     seconds, stats = outcome.seconds, outcome.stats

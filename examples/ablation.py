@@ -19,7 +19,7 @@ def main(folder: Path) -> None:
         cases=[1, 9],
         comparators=["forward-displacement"],  # or your own, as package.module:object
         gaps=[0.0],
-        seeds=range(2),
+        seeds=2,
         settings=Settings(steps=60, generations=2, trials=1).scaled(8),
     )
     failed = study.run(workers=2, on_event=print)

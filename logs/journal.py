@@ -21,6 +21,9 @@ from selfmodel.trials.trial import Trial
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
+RECOVERY = "recovery"
+"""Folder of the run in that of a study's cell."""
+
 OPTIONS = "options.json"
 """File of the options that no log has, written before the first trial."""
 

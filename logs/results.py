@@ -14,15 +14,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
+from os.path import relpath
 from pathlib import Path, PurePath
 from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec.structs import replace
 
 from selfmodel.diagnosis.diagnosis import renamed
 from selfmodel.errors import InputError
-from selfmodel.files import read_file
+from selfmodel.files import file_digest, read_file
 from selfmodel.logs.files import replace_file
 from selfmodel.settings import Settings
 
@@ -69,6 +71,7 @@ class TrialResult(Struct, frozen=True):
             under the best hypothesis at the time.
         robust_mean: Mean score of its controller in the last simulations of its repair.
         fell_at_step: Step at which the robot fell.
+        reward_sum: Return of the trial, of a robot with a task.
         hypothesis: Best hypothesis at the time, in notation.
     """
 
@@ -81,6 +84,7 @@ class TrialResult(Struct, frozen=True):
     predicted_score: float | None = None
     robust_mean: float | None = None
     fell_at_step: int | None = None
+    reward_sum: float | None = msgspec.field(default=None, name="return")
     hypothesis: str = ""
 
     @property
@@ -224,13 +228,23 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
     settings: dict[str, Any] | UnsetType = UNSET
     repair_settings: dict[str, Any] | UnsetType = UNSET
 
-    def as_file(
-        self, settings: Settings, files: dict[str, str], of_repair: Settings | None = None
-    ) -> dict[str, Any]:
-        """Returns the content of ``result.json``, with settings and digests of the logs."""
-        own = UNSET if of_repair is None else of_repair.as_json()
-        facts = {"settings": settings.as_json(), "repair_settings": own, "files": files}
-        return as_json(msgspec.structs.replace(self, **facts))
+    def write(self, folder: Path, settings: Settings, of_repair: Settings | None = None) -> None:
+        """Writes ``result.json``, with settings and digests; its paths are relative to its folder.
+
+        Args:
+            folder: Folder of the run.
+            settings: Parameters of the recovery.
+            of_repair: Those of the repair; None for the same.
+        """
+        trials = [replace(one, log=relpath(one.log, folder)) for one in self.trials or ()]
+        content = replace(
+            self,
+            trials=tuple(trials),
+            settings=settings.as_json(),
+            repair_settings=UNSET if of_repair is None else of_repair.as_json(),
+            files={one.log: file_digest(folder / one.log) for one in trials},
+        )
+        replace_file(folder / RESULT, result_bytes(as_json(content)))
 
 
 class SuspicionResult(Struct, frozen=True):

@@ -17,22 +17,20 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.files import path_of
-from selfmodel.logs import physical_trial
-from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
 from selfmodel.recovery import recover as recovery_loop
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.result import Event, Recovery
-from selfmodel.recovery.scores import Score, check_measurable, observed_of
+from selfmodel.recovery.scores import Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.studies.experiment import choose_score
+from selfmodel.studies.experiment import Experiment, choose_score, run_recovery
 from selfmodel.trials.trial import Trial, by_stage
 
 
@@ -324,29 +322,25 @@ def recover(
     repair, drawn, gait = plugins.repaired_around(repair, gait.design if gait else drawn, gait)
     score = score or plugins.DEFAULT_SCORES[repair]
     score, gait = choose_score(score, entry, drawn, steps=chosen.steps, seed=seed, gait=gait)
-    check_measurable(score, robot, observed_of(healthy, damaged))
-    make_repair = plugins.repair(repair, search, arguments.repertoire_of(repertoire, robot, drawn))
-    choose, choice = arguments.comparator_choice(comparator), plugins.next_trial(next_trial)
-    journal = create_journal(folder, robot.anatomy, searched, calibrated=calibrate)
-    return recovery_loop.RecoveryLoop(
-        simulator=Simulator(robot, count),
-        choose_comparator=choose,
-        run_trial=physical_trial.TrialRunner(journal.trials, robot, chosen),
-        store_diagnosis=journal.add,
+    experiment = Experiment(
+        robot=robot,
+        choose_comparator=arguments.comparator_choice(comparator),
         settings=chosen,
         seed=seed,
-        on_event=on_event,
+        threads=count,
+        folder=folder,
         gait=gait,
-        design=drawn,
         kinds=searched,
-        calibrate=partial(arguments.fitted, robot, threads=count, observer=on_event, known={})
-        if calibrate
-        else None,
-        next_trial=choice,
+        calibrated=calibrate,
+        next_trial=next_trial,
+        design=drawn,
         score=score,
-        make_repair=make_repair,
+        repair=repair,
+        search=search,
+        repertoire=arguments.repertoire_of(repertoire, robot, drawn),
         repair_settings=repair_settings,
-    ).run(healthy, damaged)
+    )
+    return run_recovery(experiment, healthy, damaged, on_event)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,10 @@ Draw = Callable[[np.random.Generator, tuple[int, ...]], FloatArray]
 
 @dataclass(frozen=True)
 class Generation:
-    """Progress of a search, whose text is a line with the time left.
+    """Progress of a search, whose text is a line with the evaluations and the time left.
 
     Attributes:
-        number: Generations evaluated so far.
+        number: Generations evaluated so far; those of searches differ in size.
         total: Generations of the whole search.
         best: Highest fitness so far; of the last generation if the fitness is noisy.
         evaluations: Genomes evaluated so far.
@@ -35,23 +35,18 @@ class Generation:
     seconds: float
 
     def __str__(self) -> str:
-        if self.number < self.total:
-            line = f"generation {self.number} of {self.total}: {self.detail}"
-            left = time_left(self.number / self.total, self.seconds)
-            return ", ".join(filter(None, (line, left)))
-        every = f"{counted(self.number, 'generation')}, {counted(self.evaluations, 'evaluation')}"
-        diverged = self.best == -np.inf
-        best = "every simulation diverged" if diverged else f"best {self.best:.4f}"
-        return f"{every}, {self._rate}, {best}"
+        share = self.number / self.total
+        left = time_left(share, self.seconds) if share < 1 else ""
+        return ", ".join(filter(None, (counted(self.evaluations, "evaluation"), self.detail, left)))
 
     @property
     def detail(self) -> str:
         """The best fitness and the rate as text."""
-        return f"best {self.best:.3f}, {self._rate}"
-
-    @property
-    def _rate(self) -> str:
-        return f"{self.evaluations / self.seconds:.0f}/s" if self.seconds else "-/s"
+        diverged = self.best == -np.inf
+        best = "every simulation diverged" if diverged else f"best {self.best:.4f}"
+        return (
+            f"{best}, {self.evaluations / self.seconds:.0f}/s" if self.seconds else f"{best}, -/s"
+        )
 
 
 GenerationCallback = Callable[[Generation], None]

@@ -98,7 +98,7 @@ class Registry:
     Attributes:
         what: What one of them is called.
         group: Group of the entry points of installed plug-ins.
-        known: Selfmodel's own by name; None for a name that stands for no single object.
+        known: Selfmodel's own by name; for a name of no single object, a text of what it needs.
         takes: Arguments of the objects, if they are functions.
     """
 
@@ -114,12 +114,23 @@ REGISTRIES: Mapping[str, Registry] = MappingProxyType(
         "kinds": Registry(
             "kind",
             "selfmodel.fault_kinds",
-            {**{kind.name: kind for kind in ALL_KINDS}, **dict.fromkeys(KIND_SETS)},
+            {
+                **{kind.name: kind for kind in ALL_KINDS},
+                **dict.fromkeys(KIND_SETS, "is a set of kinds: give one of them"),
+            },
         ),
         "score": Registry(
             "score",
             "selfmodel.scores",
-            {**SCORES, **dict.fromkeys((RETURN, TRACKING, VELOCITY))},
+            {
+                **SCORES,
+                RETURN: "is of a robot's task: give the robot",
+                TRACKING: "follows a trajectory, which is not given here: give "
+                "selfmodel.recovery.tracking(reference, robot), or another score",
+                VELOCITY: "follows the velocity that a policy is commanded: give --controller "
+                "policy.toml with the term velocity, in Python "
+                "selfmodel.recovery.following(velocity), or another score",
+            },
         ),
         "next_trial": Registry(
             "choice of the next trial", "selfmodel.next_trials", NEXT_TRIAL, ("loop",)
@@ -128,7 +139,9 @@ REGISTRIES: Mapping[str, Registry] = MappingProxyType(
             "kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")
         ),
         "search": Registry(
-            *("search", "selfmodel.searches", {**SEARCHES, REPERTOIRE: None}),
+            what="search",
+            group="selfmodel.searches",
+            known={**SEARCHES, REPERTOIRE: "needs gaits: give a repertoire"},
             takes=("length", "settings", "rng", "seeds"),
         ),
     }
@@ -307,10 +320,10 @@ def repaired_around(
     return name, inner.design, inner
 
 
-def search_name(repair: str, search: str | None, repertoire: Repertoire | None) -> str:
+def search_name(repair: str, search: MakeSearch | str | None, repertoire: Repertoire | None) -> str:
     """Returns the name of a repair's search: as given, of the repertoire, CMA-ES or the EA."""
     if search is not None:
-        return search
+        return name_of("search", search)
     if repertoire is not None:
         return REPERTOIRE
     return "ea" if repair == PAPER else "cma-es"
@@ -385,7 +398,10 @@ def _found(parameter: str, name: str) -> object:
             imported, or two packages have an entry point of that name.
     """
     registry = REGISTRIES[parameter]
-    if (own := registry.known.get(name)) is not None:
+    own = registry.known.get(name)
+    if isinstance(own, str):
+        raise InputError(f"the {registry.what} {name} {own}")
+    if own is not None:
         return own
     known = dict.fromkeys([*registry.known, *sorted(entry_points(group=registry.group).names)])
     module, colon, attribute = _path_of(registry, name).partition(":")

@@ -106,7 +106,8 @@ def record(
         path: Name of the log, ``NAME.mcap``; the trial is called NAME.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         observe: Function of an observation to signals, as for ``EnvironmentRobot``; None for those
-            in it by name, and the others of MuJoCo's state if ``env`` has it.
+            in it by name, and the others of MuJoCo's state if ``env`` has it, those of the sensors
+            if it has the body of ``robot``, as one of ``dm_control.suite`` has.
         steps: Control steps of the trial.
         stage: Stage of the trial within a recovery.
         seed: Seed of the trial, for the record.
@@ -117,7 +118,7 @@ def record(
     """
     robot = arguments.load_robot(robot)
     source, function = _policy_of(policy, robot)
-    physical = Stepped(env, robot).driven(observe, function)
+    physical = Stepped(env, robot).driven(observe, function, source)
     return run_trial(physical, source, path, robot=robot, steps=steps, stage=stage, seed=seed)
 
 
@@ -178,7 +179,7 @@ def evaluate(
     chosen = score if isinstance(score, Score) else plugins.score(str(score), robot.name, entry)
     most = MAX_SETTINGS["steps"] if steps is None else whole_number("steps", steps, 1000, 2)
     stepped, (source, function) = Stepped(env, robot), _policy_of(policy, robot)
-    physical, found = stepped.driven(observe, function), []
+    physical, found = stepped.driven(observe, function, source), []
     for _ in range(whole_number("episodes", episodes, 10, 1)):
         samples: list[Sample] = []
         try:

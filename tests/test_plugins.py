@@ -141,3 +141,17 @@ WRONG = replace(DISPLACEMENT, record=("base_pos",))
         found.of(quadruped, INTACT, run.trajectory)
     with pytest.raises(InputError, match="score 'score_module:WRONG' has record="):
         plugins.score("score_module:WRONG", "quadruped", entry)
+
+
+@pytest.mark.parametrize(
+    ("name", "needs"),
+    [("tracking", r"recovery\.tracking\(reference, robot\)"), ("velocity", "--controller policy")],
+)
+def test_a_score_that_needs_more_than_its_name_is_refused_with_what_it_needs(
+    name: str, needs: str, quadruped: Robot
+):
+    entry = Entry(robot=lambda: quadruped)
+    with pytest.raises(InputError, match=f"^the score {name} follows .*{needs}"):
+        plugins.score(name, "quadruped", entry)
+    with pytest.raises(InputError, match="the search repertoire needs gaits"):
+        plugins.search("repertoire")

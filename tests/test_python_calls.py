@@ -225,7 +225,7 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda _: planned(kinds="jam"),
     ),
     "one gap, seed, case and robot": (
-        lambda _: planned(gaps=0, seeds=0, cases=1, robots="quadruped"),
+        lambda _: planned(gaps=0, seeds=1, cases=1, robots="quadruped"),
         lambda _: planned(),
     ),
     "scores of a study": (
@@ -259,7 +259,7 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda _: planned(robots=["hexapod", "quadruped"]),
     ),
     "numbers in arrays without axes": (
-        lambda _: (planned(gaps=np.array(0.0), seeds=np.array(0)), Settings(steps=np.array(20))),
+        lambda _: (planned(gaps=np.array(0.0), seeds=np.array(1)), Settings(steps=np.array(20))),
         lambda _: (planned(), Settings(steps=20)),
     ),
     "a share as on the command line": (
@@ -320,6 +320,7 @@ REFUSED: dict[str, tuple[Call, str]] = {
     ),
     "a gap": (lambda _: planned(gaps=["0.1"]), "real number as gaps, got '0.1': .* gaps=0.05"),
     "a seed": (lambda _: planned(seeds=[-1]), "of 0 or above as seeds, got -1"),
+    "no seed": (lambda _: planned(seeds=0), "of 1 or above as seeds, got 0: give .* seeds=4"),
     "a robot in a study": (lambda p: planned(robots=[p.robot]), "names of robots .* got .* Robot"),
     "a score without a name": (
         lambda _: planned(score=dataclasses.replace(ENERGY, name="stranger")),

@@ -40,7 +40,7 @@ def test_the_log_of_a_policy_replays_to_the_bit(tmp_path: Path, place: int, func
     assert not selfmodel.replay(path, "intact", "quadruped").identical
 
 
-def test_the_state_of_a_task_of_the_suite_is_logged_but_for_the_readings(tmp_path: Path):
+def test_the_state_of_a_task_of_the_suite_is_logged_with_the_readings_of_the_robot(tmp_path: Path):
     env, robot = suite.load("walker", "walk", {"random": 0}), selfmodel.load_robot(WALKER)
     path, poses = tmp_path / "new.mcap", []
 
@@ -50,9 +50,28 @@ def test_the_state_of_a_task_of_the_suite_is_logged_but_for_the_readings(tmp_pat
 
     trajectory = selfmodel.record(env, policy, path, robot=robot, steps=50).trajectory
 
-    assert np.isnan(trajectory["sensors"]).all()
+    touches, angles = trajectory["sensors"][:, :2], trajectory["sensors"][:, 2:]
+    assert set(touches.ravel()) == {0.0, 1.0}
+    centres, halves = np.array(
+        [(one.centre, one.half_range) for one in robot.anatomy.sensors[2:]]
+    ).T
+    np.testing.assert_allclose(angles, (poses - centres) / halves, atol=1e-12)
     np.testing.assert_array_equal(trajectory["joint_positions"], poses)
     assert np.isfinite(trajectory["base_position"]).all()
+
+
+def test_a_network_drives_a_task_of_the_suite_with_the_body_of_its_robot(tmp_path: Path):
+    env = suite.load("walker", "walk", {"random": 0})
+    design = network_for(selfmodel.load_robot(WALKER))
+    network = selfmodel.Controller(design, np.linspace(-1, 1, design.weights))
+    path = tmp_path / "new.mcap"
+    seen = selfmodel.record(env, network, path, robot=WALKER, steps=50).trajectory
+
+    assert selfmodel.evaluate(env, network, robot=WALKER, steps=50)[0].steps == 50
+    assert len(np.unique(seen["commands"], axis=0)) > 40, "the commands follow the readings"
+    env.physics.model.body_mass[2] *= 2
+    with pytest.raises(InputError, match=r'such as lambda seen: \{"sensors": seen\[:8\]\}, with'):
+        selfmodel.evaluate(env, network, robot=WALKER, steps=50)
 
 
 def test_episodes_have_the_return_of_the_environment_and_end_with_it():

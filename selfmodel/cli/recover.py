@@ -4,38 +4,30 @@ What a recovery does, in order, is ``selfmodel.recovery.recover.RecoveryLoop.run
 robots that it drives here are drawn by ``selfmodel.studies.experiment.run``.
 """
 
-import dataclasses
 from datetime import datetime
-from os.path import relpath
 from pathlib import Path
-from typing import Any
 
 from selfmodel import arguments, plugins
-from selfmodel.arrays import finite_or_none
 from selfmodel.cli import inputs
 from selfmodel.cli.commands import Recover, repair_settings_of, settings_of
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import folding, print_tables, ranking_table
 from selfmodel.controllers.controller import check_silent_neurons
-from selfmodel.diagnosis.diagnosis import Diagnosis, output_of
 from selfmodel.diagnosis.text import right_or_wrong, summary, verdict_sentences
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
-from selfmodel.files import file_digest
 from selfmodel.logs import results
 from selfmodel.logs.files import replace_file
-from selfmodel.recovery.falls import fall_text
-from selfmodel.recovery.repertoire import self_model_digest
+from selfmodel.recovery.result import Recovery
 from selfmodel.recovery.scores import DISPLACEMENT, value_text
 from selfmodel.report.charts import REPORT, html_of
 from selfmodel.report.content import report_of
 from selfmodel.report.progress import RunProgress
 from selfmodel.report.subject import subject_of_run
-from selfmodel.robot.designs import network_for
 from selfmodel.simulation.simulator import thread_count
-from selfmodel.studies.experiment import Experiment, Outcome, choose_score, run
+from selfmodel.studies.experiment import Experiment, choose_score, result_of, run
 
 
 def recover(options: Recover) -> None:
@@ -51,19 +43,15 @@ def recover(options: Recover) -> None:
         )
         with progress.kept_on_failure():
             outcome = run(experiment, progress)
-    result = recovery_result(experiment, outcome)
-    folder = experiment.folder
+    result, folder = result_of(experiment, outcome), experiment.folder
     try:
         results.write_searches(folder, progress.searches)
-        logs = [Path(trial.path) for trial in outcome.recovery.trials]
-        digests = {relpath(one, folder): file_digest(one) for one in logs}
-        content = result.as_file(experiment.settings, digests, experiment.repair_settings)
-        replace_file(folder / results.RESULT, results.result_bytes(content))
+        result.write(folder, experiment.settings, experiment.repair_settings)
     finally:  # the result is printed even if the disk is full
         if options.as_json:
             print_json(results.as_json(result))
         else:
-            _print(result, outcome.recovery.diagnosis, folder)
+            _print(result, outcome.recovery, folder)
     if options.report:
         subject = subject_of_run(folder, experiment.threads, options.comparator, experiment.kinds)
         replace_file(folder / REPORT, html_of(report_of(subject)))
@@ -122,7 +110,7 @@ def experiment_of(options: Recover) -> Experiment:
         design=design,
         gait=score.gait,
         score=score.score,
-        physical=entry.physical,
+        entry=entry,
         repair=repair,
         search=options.search,
         repertoire=gaits,
@@ -130,81 +118,16 @@ def experiment_of(options: Recover) -> Experiment:
     )
 
 
-def recovery_result(experiment: Experiment, outcome: Outcome) -> results.RecoveryResult:
-    """Returns the outcome of a recovery as ``recover --json`` prints it."""
-    recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
-    design = experiment.design or network_for(experiment.robot)
-    columns = (recovery.scored, recovery.tried, recovery.predicted, recovery.robust_means)
-    return results.RecoveryResult(
-        robot=experiment.robot.name,
-        model=self_model_digest(experiment.robot),
-        case=experiment.case,
-        truth=str(experiment.truth),
-        comparator=recovery.comparator.comparator.name,
-        comparator_reason=recovery.comparator.reason,
-        kinds=tuple(kind.name for kind in experiment.kinds),
-        gap=experiment.gap,
-        next_trial=experiment.next_trial,
-        repair=experiment.repair,
-        search=plugins.search_name(experiment.repair, experiment.search, gaits),
-        repertoire=dataclasses.asdict(gaits.origin) if gaits else None,
-        controller=design.name,
-        neurons=design.hidden,
-        seed=experiment.seed,
-        trials=tuple(
-            results.TrialResult(
-                log=one.trial.path,
-                stage=one.trial.plan.stage,
-                displacement=one.trial.displacement,
-                steps=one.trial.trajectory.steps,
-                ended_early=one.trial.early_end != "",
-                score=one.value,
-                predicted_score=finite_or_none(predicted),
-                robust_mean=finite_or_none(mean),
-                fell_at_step=one.fall,
-                hypothesis=str(tried),
-            )
-            for one, tried, predicted, mean in zip(*columns, strict=True)
-        ),
-        **output_of(recovery.diagnosis),
-        summary=" ".join(summary(recovery.diagnosis)),
-        calibration=recovery.calibration.to_dict() if recovery.calibration else None,
-        correct=outcome.correct,
-        displacement={name: getattr(recovery, name) for name in ("before", "after", "recovered")},
-        score=results.ScoreResult(
-            name=recovery.score.name,
-            unit=recovery.score.unit,
-            before=recovery.scores[0],
-            after=recovery.scores[1],
-            recovered=recovery.best_score,
-            most=recovery.score.most(experiment.settings.steps),
-        ),
-        fell=recovery.fell,
-        recovery=recovery.recovery,
-        physical_trials=len(recovery.trials) - 2,
-        evaluations={
-            "repair": recovery.repair_evaluations,
-            "diagnostic": recovery.diagnostic_evaluations,
-            "distinct_hypotheses": recovery.distinct_hypotheses,
-            "simulated_steps": stats.steps,
-            "diverged": stats.diverged,
-        },
-        seconds=outcome.seconds,
-    )
-
-
-def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) -> None:
+def _print(found: results.RecoveryResult, recovery: Recovery, folder: Path) -> None:
     """Prints the trials, the last diagnosis, and the true hypothesis."""
-    values, score, evaluations = results.as_json(found), found.score, found.evaluations
-    column, key, subject = f"{score.name}, {score.unit}", "score", f"The score {score.name} was"
-    if score.name == DISPLACEMENT.name:
-        column, key, subject = "forward, m", "displacement", "The robot went"
+    diagnosis, score, evaluations = recovery.diagnosis, found.score, found.evaluations
+    is_way = score.name == DISPLACEMENT.name
+    subject = "The robot went" if is_way else f"The score {score.name} was"
     ways = (score.before, score.after, score.recovered)
     before, after, recovered = (value_text(value, score.unit, score.most) for value in ways)
-    rows = [(one["stage"], one["hypothesis"], _result(one, key)) for one in values["trials"]]
-    columns = ("trial", "best hypothesis so far", column.removesuffix(", "))
+    columns, *rows = recovery.table
     trials = folding(columns, rows, title="physical trials", texts=2)
-    print_tables(trials, ranking_table(values, found.truth))
+    print_tables(trials, ranking_table(results.as_json(found), found.truth))
     gap = f", at a reality gap of {found.gap:g}" if found.gap else ""
     verdict = right_or_wrong(str(diagnosis.best), found.truth, correct=found.correct)
     print_lines(
@@ -218,9 +141,3 @@ def _print(found: results.RecoveryResult, diagnosis: Diagnosis, folder: Path) ->
         f"hypotheses in {found.seconds:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",
     )
-
-
-def _result(trial: dict[str, Any], key: str) -> str:
-    """Returns the result of a trial, with its early end or its fall."""
-    end = f", ended at step {trial['steps']}" if trial["ended_early"] else ""
-    return f"{trial[key]:.3f}{fall_text(trial['fell_at_step'])}{end}"

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.diagnosis.choice import contract_error, prepared_trial
+from selfmodel.controllers.playback import Playback
+from selfmodel.diagnosis.choice import ComparatorChoice, contract_error, prepared_trial
 from selfmodel.diagnosis.comparator import (
     Comparator,
     Losses,
@@ -23,12 +24,14 @@ from selfmodel.diagnosis.comparator import (
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import Trial, TrialPart, whole
+from selfmodel.trials.trial import Trial, TrialPart, TrialPlan, whole
 
 Parts = Sequence[Trial | TrialPart]
 
@@ -310,6 +313,39 @@ def steps_of(request: Request, trial: Trial) -> int:
             return len(request.starts) * request.horizon
         case Ensemble():
             return request.members * trial.trajectory.steps
+
+
+def check_limit(limit: int | None, choose: ComparatorChoice, trial: Trial, robot: Robot) -> None:
+    """Raises ``InputError`` if a limit does not allow for one hypothesis of one trial.
+
+    Args:
+        limit: Control steps that a diagnosis may simulate for each trial; None for any number.
+        choose: Chooses the comparator; one that refuses the trial is not judged.
+        trial: A trial as long as those to diagnose.
+        robot: The self-model.
+    """
+    try:
+        comparator = choose(robot, [trial]).comparator
+        prepared = prepared_trial(comparator, robot, trial)
+    except InputError:
+        return
+    sections = getattr(prepared, "sections", ()) or [prepared]
+    needed = sum(steps_of(section.request, trial) for section in sections)
+    if limit is not None and limit < needed:
+        raise InputError(
+            f"expected max_simulated_steps of {needed} or above, as {comparator.name} simulates "
+            f"for one hypothesis in each trial, got {limit}: give more, or another comparator"
+        )
+
+
+def still_trial(robot: Robot, steps: int) -> Trial:
+    """Returns a simulated trial of a healthy robot whose motors hold their initial pose."""
+    names, hold = robot.anatomy.names, holding_commands(robot.model)[np.newaxis]
+    driver = Playback(names.motors, hold)
+    run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, SIGNALS).trajectory
+    signals = {name: values[0] for name, values in run.signals.items()}
+    trajectory = Trajectory(names, run.time, signals)
+    return Trial(TrialPlan("still", "single", driver, steps, 0), robot.name, trajectory, "still")
 
 
 def simulate(

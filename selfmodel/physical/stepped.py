@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.errors import InputError
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.environment import EnvironmentRobot, Observe
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import SignalSource, current_value, signal_fields
+from selfmodel.robot.state import SensorReader, SignalSource, current_value, signal_fields
 from selfmodel.trials.signals import SIGNALS, Signal
 
 Policy = Callable[[Any], ArrayLike]
@@ -23,7 +26,8 @@ class Stepped:
     """An environment as ``EnvironmentRobot`` steps it.
 
     Its signals are those in an observation by name, and of MuJoCo's state of ``env.physics``, or of
-    ``env.unwrapped.model`` and ``data``, the others but the readings of the sensors.
+    ``env.unwrapped.model`` and ``data``, the others. The readings of the sensors are those of the
+    robot's model in that state, if the environment has the same body.
 
     Attributes:
         rewards: Rewards of the episode so far.
@@ -48,6 +52,9 @@ class Stepped:
         self.rewards: list[float] = []
         self.is_over = False
         self._fields: Mapping[Signal, SignalSource] = {}
+        self._variant, self._reads = build(robot, INTACT), False
+        self._sensors = SensorReader(self._variant.model, robot.anatomy, [self._variant])
+        self._data = mujoco.MjData(self._variant.model)
         if (state := self._state) is not None:
             try:
                 self._fields = signal_fields(robot, state[0])
@@ -59,8 +66,11 @@ class Stepped:
                     ) from error
                 self._fields = signal_fields(robot)  # its motors have no names
 
-    def driven(self, observe: Observe | None, policy: Policy | None) -> EnvironmentRobot:
-        """Returns the robot that is stepped through the environment, by a policy if given."""
+    def driven(
+        self, observe: Observe | None, policy: Policy | None, source: CommandSource
+    ) -> EnvironmentRobot:
+        """Returns the robot that is stepped through the environment by a policy, or a source."""
+        self._reads = isinstance(source, Controller) and source.design.reads
         return EnvironmentRobot(
             self,
             self._robot,
@@ -99,12 +109,31 @@ class Stepped:
         if (state := self._state) is not None:
             for name, field in self._fields.items():
                 found.setdefault(name, current_value(field, state[1]))
+            if "sensors" not in found and _same_body(state[0], self._variant.model):
+                found["sensors"] = self._readings(state[1])
+        if self._reads and "sensors" not in found:
+            names = self._robot.anatomy.names.sensors
+            raise InputError(
+                f"the controller reads the sensors of {self._robot.name}, and the environment has "
+                f"another body, or no state of MuJoCo: give observe=, such as "
+                f'lambda seen: {{"sensors": seen[:{len(names)}]}}, with touch 0 or 1 and angles '
+                f"from -1 to 1, in the order {', '.join(names)}"
+            )
         if not found:
             raise InputError(
                 f"expected an environment with the state of MuJoCo, or observations with some of "
                 f"{', '.join(SIGNALS)}: give observe=, a function of an observation to signals"
             )
         return found
+
+    def _readings(self, state: mujoco.MjData) -> FloatArray:
+        """Returns the readings of the sensors of the robot's model in a state, ``(sensors,)``."""
+        data, readings = self._data, np.empty((1, len(self._robot.anatomy.sensors)))
+        data.qpos[:], data.qvel[:], data.act[:] = state.qpos, state.qvel, state.act
+        data.ctrl[:] = state.ctrl
+        mujoco.mj_forward(self._variant.model, data)
+        self._sensors.read(data.sensordata[np.newaxis], data.qpos[np.newaxis], readings)
+        return np.array(readings[0])
 
     @property
     def _state(self) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
@@ -113,6 +142,14 @@ class Stepped:
             return physics.model.ptr, physics.data.ptr
         model = getattr(self._inner, "model", None)
         return (model, self._inner.data) if isinstance(model, mujoco.MjModel) else None
+
+
+def _same_body(model: mujoco.MjModel, own: mujoco.MjModel) -> bool:
+    """Returns whether two models have the same body; their ground and targets may differ."""
+    names = ("body_mass", "body_inertia", "geom_type", "geom_contype", "jnt_type")
+    limbs = [one.geom_size[one.geom_bodyid > 0] for one in (model, own)]
+    same = [np.array_equal(getattr(model, name), getattr(own, name)) for name in names]
+    return model.na == own.na and all(same) and np.array_equal(*limbs)
 
 
 def _layout(model: mujoco.MjModel) -> tuple[list[str], int]:

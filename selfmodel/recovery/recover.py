@@ -15,6 +15,7 @@ from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
+from selfmodel.diagnosis.losses import check_limit, still_trial
 from selfmodel.diagnosis.problem import Calibrate
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -111,6 +112,9 @@ class RecoveryLoop:
         """
         robot = self.simulator.robot
         HypothesisSpace.of(self.kinds, robot.anatomy)  # refused before any trial
+        if (limit := self.settings.max_simulated_steps) is not None:
+            still = still_trial(robot, self.settings.steps)
+            check_limit(limit, self.choose_comparator, still, robot)
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(robot)
         self._repairs = [self._repair_in_simulator()]
@@ -207,7 +211,9 @@ class RecoveryLoop:
         healthy_trials, nominal = self.trials, self.simulator
         # Refused before the failure.
         check_measurable(self.score, nominal.robot, observed_in(healthy_trials[0]))
-        self.choose_comparator(nominal.robot, healthy_trials)
+        choose, limit = self.choose_comparator, self.settings.max_simulated_steps
+        choose(nominal.robot, healthy_trials)
+        check_limit(limit, choose, healthy_trials[0], nominal.robot)
         calibration = self.calibrate(healthy_trials) if self.calibrate else None
         if calibration is not None:
             self.on_event(calibration)

@@ -11,7 +11,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.progress import Progress
 from selfmodel.recovery.falls import fall_text
-from selfmodel.recovery.scores import DISPLACEMENT, Score, value_text
+from selfmodel.recovery.scores import DISPLACEMENT, Score, score_label, value_text
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.trials.trial import Trial
@@ -66,6 +66,11 @@ class TrialScore:
         most = self.score.most(self.trial.trajectory.steps)
         result = f"{self.score.name} {value_text(self.value, self.score.unit, most)}"
         return f"trial {self.trial.plan.name} by {self.hypothesis}: {result}{fall_text(self.fall)}"
+
+    @property
+    def result(self) -> str:
+        """The value, with the fall or the early end of the trial, as text."""
+        return f"{self.value:.3f}{fall_text(self.fall)}{self.trial.early_end}"
 
 
 Event = (
@@ -177,12 +182,23 @@ class Recovery:
         return self.recovered / self.before if self.before > 0 and not self.fell else None
 
     def __repr__(self) -> str:
-        lines = [f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"]
-        lines += [
-            f"  {trial.plan.name:14} {trial.displacement:8.3f} m  {tried}{trial.early_end}"
-            for trial, tried in zip(self.trials, self.tried, strict=True)
+        rows = self.table
+        widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+        lines = [
+            f"  {name:{widths[0]}}  {tried:{widths[1]}}  {result}" for name, tried, result in rows
         ]
-        return "\n".join(lines) + ">"
+        title = f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"
+        return "\n".join([title, *lines]) + ">"
+
+    @property
+    def table(self) -> list[tuple[str, str, str]]:
+        """The physical trials as rows of text with a heading, as the command line shows them."""
+        label = score_label(self.score.name, self.score.unit)
+        rows = zip(self.scored, self.tried, strict=True)
+        return [
+            ("trial", "best hypothesis so far", label),
+            *((one.trial.plan.name, str(tried), one.result) for one, tried in rows),
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the result as JSON values: trials, displacements in m, diagnosis, evaluations.
@@ -214,11 +230,12 @@ class Recovery:
 
         names = [trial.plan.name for trial in self.trials]
         predicted = ("predicted by the self-model", self.predicted)
-        title, label = str(self.diagnosis.best), f"{self.score.name} {self.score.unit}".strip()
-        return values_by_name(title, label, names, self.scores, others=predicted)
+        label = score_label(self.score.name, self.score.unit)
+        return values_by_name(str(self.diagnosis.best), label, names, self.scores, others=predicted)
 
     def _rows(self) -> list[dict[str, Any]]:
-        columns = zip(self.trials, self.tried, self.scored, self.predicted, strict=True)
+        forecasts = self.predicted, self.robust_means
+        columns = zip(self.trials, self.tried, self.scored, *forecasts, strict=True)
         return [
             {
                 "trial": trial.plan.name,
@@ -227,8 +244,11 @@ class Recovery:
                 "displacement": finite_or_none(trial.displacement),
                 "score": finite_or_none(score.value),
                 "predicted_score": finite_or_none(predicted),
+                "robust_mean": finite_or_none(mean),
+                "steps": trial.trajectory.steps,
+                "ended_early": trial.early_end != "",
                 "fell_at_step": score.fall,
                 "log": trial.path,
             }
-            for trial, tried, score, predicted in columns
+            for trial, tried, score, predicted, mean in columns
         ]

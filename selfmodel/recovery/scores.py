@@ -106,6 +106,17 @@ def value_text(value: float | None, unit: str, most: float | None = None) -> str
     return f"{known:.3f}{'' if most is None else f' of {most:,}'} {unit}".rstrip()
 
 
+def score_label(name: str, unit: str, most: float | None = None) -> str:
+    """Returns a score as the label of an axis or a column, a return with the most possible.
+
+    Examples:
+        >>> score_label("return", "", 199), score_label("upright", "m")
+        ('return (of 199)', 'upright, m')
+    """
+    bound = "" if most is None else f" (of {most:,})"
+    return f"{name}{bound}, {unit}".removesuffix(", ")
+
+
 def scores_of(
     score: Score, robot: Robot, hypotheses: Sequence[Hypothesis], outcome: SimulationResult
 ) -> FloatArray:

@@ -19,7 +19,7 @@ from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
 from selfmodel.recovery.falls import fall_text
-from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, value_text
+from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, score_label, value_text
 from selfmodel.report import charts
 from selfmodel.report.charts import Item, Report, Section
 from selfmodel.report.evidence import residual_section, separation_section
@@ -166,11 +166,10 @@ def _score_chart(result: RecoveryResult) -> list[Item]:
         )
         for one in trials
     ]
-    most = "" if score.most is None else f" (of {score.most:,})"
     return [
         charts.BarChart(
             title="Score of each trial, observed and predicted before the trial",
-            x_label=f"{score.name}{most}, {score.unit}".removesuffix(", "),
+            x_label=score_label(score.name, score.unit, score.most),
             names=("observed", "predicted before the trial"),
             groups=tuple(groups),
         )
@@ -197,10 +196,12 @@ def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:
             "predicted under": str(first.hypothesis),
         }
         if result is not None:
-            score = f"{result.score.name}, {result.score.unit}".removesuffix(", ")
+            score = score_label(result.score.name, result.score.unit)
             score = f"score: {score}" if score in row else score  # of a plug-in
             found = results.get(one.name)
-            for title, name in {score: "score", **TRIAL_COLUMNS}.items():
+            has_task = any(one.reward_sum is not None for one in results.values())
+            task = {"return": "reward_sum"} if has_task else {}
+            for title, name in {score: "score", **task, **TRIAL_COLUMNS}.items():
                 row[title] = getattr(found, name, None)
         rows.append(row)
     return charts.Table.of("Trials", rows)
@@ -266,20 +267,24 @@ def searches_section(searches: Sequence[Search]) -> Section | None:
     shown = tuple(
         charts.LineChart(
             title=title,
-            x_label="generation",
+            x_label="evaluations",
             y_label=y_label,
             series=tuple(
                 charts.Series(
                     name=f"{number}. {one.hypothesis or 'diagnosis'}",
-                    x=tuple(map(float, range(1, len(one.best) + 1))),
+                    x=tuple(map(float, one.evaluations)),
                     y=one.best,
                 )
                 for number, one in enumerate((one for one in searches if one.kind == kind), start=1)
             ),
         )
         for kind, title, y_label in (
-            ("repair", "Repair: best score by generation", "best score"),
-            ("diagnostic", "Diagnosis: best fitness by generation", "best fitness, minus distance"),
+            ("repair", "Repair: best score by evaluations", "best score"),
+            (
+                "diagnostic",
+                "Diagnosis: best fitness by evaluations",
+                "best fitness, minus distance",
+            ),
         )
         if any(one.kind == kind and one.best for one in searches)
     )

@@ -9,7 +9,7 @@ import pandas as pd
 from selfmodel.errors import counted
 from selfmodel.report.charts import BarChart, Cell, Estimate, Group, IntervalChart, Section, Table
 from selfmodel.studies.comparisons import p_text
-from selfmodel.studies.rows import LoadedStudy, methods_of, whole
+from selfmodel.studies.rows import LoadedStudy, label_of, methods_of, whole
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, grouped
 
@@ -177,11 +177,11 @@ def recovered(rows: Sequence[Row]) -> tuple[str, list[Section]]:
     charts = tuple(
         BarChart(
             title="Before the failure, after it, and recovered",
-            x_label=", ".join(filter(None, names)) or "score",
+            x_label=label_of(same),
             names=ENDS,
             groups=tuple(_body(*key, own) for key, own in _failures(same).items()),
         )
-        for names, same in scores.items()
+        for same in scores.values()
     )
     text = "Medians over the seeds of a body and a failure. A hatched bar has a trial that fell."
     reasons = dict.fromkeys(

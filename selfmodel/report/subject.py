@@ -26,6 +26,7 @@ from selfmodel.faults.registry import ALL_KINDS
 from selfmodel.files import encodable, file_digest
 from selfmodel.logs.journal import (
     DIAGNOSES,
+    RECOVERY,
     TRIALS,
     is_calibrated,
     read_diagnoses,
@@ -145,8 +146,14 @@ def title_of(robot: Robot, name: str) -> str:
 
 
 def is_run(folder: Path) -> bool:
-    """Returns whether a folder is that of a run with at least one diagnosis."""
-    return (folder / TRIALS).is_dir() and (folder / DIAGNOSES).is_file()
+    """Returns whether a folder is that of a run with at least one diagnosis; of a study or not."""
+    place = _place_of(folder)
+    return (place / TRIALS).is_dir() and (place / DIAGNOSES).is_file()
+
+
+def _place_of(run: Path) -> Path:
+    """Returns the folder with the trials of a run: of one in a study, the folder inside it."""
+    return run / RECOVERY if (run / RECOVERY).is_dir() else run
 
 
 def subject_of_run(
@@ -159,12 +166,13 @@ def subject_of_run(
     run was begun without calibration.
 
     Args:
-        folder: Folder of the run.
+        folder: Folder of the run, or of a run of a study, ``STUDY/runs/NAME``.
         threads: Threads of the physics; 0 for all processors.
         comparator: Name of the comparator of the run, which may be ``package.module:object``;
             ``auto`` for that of its result.
         kinds: Fault kinds of the run that are no entry points.
     """
+    name, folder = folder.resolve().name, _place_of(folder)
     paths = sorted((folder / TRIALS).glob("*.mcap"), key=trial_order)
     if not paths:
         raise InputError(f"{folder}: expected the folder of a run with logs in {TRIALS}, got none")
@@ -188,7 +196,7 @@ def subject_of_run(
     else:
         calibration = fitted(robot, healthy, count) if healthy and is_calibrated(folder) else None
     return Subject(
-        name=folder.resolve().name,
+        name=name,
         robot=robot,
         healthy=tuple(healthy),
         damaged=tuple(explained),

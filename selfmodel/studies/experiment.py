@@ -1,31 +1,38 @@
-"""Recovery of a simulated physical robot with known faults: definition, score, run, correctness."""
+"""Recovery in a folder, and that of a simulated robot with known faults: definition, score, run."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import convert
 
 from selfmodel import plugins
 from selfmodel.arguments import fitted, read_logs
+from selfmodel.arrays import finite_or_none
 from selfmodel.controllers.controller import CommandSource, Controller, Design, draw_genomes
 from selfmodel.diagnosis.choice import ComparatorChoice
+from selfmodel.diagnosis.diagnosis import output_of
+from selfmodel.diagnosis.text import summary
 from selfmodel.errors import InputError, check_type
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
+from selfmodel.logs import results
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.recover import RecoveryLoop, random_stream
-from selfmodel.recovery.repertoire import Repertoire
+from selfmodel.recovery.recover import NextTrial, RecoveryLoop, random_stream
+from selfmodel.recovery.repair import MakeSearch
+from selfmodel.recovery.repertoire import Repertoire, self_model_digest
 from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import (
     TRACKING,
@@ -37,6 +44,7 @@ from selfmodel.recovery.scores import (
     upright_within,
 )
 from selfmodel.recovery.tracking import Reference, following, tracking
+from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.reality_gap import RealityGap
@@ -53,104 +61,178 @@ TIME = "time"
 """Name of the column of a table with the time of each row, s."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Experiment:
-    """Definition of a recovery with known truth.
+    """Definition of a recovery, of a simulated robot with known faults or of other robots.
 
     The fields of the same names are those of ``RecoveryLoop``.
 
     Attributes:
         robot: The nominal robot.
-        case: Number of the failure in Table I; None for a failure that is not in it.
-        truth: Faults of the physical robot after the failure.
         folder: Folder of the run.
-        gap: Level of the reality gap.
+        case: Number of the failure in Table I; None for a failure that is not in it.
+        truth: Faults of the simulated physical robot after the failure.
+        gap: Level of its reality gap.
+        entry: Its task, and its physical robot beyond a simulation of the model, which is unused
+            with a reality gap; None for a robot without.
         calibrated: Whether the self-model is fitted to the trials before the failure.
-        next_trial: Choice of each trial after the failing one, by name; see
-            ``plugins.next_trial``.
-        physical: Returns the physical robot with a hypothesis, for robots beyond a simulation of
-            the model; unused with a reality gap.
-        repair: Name of the repair, ``robust`` or ``paper``.
-        search: Name of the search of the repair; None for its own.
+        next_trial: Choice of each trial after the failing one; see ``plugins.next_trial``.
+        repair: Name of the repair, such as ``robust``.
+        search: Search of the repair; None for its own.
         repertoire: Gaits from which the search ``repertoire`` begins.
         repair_settings: Parameters of the repair; None for ``settings``.
     """
 
     robot: Robot
-    case: int | None
-    truth: Hypothesis
     choose_comparator: ComparatorChoice
     settings: Settings
     seed: int
     threads: int
     folder: Path
-    gait: Controller | None = None
+    case: int | None = None
+    truth: Hypothesis = INTACT
     gap: float = 0.0
+    entry: Entry | None = None
+    gait: Controller | None = None
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
     calibrated: bool = True
-    next_trial: str = "repair"
+    next_trial: NextTrial | str = "repair"
     design: Design | None = None
     score: Score = UPRIGHT
-    physical: Callable[[Robot, Hypothesis], PhysicalRobot] | None = None
     repair: str = plugins.ROBUST
-    search: str | None = None
+    search: MakeSearch | str | None = None
     repertoire: Repertoire | None = None
     repair_settings: Settings | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of an experiment: simulations of the self-model, and wall time, s, of the recovery."""
+    """Result of an experiment: simulations of the self-model, and wall time, s, of the recovery.
+
+    ``returns`` has the return of each trial, NaN for a robot without a task.
+    """
 
     recovery: Recovery
     correct: bool
+    returns: tuple[float, ...]
     stats: SimulationStats
     seconds: float
 
 
 def run(experiment: Experiment, on_event: Callable[[Event], None]) -> Outcome:
     """Runs an experiment. The algorithm has access to the trials, not to the truth."""
-    start = perf_counter()
-    robot, truth, threads = experiment.robot, experiment.truth, experiment.threads
-    simulator = Simulator(robot, threads)
+    start, stats = perf_counter(), SimulationStats()
+    robot, truth = experiment.robot, experiment.truth
     gap = draw_reality(robot, experiment.seed, experiment.gap)
-    physical: list[PhysicalRobot] = [
+    entry = experiment.entry or Entry(lambda: robot)
+    healthy, damaged = (
         SimulatedRobot(robot, hidden, gap, stream)
-        if experiment.physical is None or gap.level
-        else experiment.physical(robot, hidden)
+        if entry.physical is None or gap.level
+        else entry.physical(robot, hidden)
         for stream, hidden in enumerate((INTACT, truth))
-    ]
-    healthy, damaged = physical
-    check_measurable(experiment.score, robot, observed_of(healthy, damaged))
-    journal = create_journal(
-        experiment.folder, robot.anatomy, experiment.kinds, calibrated=experiment.calibrated
     )
-    hidden: dict[Stage, str] = {"before": str(INTACT), "after": str(truth), "recovery": str(truth)}
-    recovery = RecoveryLoop(
-        simulator=simulator,
-        choose_comparator=experiment.choose_comparator,
-        run_trial=TrialRunner(
-            journal.trials, robot, experiment.settings, hidden=hidden, gap=gap.text
+    recovery = run_recovery(
+        *(experiment, healthy, damaged, on_event),
+        stats=stats,
+        hidden={"before": str(INTACT), "after": str(truth), "recovery": str(truth)},
+        gap=gap.text,
+    )
+    seconds = perf_counter() - start
+    judge = Simulator(robot, experiment.threads)  # scoring is no cost of the recovery
+    correct = is_correct(recovery.diagnosis.best, truth, recovery.trials[1:], judge)
+    task = entry.episode_return
+    returns = recovery.scores_by(task, robot) if task else (math.nan,) * len(recovery.trials)
+    return Outcome(recovery, correct, returns, stats, seconds)
+
+
+def result_of(experiment: Experiment, outcome: Outcome) -> results.RecoveryResult:
+    """Returns the outcome of an experiment as ``recover --json`` prints it."""
+    recovery, stats, gaits = outcome.recovery, outcome.stats, experiment.repertoire
+    design = experiment.design or network_for(experiment.robot)
+    values = recovery.to_dict()
+    return results.RecoveryResult(
+        robot=experiment.robot.name,
+        model=self_model_digest(experiment.robot),
+        case=experiment.case,
+        truth=str(experiment.truth),
+        comparator=recovery.comparator.comparator.name,
+        comparator_reason=recovery.comparator.reason,
+        kinds=tuple(kind.name for kind in experiment.kinds),
+        gap=experiment.gap,
+        next_trial=plugins.name_of("next_trial", experiment.next_trial),
+        repair=experiment.repair,
+        search=plugins.search_name(experiment.repair, experiment.search, gaits),
+        repertoire=asdict(gaits.origin) if gaits else None,
+        controller=design.name,
+        neurons=design.hidden,
+        seed=experiment.seed,
+        trials=tuple(
+            convert({**row, "return": finite_or_none(reward)}, results.TrialResult)
+            for row, reward in zip(values["trials"], outcome.returns, strict=True)
         ),
+        **output_of(recovery.diagnosis),
+        summary=" ".join(summary(recovery.diagnosis)),
+        calibration=recovery.calibration.to_dict() if recovery.calibration else None,
+        correct=outcome.correct,
+        displacement=values["displacement"],
+        score=results.ScoreResult(
+            name=recovery.score.name,
+            unit=recovery.score.unit,
+            before=finite_or_none(recovery.scores[0]),
+            after=finite_or_none(recovery.scores[1]),
+            recovered=finite_or_none(recovery.best_score),
+            most=recovery.score.most(experiment.settings.steps),
+        ),
+        fell=recovery.fell,
+        recovery=recovery.recovery,
+        physical_trials=len(recovery.trials) - 2,
+        evaluations={
+            **values["evaluations"],
+            "simulated_steps": stats.steps,
+            "diverged": stats.diverged,
+        },
+        seconds=outcome.seconds,
+    )
+
+
+def run_recovery(
+    experiment: Experiment,
+    healthy: PhysicalRobot,
+    damaged: PhysicalRobot,
+    on_event: Callable[[Event], None],
+    *,
+    stats: SimulationStats | None = None,
+    hidden: Mapping[Stage, str] = MappingProxyType({}),
+    gap: str | None = None,
+) -> Recovery:
+    """Runs a recovery of a robot before and after its failure; ``stats`` counts its simulations.
+
+    What is wrong is refused before there is a folder. ``hidden`` and ``gap`` are for the logs; see
+    ``TrialRunner``.
+    """
+    robot, settings, threads = experiment.robot, experiment.settings, experiment.threads
+    check_measurable(experiment.score, robot, observed_of(healthy, damaged))
+    make_repair = plugins.repair(experiment.repair, experiment.search, experiment.repertoire)
+    next_trial, kinds = plugins.next_trial(experiment.next_trial), experiment.kinds
+    calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads, known={})
+    journal = create_journal(experiment.folder, robot.anatomy, kinds, calibrated=calibrated)
+    return RecoveryLoop(
+        simulator=Simulator(robot, threads, stats),
+        choose_comparator=experiment.choose_comparator,
+        run_trial=TrialRunner(journal.trials, robot, settings, hidden=hidden, gap=gap),
         store_diagnosis=journal.add,
-        settings=experiment.settings,
+        settings=settings,
         seed=experiment.seed,
         on_event=on_event,
         gait=experiment.gait,
         design=experiment.design,
-        kinds=experiment.kinds,
-        calibrate=partial(fitted, robot, threads=threads, observer=on_event, known={})
-        if experiment.calibrated
-        else None,
-        next_trial=plugins.next_trial(experiment.next_trial),
+        kinds=kinds,
+        calibrate=partial(fit, observer=on_event) if calibrated else None,
+        next_trial=next_trial,
         score=experiment.score,
-        make_repair=plugins.repair(experiment.repair, experiment.search, experiment.repertoire),
+        make_repair=make_repair,
         repair_settings=experiment.repair_settings,
     ).run(healthy, damaged)
-    seconds = perf_counter() - start
-    judge = Simulator(robot, threads)  # scoring is no cost of the recovery
-    correct = is_correct(recovery.diagnosis.best, truth, recovery.trials[1:], judge)
-    return Outcome(recovery, correct, simulator.stats, seconds)
 
 
 def draw_reality(robot: Robot, seed: int, level: float) -> RealityGap:
@@ -267,11 +349,6 @@ def _limited(name: str, limits: Sequence[float | None]) -> Score:
 
 def check_score(name: str, entry: Entry) -> None:
     """Checks that a robot has a score of that name, which can be measured on it."""
-    if name == VELOCITY:
-        raise InputError(
-            f"--score {VELOCITY} is of the velocity that a policy is commanded: give --controller "
-            f"policy.toml with the term velocity, or another score"
-        )
     if name != TRACKING:
         robot = entry.robot()
         check_measurable(plugins.score(name, robot.name, entry), robot)

@@ -14,10 +14,9 @@ from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import counted
-from selfmodel.plugins import RETURN
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import robot_key
-from selfmodel.studies.rows import failure_of, methods_of, whole
+from selfmodel.studies.rows import failure_of, label_of, methods_of, whole
 from selfmodel.studies.study import Row, grouped
 from selfmodel.style import (
     COLOURS,
@@ -167,11 +166,7 @@ def by_body(rows: Sequence[Row]) -> Figure:
     axes.axvline(0, color="0.3", linewidth=0.8)
     axes.set_yticks(range(len(places)), labels, fontsize=text_size(0.8))
     axes.set(ylim=(len(places) - 0.5, -0.5))
-    score, unit = rows[0].get("score") or "score", rows[0].get("unit") or ""
-    limits = {row.get("return_most") if score == RETURN else None for row in rows}
-    most = limits.pop() if len(limits) == 1 else None
-    limit = f" (of {most:,})" if most else ""
-    axes.set_xlabel(f"{score}{limit}, {unit}".rstrip(", "))
+    axes.set_xlabel(label_of(rows))
     axes.grid(axis="x")
     legend_below(figure, columns=4)
     return figure

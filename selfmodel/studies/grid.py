@@ -171,10 +171,11 @@ def _unfinished(
     Raises:
         InputError: A cell in the folder is damaged, or was made by other code than this.
     """
-    here, earlier = versions_of(every.values()), Counter[str]()
+    here, earlier, restored = versions_of(every.values()), Counter[str](), 0
     for place in every:
         if (folder / EARLIER / place / CELL).exists() and not (folder / place / CELL).exists():
             cell_files.move(folder, place, aside=False)
+            restored += 1
     known: dict[str, cell_files.FinishedCell] = {}
     for path in sorted(folder.glob(f"*/*/{CELL}")):
         if path.parts[-3] == UNFINISHED:  # what a killed worker left
@@ -200,14 +201,12 @@ def _unfinished(
             places.add(place)
             todo += wanted.needs.values()
     moved = [
-        f"{counted(count, 'cell')} {'was' if count == 1 else 'were'} made by an earlier {names}"
-        for names, count in earlier.items()
+        f"{counted(count, 'cell')} made by another {names}" for names, count in earlier.items()
     ]
-    tells = (
-        f"{'; '.join(moved)}: computed again, as far as this study has them; the old ones are in "
-        f"{folder / EARLIER}"
-    )
-    return {place: every[place] for place in every if place in places}, tells if moved else ""
+    tells = [f"{' and '.join(moved)}: moved to {folder / EARLIER}"] if moved else []
+    tells += [f"{counted(restored, 'cell')} of this source: used again from there"] * bool(restored)
+    tells += ["those that this study lacks are computed again"] * bool(moved and places)
+    return {place: every[place] for place in every if place in places}, "; ".join(tells)
 
 
 def _computed(

@@ -13,11 +13,13 @@ from selfmodel import arguments, plugins
 from selfmodel.arguments import AUTO, KindSource, comparator_choice, robot_entry
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.losses import check_limit, still_trial
 from selfmodel.errors import (
     InputError,
     items_of,
     names_of,
     real_numbers,
+    scalar_of,
     whole_number,
     whole_numbers,
 )
@@ -81,7 +83,7 @@ def ablation(
     cases: int | Iterable[int] | None = None,
     comparators: str | Comparator | Iterable[str | Comparator] = tuple(COMPARATORS),
     gaps: float | Iterable[float] = 0.0,
-    seeds: int | Iterable[int] = range(1),
+    seeds: int | Iterable[int] = 1,
     settings: Settings = Settings(),  # noqa: B008  # frozen
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
@@ -102,8 +104,9 @@ def ablation(
     The diagnoses of a run need its trials, which need its gaits. With other choices of the next
     trial than the bank, a recovery needs the first gait alone.
 
-    One value may stand for a sequence of it. The processes of a study find comparators, kinds and a
-    score by name: such an object is built in, or a variable of a module that can be imported.
+    One value may stand for a sequence of it, but for ``seeds``. The processes of a study find
+    comparators, kinds and a score by name: such an object is built in, or a variable of a module
+    that can be imported.
 
     Args:
         folder: Folder of the study.
@@ -111,7 +114,7 @@ def ablation(
         cases: Numbers of failures of Table I; None for all that apply to each robot.
         comparators: Comparators, their names, or ``package.module:object``.
         gaps: Levels of the reality gap.
-        seeds: Seeds, one run each: ``range(3)`` for three; a number is one seed.
+        seeds: Seeds, one run each; a number is a count, as of ``--seeds``: 3 for 0, 1 and 2.
         settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
@@ -128,7 +131,7 @@ def ablation(
     robots = names_of(robots, ROBOT)
     cases = None if cases is None else whole_numbers("cases", cases, 1)
     comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
-    gaps, seeds = real_numbers("gaps", gaps), whole_numbers("seeds", seeds, 0, 0)
+    gaps, seeds = real_numbers("gaps", gaps), _seeds_of(seeds)
     damages = names_of(damages, "failures in notation", Hypothesis)
     next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
@@ -157,6 +160,9 @@ def ablation(
     }
     for entry in entries.values():
         check_score(chosen["score"], entry)
+        still = still_trial(entry.robot(), settings.steps)
+        for name in comparators:
+            check_limit(limit, comparator_choice(name), still, entry.robot())
     runs = [
         _point(models[robot], case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
@@ -206,7 +212,7 @@ def suite(
     *,
     bodies: str | Path | Iterable[str | Path] | None = None,
     cases: int | Iterable[int] | None = None,
-    seeds: int | Iterable[int] = range(1),
+    seeds: int | Iterable[int] = 1,
     settings: Settings = Settings(),  # noqa: B008  # frozen
     comparator: str | Comparator = SEGMENT_PREDICTION.name,
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
@@ -230,7 +236,7 @@ def suite(
     bodies = bodies_of(tuple(DOMAINS), None) if bodies is None else names_of(bodies, ROBOT)
     cases = known_cases(bodies) if cases is None else whole_numbers("cases", cases, 1)
     damages = names_of(damages, "failures in notation", Hypothesis)
-    seeds, (gap,) = whole_numbers("seeds", seeds, 0, 0), real_numbers("gap", [gap])
+    seeds, (gap,) = _seeds_of(seeds), real_numbers("gap", [gap])
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     neurons = None if neurons is None else whole_number("neurons", neurons, 3)
@@ -269,17 +275,17 @@ def paper(
     *,
     robots: str | Path | Iterable[str | Path] = tuple(ROBOTS),
     cases: int | Iterable[int] = tuple(TABLE_ONE),
-    seeds: int | Iterable[int] = range(1),
+    seeds: int | Iterable[int] = 1,
     comparators: str | Comparator | Iterable[str | Comparator] = PAPER_COMPARATORS,
     settings: Settings = Settings(),  # noqa: B008  # frozen
 ) -> Study:
     """Returns the paper's experiment: its failures, repair and fault kinds, and no reality gap.
 
     A run has a recovery with each comparator, and the paper's control. Without a gap the self-model
-    is exact, and is not calibrated. One value may stand for a sequence of it.
+    is exact, and is not calibrated. The sequences and ``seeds`` are as of ``ablation``.
     """
     robots, cases = names_of(robots, ROBOT), whole_numbers("cases", cases, 1)
-    seeds, comparators = whole_numbers("seeds", seeds, 0, 0), plugins.comparator_names(comparators)
+    seeds, comparators = _seeds_of(seeds), plugins.comparator_names(comparators)
     settings = arguments.settings_of(settings)
     _check_search(settings, EA, "the paper has the EA alone")
     settings = dataclasses.replace(settings, diagnostic_search=EA)
@@ -299,6 +305,13 @@ def paper(
     ]
     shared = {**_shared(settings, "paper", chosen), "calibrated": False}
     return _study("paper", folder, points, shared, _one_gait(models, shared))
+
+
+def _seeds_of(source: int | Iterable[int]) -> tuple[int, ...]:
+    """Returns seeds, given in a sequence, or as their number: those from 0 on."""
+    if isinstance(scalar_of(source), Iterable):
+        return whole_numbers("seeds", source, 0, 0)
+    return tuple(range(whole_number("seeds", source, 4, 1)))
 
 
 def _check_search(settings: Settings, known: str, remedy: str) -> None:

@@ -34,14 +34,16 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.logs.controllers import controller_bytes
 from selfmodel.logs.files import replace_file
+from selfmodel.logs.journal import RECOVERY
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.results import RecoveryResult
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import MakeSearch, RepairSearch
 from selfmodel.recovery.repertoire import model_digest
-from selfmodel.recovery.result import Event, Recovery, SearchBegins
+from selfmodel.recovery.result import Event, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
@@ -68,6 +70,9 @@ ON_ROBOT = "evolution-on-robot"
 
 REPAIR = "repair_settings"
 """Parameter with the settings of the repair, where they are others."""
+
+TRIAL_COLUMNS = ("stage", "hypothesis", "score", "robust_mean", "displacement", "fell_at_step")
+"""Columns of a trial of a recovery that are those of its result."""
 
 DIAGNOSIS_SETTINGS = ("trials", "genes", "kept", *ADDED)
 """Names of the settings that do not affect a gait."""
@@ -303,19 +308,20 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         settings=settings,
         seed=seed,
         threads=1,
-        folder=folder / "recovery",
+        folder=folder / RECOVERY,
         gait=gait,
         design=design,
         next_trial=shared["next_trial"],
         score=score,
-        physical=entry.physical,
+        entry=entry,
         repair=shared["repair"],
         search=shared["search"],
         repair_settings=of_repair,
     )
     watch = _DiagnosisWatch()
     outcome = experiments.run(experiment, watch)
-    recovery = outcome.recovery
+    recovery, result = outcome.recovery, experiments.result_of(experiment, outcome)
+    result.write(experiment.folder, settings, of_repair)
     before, after, *recoveries = recovery.scores
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
@@ -330,7 +336,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "correct": outcome.correct,
         "verdict": recovery.diagnosis.verdict,
         "trials": len(recovery.trials) - 1,
-        **_ends(recovery, entry),
+        **_ends(result, recovery.best_trial, entry, steps),
         "distinct_hypotheses": recovery.distinct_hypotheses,
         "diverged": outcome.stats.diverged,
         "simulated_steps": outcome.stats.steps,
@@ -338,49 +344,31 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "repair": shared["repair"],
         "search": shared["search"],
     }
-    others = recovery.scores_by(UPRIGHT, robot), _returns(recovery, entry)
-    forecasts = recovery.predicted, recovery.robust_means
-    columns = (recovery.scored, recovery.tried, *forecasts, *others)
     trials = [
         {
             "robot": robot.name,
             "number": number,
-            "stage": one.trial.plan.stage,
-            "hypothesis": str(tried),
-            "score": finite_or_none(one.value),
-            "predicted": finite_or_none(predicted),
-            "robust_mean": finite_or_none(mean),
-            "displacement": finite_or_none(one.trial.displacement),
-            "return": reward,
+            **{name: getattr(one, name) for name in TRIAL_COLUMNS},
+            "predicted": one.predicted_score,
+            "return": one.reward_sum,
             "upright": finite_or_none(walked),
-            "fell_at_step": one.fall,
         }
-        for number, (one, tried, predicted, mean, walked, reward) in enumerate(
-            zip(*columns, strict=True)
+        for number, (one, walked) in enumerate(
+            zip(result.trials or (), recovery.scores_by(UPRIGHT, robot), strict=True)
         )
     ]
     return {"diagnoses": diagnoses, "recoveries": [own], "trials": trials}
 
 
-def _returns(recovery: Recovery, entry: Entry) -> list[float | None]:
-    """Returns the return of each trial; None for a robot without a task."""
-    if entry.episode_return is None:
-        return [None] * len(recovery.trials)
-    return [*map(finite_or_none, recovery.scores_by(entry.episode_return, entry.robot()))]
-
-
-def _ends(recovery: Recovery, entry: Entry) -> Row:
+def _ends(result: RecoveryResult, best: int, entry: Entry, steps: int) -> Row:
     """Returns what was reached before and after the failure, and in the best recovery trial."""
-    steps, task = recovery.trials[0].plan.steps, entry.episode_return
-    row: Row = {"score": recovery.score.name, "unit": recovery.score.unit}
-    row["control_steps"] = steps
-    returns = _returns(recovery, entry)
-    for name, number in (("before", 0), ("after", 1), ("recovered", recovery.best_trial)):
-        one = recovery.scored[number]
-        row[name] = finite_or_none(one.value)
-        row["upright" if name == "recovered" else f"upright_{name}"] = one.fall is None
-        row[f"displacement_{name}"] = finite_or_none(one.trial.displacement)
-        row[f"return_{name}"] = returns[number]
+    trials, task = result.trials or (), entry.episode_return
+    row: Row = {"score": result.score.name, "unit": result.score.unit, "control_steps": steps}
+    for name, one in (("before", trials[0]), ("after", trials[1]), ("recovered", trials[best])):
+        row[name] = one.score
+        row["upright" if name == "recovered" else f"upright_{name}"] = one.fell_at_step is None
+        row[f"displacement_{name}"] = one.displacement
+        row[f"return_{name}"] = one.reward_sum
     return {**row, "return_most": None if task is None else task.most(steps)}
 
 

@@ -14,6 +14,8 @@ import pandas as pd
 from selfmodel.comparators import FORWARD_DISPLACEMENT
 from selfmodel.errors import InputError, counted
 from selfmodel.files import path_of, read_file
+from selfmodel.plugins import RETURN
+from selfmodel.recovery.scores import score_label
 from selfmodel.studies import comparisons
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, rows_in, shared_in
@@ -377,3 +379,10 @@ def whole(tables: pd.DataFrame) -> pd.DataFrame:
 def failure_of(case: Any, truth: str) -> str:  # noqa: ANN401  # a whole number, or pandas' NA
     """Returns the name of a failure: its number in Table I, or its notation."""
     return truth if pd.isna(case) else f"{case:2d}"
+
+
+def label_of(rows: Sequence[Row]) -> str:
+    """Returns the label of the score of rows of bodies, a return with the most, if that is one."""
+    score, unit = rows[0].get("score") or "score", rows[0].get("unit") or ""
+    limits = {row.get("return_most") if score == RETURN else None for row in rows}
+    return score_label(score, unit, limits.pop() if len(limits) == 1 else None)

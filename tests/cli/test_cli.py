@@ -81,14 +81,13 @@ def test_the_result_file_has_the_printed_object_and_what_it_was_made_with(short:
     folder, told = short
     found = read_result(folder / "run" / "result.json", "a result", "")
 
-    assert {key: found[key] for key in told} == told
+    logs = {f"trials/{Path(one['log']).name}": one for one in told["trials"]}
+    trials = [{**one, "log": log} for log, one in logs.items()]
+    assert {key: found[key] for key in told} == {**told, "trials": trials}
     assert found.keys() - told.keys() == {"settings", "files"}
     written = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
     assert written["made_with"] == versions()
-    assert found["files"] == {
-        f"trials/{Path(trial['log']).name}": file_digest(folder / trial["log"])
-        for trial in told["trials"]
-    }
+    assert found["files"] == {log: file_digest(folder / one["log"]) for log, one in logs.items()}
     assert found["settings"]["population"] == 8
 
 

@@ -54,7 +54,7 @@ def test_in_a_file_a_stage_is_a_line_now_and_then_with_the_time_left(
     assert told.err.splitlines() == [
         "calibration: 50%, about 12 s left",
         "diagnostic EA: 33%, about 20 s left",
-        "diagnostic EA: 30 generations, 900 evaluations, 30/s, best -0.1250",
+        "diagnostic EA: 900 evaluations, best -0.1250, 30/s",
         "refinement: 33%, about 4 min 00 s left",
     ]
 
@@ -73,7 +73,7 @@ def test_on_a_terminal_a_stage_is_a_bar_with_the_time_left(
     shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
 
     assert re.search(r"calibration .*━.* 50 % about 12 s left", shown)
-    assert re.search(r"diagnostic EA .*━.* 33 % best -0.250, 30/s, about 20 s left", shown)
+    assert re.search(r"diagnostic EA .*━.* 33 % best -0.2500, 30/s, about 20 s left", shown)
     assert re.search(r"refinement .*━.* 33 % about 4 min 00 s left", shown)
 
 
@@ -109,6 +109,6 @@ def test_printed_events_are_lines_with_the_time_left(
         "calibration: 50%, about 8 s left",
         "calibration: 100%",
         "diagnostic EA",
-        "generation 10 of 30: best -0.250, 30/s, about 20 s left",
-        "30 generations, 900 evaluations, 30/s, best -0.1250",
+        "300 evaluations, best -0.2500, 30/s, about 20 s left",
+        "900 evaluations, best -0.1250, 30/s",
     ]

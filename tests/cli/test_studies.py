@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.report.charts import Table
+from selfmodel.report.content import shots_of, trials_section
+from selfmodel.report.subject import subject_of_run
 from selfmodel.studies import figures, load
 from selfmodel.studies.study import Study
 from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
@@ -104,6 +107,15 @@ def test_bodies_of_the_suite_and_of_the_user_fail_and_recover_once(tmp_path: Pat
     assert [one["fell_at_step"] is None for one in trials] == [
         broken[name] for name in ("upright_before", "upright_after", "upright")
     ]
+    (run,) = (tmp_path / "out" / "runs").glob("suite-walker-walk-case01*")
+    alone = json.loads(succeeds("report", str(run), "--json", cwd=tmp_path).stdout)
+    assert f"The robot moved {broken['recovered']:.3f} m at best" in alone["headline"]
+    table = trials_section(subject := subject_of_run(run), shots_of(subject)).items[-1]
+    assert isinstance(table, Table)
+    cells = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    names = {"score": "displacement, m", "return": "return", "fell_at_step": "fell at step"}
+    for shown, one in zip(cells, trials, strict=True):
+        assert {name: shown[key] for name, key in names.items()} == {key: one[key] for key in names}
     kept = json.loads((tmp_path / "out" / "results.json").read_text())
     assert kept == {key: told[key] for key in ("rows", "summaries", "trials")}
     study = load(tmp_path / "out" / "results.csv")

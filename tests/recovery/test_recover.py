@@ -429,3 +429,13 @@ def test_a_surrogate_that_cannot_judge_a_trial_is_replaced_by_the_comparator(qua
 
     assert evidence.surrogate([whole])[0] is not evidence
     assert evidence.surrogate([trial])[0] is evidence
+
+
+def test_a_limit_too_small_for_one_hypothesis_is_refused_before_the_first_trial(quadruped: Robot):
+    def run_trial(*_: object) -> Trial:
+        raise AssertionError("a trial was run")
+
+    few = dataclasses.replace(TINY, max_simulated_steps=TINY.steps + 1)
+    choose = comparator_choice("noisy-transfer")
+    with pytest.raises(InputError, match="as noisy-transfer simulates for one hypothesis"):
+        recovery(quadruped, settings=few, choose_comparator=choose, run_trial=run_trial)

@@ -54,7 +54,8 @@ def without_base(trial: Trial) -> Trial:
 def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     diagnosis = Diagnosis((Candidate(INTACT, 0.0),), 1, 0.0, (), "explained", "by hand")
     blind = without_base(trial)
-    scored = (TrialScore(blind, INTACT, DISPLACEMENT, math.nan, None),) * 3
+    fallen = TrialScore(blind, INTACT, DISPLACEMENT, math.nan, 7)
+    scored = (*[dataclasses.replace(fallen, fall=None)] * 2, fallen)
     found = (diagnosis, 0, 0, 0, CHOSEN, *[(math.nan,) * 3] * 2, scored)
     recovery = Recovery((blind,) * 3, (INTACT,) * 3, *found)
 
@@ -63,7 +64,8 @@ def test_an_unobserved_displacement_is_none_everywhere(trial: Trial):
     assert math.isnan(recovery.before)
     assert values["displacement"] == {"before": None, "after": None, "recovered": None}
     assert recovery.to_pandas()["displacement"].isna().all()
-    assert "nan m  intact" in repr(recovery)
+    first, *ways = [row[2] for row in recovery.table]
+    assert (first, ways) == ("displacement, m", ["nan", "nan", "nan, fell at step 7"])
 
 
 def test_a_calibration_is_readable_serialisable_and_a_table(fit: Calibration):

@@ -113,6 +113,9 @@ def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_p
         ("b, case 1", (2.0, 1.0, 1.0)),
     ]
     assert [group.notes for group in chart.groups] == [("", "", "fell in 1 of 2"), ("", "", "")]
+    paid = [body(score="return", unit="", return_most=199)]
+    (chart,) = study(tmp_path, "suite", paid).sections[0].items
+    assert chart.x_label == "return (of 199)"
 
 
 @browses

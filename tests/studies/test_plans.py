@@ -231,6 +231,21 @@ def test_the_shares_of_a_cluster_are_the_whole_and_nothing_twice(tmp_path: Path)
     ]
 
 
+def test_an_ablation_whose_limit_is_too_small_for_a_comparator_is_refused(tmp_path: Path):
+    few = replace(SMALL, max_simulated_steps=SMALL.steps + 1)
+    with pytest.raises(InputError, match="as noisy-transfer simulates for one hypothesis"):
+        ablated(tmp_path, settings=few, comparators=["forward-displacement", "noisy-transfer"])
+
+
+def test_a_number_of_seeds_is_a_count_and_a_sequence_has_the_seeds(tmp_path: Path):
+    for plan in (ablated, bodies):
+        assert set(values(plan(tmp_path, seeds=2), "seed")) == {0, 1}
+        assert set(values(plan(tmp_path, seeds=[2]), "seed")) == {2}
+        with pytest.raises(InputError, match="of 1 or above as seeds, got 0"):
+            plan(tmp_path, seeds=0)
+    assert set(values(paper(tmp_path, robots="quadruped", cases=1, seeds=2), "seed")) == {0, 1}
+
+
 def test_a_body_whose_model_changed_is_another_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -118,10 +118,8 @@ def test_an_edited_plug_in_makes_its_own_cells_again_and_its_earlier_rows_leave_
 
     names = [f"way=own_way-seed={seed}" for seed in range(3)]
     assert begun == str([3, names])
-    assert said == (
-        "3 cells were made by an earlier own_way.py: computed again, as far as this study has "
-        "them; the old ones are in study/earlier"
-    )
+    moved = "3 cells made by another own_way.py: moved to study/earlier"
+    assert said == f"{moved}; those that this study lacks are computed again"
     assert rows == first[2].replace(
         "('own_way', 0, 1), ('own_way', 1, 1), ('own_way', 2, 1)",
         "('own_way', 0, 3), ('own_way', 1, 3), ('own_way', 2, 3)",
@@ -130,9 +128,9 @@ def test_an_edited_plug_in_makes_its_own_cells_again_and_its_earlier_rows_leave_
 
     write(folder, own_way="VALUE = 1")  # what was made by it is finished
     begun, said, rows = study_in(folder)
-    assert (begun, said.split(":")[0]) == (
+    assert (begun, said) == (
         str([6, []]),
-        "3 cells were made by an earlier own_way.py",
+        f"{moved}; 3 cells of this source: used again from there",
     )
     assert rows == first[2]
     write(folder, my_work=SCRIPT.format(factor=2))
