@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
@@ -29,11 +30,20 @@ def run_trial(
         path: Name of the log; it must not exist.
         robot: Robot as its model describes it.
         header: Other content of the log's preamble; ``timed`` is taken from the physical robot.
+
+    A controller that no log holds, a function, is that of the plan.
     """
     timed = isinstance(physical, TimedRobot)
     samples = physical.run(plan.controller, plan.steps)
     write_trial(path, robot, plan, samples, replace(header, timed=timed))
-    return read_log(path).trial
+    return _logged(path, plan)
+
+
+def _logged(path: Path, plan: TrialPlan) -> Trial:
+    trial = read_log(path).trial
+    if isinstance(plan.controller, Controller) and plan.controller.design.function:
+        trial = replace(trial, plan=plan)
+    return trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +81,7 @@ class TrialRunner:
             unsafe = isinstance(error, HangError) or bool(getattr(error, "__notes__", ()))
             if unsafe or plan.stage == "before" or not path.exists():
                 raise
-            trial = read_log(path).trial
+            trial = _logged(path, plan)
             if trial.trajectory.steps < MIN_STEPS:
                 raise
             return trial

@@ -18,6 +18,7 @@ from .physical.interface import PhysicalRobot as PhysicalRobot
 from .recording import (
     Episode as Episode,
     evaluate as evaluate,
+    load_policy as load_policy,
     record as record,
     run_trial as run_trial,
     simulated_robot as simulated_robot,

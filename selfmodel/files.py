@@ -1,6 +1,7 @@
 """Files that a user names: bounded reading, digests, and writing that is complete or absent."""
 
 import hashlib
+import importlib
 import os
 import re
 import secrets
@@ -29,6 +30,17 @@ def search_here() -> None:
     """
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)
+
+
+def imported(name: str) -> Any:  # noqa: ANN401  # any object
+    """Returns the object that ``package.module:object`` names, importable from here.
+
+    Raises:
+        ImportError, AttributeError, SyntaxError, TypeError, ValueError: It cannot be imported.
+    """
+    search_here()
+    module, _, attribute = name.partition(":")
+    return getattr(importlib.import_module(module), attribute)
 
 
 def read_file(path: Path, what: str, limit: int) -> bytes:
