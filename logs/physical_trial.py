@@ -6,6 +6,8 @@ from pathlib import Path
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
+from selfmodel.logs.controllers import LAYER
+from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
 from selfmodel.logs.writer import write_trial
@@ -68,10 +70,16 @@ class TrialRunner:
     def __call__(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a physical trial; see ``run_trial``.
 
+        The numbers of a compensating layer are in a file beside the log, ``NAME.toml``.
+
         A trial that the robot could not finish, such as after an emergency stop, is returned as far
         as it went.
         """
-        path = self.folder / f"{checked_name(plan.name)}.mcap"
+        path, driver = self.folder / f"{checked_name(plan.name)}.mcap", plan.controller
+        if isinstance(driver, Controller) and driver.design.name == LAYER and driver.genome.any():
+            from selfmodel.logs.layers import layer_text  # noqa: PLC0415  # few trials have one
+
+            replace_file(path.with_suffix(".toml"), layer_text(driver).encode())
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
         try:
             return run_trial(physical, plan, path, self.robot, header)

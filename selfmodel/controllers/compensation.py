@@ -153,6 +153,18 @@ class Compensated(Design):
             * response.reshape(len(genomes), felt, RESPONSES),
         )
 
+    def encode(self, layer: "Layer") -> FloatArray:
+        """Returns the genomes of numbers, ``(n, weights)``, but for rounding; see ``decode``."""
+        ones = self.decode(np.ones((1, self.weights)))
+        parts = (
+            layer.offset / ones.offset,
+            np.log(layer.gain) / np.log(ones.gain),
+            layer.shift / ones.shift,
+            (layer.response / ones.response).reshape(len(layer.offset), -1),
+        )
+        genomes = np.concatenate(parts, axis=1)
+        return np.where(np.abs(genomes) < 1 + 1e-9, np.clip(genomes, -1, 1), genomes)
+
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "CompensatedBatch":
         """Returns the batch of the layers of some genomes; see ``Design.batch``."""
         within = self.base.design.batch(np.tile(self.base.genome, (len(genomes), 1)), silent)

@@ -69,9 +69,10 @@ class Function:
         # A batch may round otherwise than a row.
         if not np.allclose(again, first, rtol=1e-5, atol=1e-6):
             raise TrialError(
-                f"the function {self.name} returns {first.tolist()}, then {again.tolist()} for the "
-                f"same observation: it has a state, or is random; give it a history or last_action "
-                f"as terms in place of a state, and the mean in place of random numbers"
+                f"the function {self.name} returns two actions for one observation, which differ "
+                f"by {np.abs(again - first).max():.3g}: it has a state, or is random; give it a "
+                f"history or last_action as terms in place of a state, and the mean in place of "
+                f"random numbers"
             )
 
 
@@ -91,7 +92,7 @@ def called(
     try:
         action = np.asarray(function(observation), dtype=np.float64)
     except Exception as error:  # a user's function may raise any: raised as a TrialError
-        reason = f"{type(error).__name__}: {error}".removesuffix(": ")
+        reason = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
         raise TrialError(f"the function {name} failed: {reason}") from error
     if action.size != math.prod(shape):
         raise TrialError(

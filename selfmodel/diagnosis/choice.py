@@ -63,8 +63,8 @@ def prepared_trial(
     if isinstance(driver, Playback) and driver.function and not isinstance(request, Segments):
         raise TrialRefusedError(
             f"{trial.path}: {comparator.name} simulates whole trials with the robot's controller, "
-            f"and the log has only the commands of the function {driver.function}, which would "
-            f"have given others to a robot that moves otherwise",
+            f"and the log has only the commands of the function {driver.function}, which do not "
+            f"react to a fault",
             "give the comparator segment-prediction",
         )
     states = (*request.states, "commands") if isinstance(request, Segments) else ()

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import mujoco
+import numpy as np
 from mujoco import MjModel, MjSpec
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
-from selfmodel.robot.anatomy import Anatomy, Joint
+from selfmodel.robot.anatomy import CONTROL_DELAY, Anatomy, Joint, added_steps
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
@@ -53,16 +54,67 @@ def compile_model(
 
     The result is the robot's own model, not a copy, if the specification is not edited.
     """
-    faults = hypothesis.spec_part.faults
-    if not faults and not edits:
+    if not hypothesis.spec_part.faults and not edits:
         return robot.model
+    return _compiled(robot, hypothesis, seed, edits)[1]
+
+
+def _compiled(
+    robot: Robot, hypothesis: Hypothesis, seed: int, edits: Sequence[SpecEdit] = ()
+) -> tuple[MjSpec, MjModel]:
     spec = robot.specification()
-    for fault in faults:
+    for fault in hypothesis.spec_part.faults:
         fault.kind.edit_specification(spec, fault, seed)
     for edit in edits:
         edit(spec)
     with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
-        return spec.compile()
+        return spec, spec.compile()
+
+
+MIN_MASS = 1e-9
+"""Mass, kg, and moments of inertia, kg m^2, of a detached body in an MJCF, which has to have some.
+"""
+
+
+_FLAGS = (
+    ("geoms", "geom_", {k: k for k in ("contype", "conaffinity", "condim", "priority")}),
+    ("joints", "jnt_", {"limited": "limited"}),
+    ("tendons", "tendon_", {"limited": "limited"}),
+    ("equalities", "eq_", {"active": "active0"}),
+)
+
+
+def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
+    """Returns the MJCF of a robot with the faults of a hypothesis, to six digits.
+
+    Its parts are those of the robot's own, in the same order. A detached body has ``MIN_MASS``. A
+    delay is the custom numeric ``CONTROL_DELAY``. Faults of readings and encoders are not in it.
+
+    Raises:
+        InputError: A fault does not apply to the model.
+    """
+    spec, compiled = _compiled(robot, hypothesis, 0)
+    variant = apply_faults(compiled, robot.anatomy, hypothesis)
+    model, nominal = variant.model, robot.model
+    moving = compiled.body_mass > 0
+    model.body_mass[moving] = np.maximum(model.body_mass[moving], MIN_MASS)
+    model.body_inertia[moving] = np.maximum(model.body_inertia[moving], MIN_MASS)
+    # A range of 0 is refused; a motor without a gain needs none.
+    for name in ("actuator_forcerange", "jnt_actfrcrange"):
+        ranges = getattr(model, name)
+        ranges[:] = np.where(ranges.any(axis=1, keepdims=True), ranges, getattr(nominal, name))
+    with mujoco_errors_as_input_errors(f"write the model of {hypothesis}"):
+        spec.copy_back(model)  # but for flags
+        for parts, prefix, names in _FLAGS:
+            for part in getattr(spec, parts):
+                for name, field in names.items():
+                    setattr(part, name, int(getattr(model, prefix + field)[part.id]))
+        added = added_steps(robot.control_delay, float(variant.added_delay[0]))
+        if added:
+            for numeric in [one for one in spec.numerics if one.name == CONTROL_DELAY]:
+                spec.delete(numeric)
+            spec.add_numeric(name=CONTROL_DELAY, data=[float(robot.control_delay + added)])
+        return str(spec.to_xml())
 
 
 def apply_faults(
