@@ -2,6 +2,7 @@ from .api import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
+    export_diagnosis as export_diagnosis,
     recover as recover,
     replay as replay,
 )

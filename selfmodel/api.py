@@ -17,7 +17,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.files import path_of
-from selfmodel.logs import physical_trial
+from selfmodel.logs import export, physical_trial
 from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
@@ -347,6 +347,33 @@ def recover(
         make_repair=make_repair,
         repair_settings=repair_settings,
     ).run(healthy, damaged)
+
+
+def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Path) -> Path:
+    """Writes a diagnosis for other software, as ``selfmodel diagnose --export``.
+
+    Example:
+        >>> import selfmodel
+        >>> settings = selfmodel.Settings(generations=2).scaled(6)
+        >>> given = {"kinds": "paper", "settings": settings, "calibrate": False}
+        >>> diagnosis = selfmodel.diagnose("after.mcap", healthy="before.mcap", **given)
+        >>> folder = selfmodel.export_diagnosis(diagnosis, "quadruped", "damaged")
+        >>> sorted(path.name for path in folder.iterdir())
+        ['model.xml', 'status.json']
+
+    Args:
+        diagnosis: The diagnosis.
+        robot: The self-model: a robot, its name, or the path of its MJCF or URDF file.
+        folder: Folder for ``model.xml``, the robot with the best hypothesis, and ``status.json``;
+            made if it is missing.
+
+    Raises:
+        InputError: The folder has such a file.
+    """
+    check_type(diagnosis, Diagnosis, "a Diagnosis")
+    folder = path_of(folder, "a folder")
+    export.export_diagnosis(diagnosis, arguments.load_robot(robot), folder)
+    return folder
 
 
 @dataclass(frozen=True, eq=False)

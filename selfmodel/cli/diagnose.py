@@ -18,6 +18,7 @@ from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.errors import counted
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
+from selfmodel.logs.export import check_folder, export_diagnosis
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
@@ -27,6 +28,8 @@ from selfmodel.trials.trial import by_stage, trial_names
 def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
+    if options.export is not None:
+        check_folder(options.export)
     explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)
     evidence = direct_evidence(
         diagnosis.explained(inputs.damaged), robot.anatomy, trial_names(inputs.damaged)
@@ -52,6 +55,9 @@ def diagnose(options: Diagnose) -> None:
         distinct_hypotheses=inputs.search.distinct_hypotheses,
         seconds=perf_counter() - start,
     )
+    if options.export is not None:
+        self_model = inputs.calibration.robot if inputs.calibration else robot
+        export_diagnosis(diagnosis, self_model, options.export)
     if options.as_json:
         print_json(values_of(result))
         return
@@ -67,6 +73,7 @@ def diagnose(options: Diagnose) -> None:
         *text.detectable_sentences(diagnosis),
         *text.evidence_sentences(evidence),
         *(f"from before the failure, not explained: {Path(one.path)}" for one in inputs.healthy),
+        *([f"For other software: {options.export}"] if options.export else []),
     )
 
 
