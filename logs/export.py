@@ -140,8 +140,8 @@ def _range(
     return {
         "kind": kind.name,
         "part": part,
-        "low": low,
-        "high": high,
+        "low": round(low, 6),
+        "high": round(high, 6),
         "nominal": kind.nominal,
         "unit": kind.unit,
         "found": is_found,

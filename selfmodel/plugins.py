@@ -99,12 +99,14 @@ class Registry:
         group: Group of the entry points of installed plug-ins.
         known: Selfmodel's own by name; None for a name that stands for no single object.
         takes: Arguments of the objects, if they are functions.
+        hint: Clause for an object that is none.
     """
 
     what: str
     group: str
     known: Mapping[str, object]
     takes: tuple[str, ...] = ()
+    hint: str = ""
 
 
 REGISTRIES: Mapping[str, Registry] = MappingProxyType(
@@ -124,7 +126,8 @@ REGISTRIES: Mapping[str, Registry] = MappingProxyType(
             "choice of the next trial", "selfmodel.next_trials", NEXT_TRIAL, ("loop",)
         ),
         "controller": Registry(
-            "kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")
+            *("kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")),
+            hint="; a policy is given as a policy file, which may name a function as its network",
         ),
         "search": Registry(
             *("search", "selfmodel.searches", {**SEARCHES, REPERTOIRE: None}),
@@ -362,7 +365,7 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{source!r:.200} is no {registry.what}: expected a function of the arguments "
-            f"{', '.join(registry.takes)}, got {found!r:.200} ({error})"
+            f"{', '.join(registry.takes)}, got {found!r:.200} ({error}){registry.hint}"
         ) from error
     return cast("Callable[..., Any]", found)
 
