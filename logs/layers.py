@@ -1,6 +1,6 @@
 """Layer files: the numbers of a compensating layer by name, for the software of a robot.
 
-``--controller`` takes one as the key ``layer`` of a policy file. Its own comments have the formula.
+The comments of a file have the formula. The key ``layer`` of a policy file names one.
 """
 
 import json
@@ -25,25 +25,22 @@ HEADER = """\
 # own: the command of the controller within for this motor, in the unit of the motor.
 # felt: the direction of gravity in the frame of the base, its x (forward) and y (to the left),
 #   0 if upright; and the angular velocity of the base about x, y and z of that frame, rad/s.
-#   Without a response, 0.
 # velocity_shift is added to the velocity that the controller within is commanded: m/s forward and
 #   to the left, and rad/s to the left.
 """
-"""Comments at the beginning of a file."""
 
 Number = Annotated[float, Meta(gt=-1e9, lt=1e9)]
-Responses = tuple[Number, Number, Number, Number, Number]
 
 
 class Motor(Struct, forbid_unknown_fields=True, frozen=True):
     """Numbers of a motor; see ``HEADER``."""
 
-    neutral: Number
     gain: Annotated[float, Meta(gt=0, lt=1e9)]
     offset: Number
+    neutral: Number
     low: Number
     high: Number
-    response: Responses | None = None
+    response: tuple[Number, ...] = ()
 
 
 class LayerFile(Struct, forbid_unknown_fields=True, frozen=True):
@@ -54,30 +51,25 @@ class LayerFile(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def layer_text(controller: Controller) -> str:
-    """Returns the numbers of a controller with a layer as TOML, to the last bit.
-
-    Raises:
-        InputError: The controller has no layer.
-    """
+    """Returns the numbers of a controller's layer as TOML, to the last bit."""
     design = controller.design
     if not isinstance(design, Compensated):
-        raise InputError(f"expected a compensating layer, got {design.description}")
-    layer = design.decode(controller.genome[np.newaxis])
-    within = design.base.design.summary(design.base.genome)
-    lines = [HEADER.format(within=" ".join(within.split()))]
-    lines.append(f"velocity_shift = {layer.shift[0].tolist()}")
+        raise TypeError(f"expected a controller with a layer, got {design!r}")
+    layer, within = design.decode(controller.genome[np.newaxis]), design.base
+    text = HEADER.format(within=" ".join(within.design.summary(within.genome).split()))
+    text += f"\nvelocity_shift = {layer.shift[0].tolist()}\n\n[motors]\n"
     for k, (motor, (centre, half)) in enumerate(zip(design.motors, design.ranges, strict=True)):
         numbers = {
+            "gain": layer.gain[0, k].tolist(),
+            "offset": layer.offset[0, k].tolist(),
             "neutral": float(design.neutral[k]),
-            "gain": float(layer.gain[0, k]),
-            "offset": float(layer.offset[0, k]),
             "low": float(centre - half),
             "high": float(centre + half),
             **({"response": layer.response[0, k].tolist()} if design.feedback else {}),
         }
-        lines.append(f"\n[motors.{json.dumps(motor)}]")
-        lines += [f"{key} = {value!r}" for key, value in numbers.items()]
-    return "\n".join(lines) + "\n"
+        values = ", ".join(f"{key} = {value!r}" for key, value in numbers.items())
+        text += f"{json.dumps(motor)} = {{ {values} }}\n"
+    return text
 
 
 def read_layer(path: Path, base: Controller) -> Controller:
@@ -90,19 +82,18 @@ def read_layer(path: Path, base: Controller) -> Controller:
     data = read_file(path, "a layer file", 2**20)
     try:
         file = msgspec.convert(load_toml(data.decode()), LayerFile)
-    # No ValueError in msgspec 0.19.
-    except (ValueError, msgspec.ValidationError) as failure:
+    except (ValueError, msgspec.ValidationError) as failure:  # no ValueError in msgspec 0.19
         raise InputError(f"{path}: expected {what}: {failure}") from failure
     rows = [file.motors[name] for name in motors if name in file.motors]
-    responses = [one.response for one in rows if one.response is not None]
-    design = Compensated.around(base, feedback=bool(responses))
-    shift = len(design.velocity or ())
-    counts = (len(file.motors), len(rows), len(responses) or len(motors), len(file.velocity_shift))
-    if counts != (len(motors), len(motors), len(motors), shift):
+    responses = [one.response for one in rows]
+    feedback, shift = any(responses), len(base.design.velocity or ())
+    widths = {len(one) for one in responses} - {RESPONSES * feedback}
+    if len(rows) != len(motors) or widths or len(file.velocity_shift) != shift:
         raise InputError(
-            f"{path}: expected {what}: the motors {', '.join(motors)}, a response of all or none, "
-            f"and {shift} numbers of a velocity_shift"
+            f"{path}: expected {what}: the motors {', '.join(motors)}, {RESPONSES} numbers of the "
+            f"response of all or none, and {shift} of a velocity_shift"
         )
+    design = Compensated.around(base, feedback=feedback)
     layer = Layer(
         offset=np.array([[one.offset for one in rows]]),
         gain=np.array([[one.gain for one in rows]]),

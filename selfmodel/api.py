@@ -18,6 +18,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.files import path_of
 from selfmodel.logs import export, physical_trial
+from selfmodel.logs.files import make_folder, refuse_existing, replace_file
 from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
@@ -350,7 +351,7 @@ def recover(
 
 
 def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Path) -> Path:
-    """Writes a diagnosis for other software, as ``selfmodel diagnose --export``.
+    """Writes a diagnosis for other software into a folder, and returns the folder.
 
     Example:
         >>> import selfmodel
@@ -371,8 +372,13 @@ def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Pat
         InputError: The folder has such a file.
     """
     check_type(diagnosis, Diagnosis, "a Diagnosis")
+    files = export.files_of(diagnosis, arguments.load_robot(robot))
     folder = path_of(folder, "a folder")
-    export.export_diagnosis(diagnosis, arguments.load_robot(robot), folder)
+    for name in files:
+        refuse_existing(folder / name)
+    make_folder(folder)
+    for name, data in files.items():
+        replace_file(folder / name, data)
     return folder
 
 

@@ -9,7 +9,7 @@ from mujoco import MjModel, MjSpec
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
-from selfmodel.robot.anatomy import CONTROL_DELAY, Anatomy, Joint, added_steps
+from selfmodel.robot.anatomy import Anatomy, Joint, added_steps, write_control_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
@@ -111,9 +111,7 @@ def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
                     setattr(part, name, int(getattr(model, prefix + field)[part.id]))
         added = added_steps(robot.control_delay, float(variant.added_delay[0]))
         if added:
-            for numeric in [one for one in spec.numerics if one.name == CONTROL_DELAY]:
-                spec.delete(numeric)
-            spec.add_numeric(name=CONTROL_DELAY, data=[float(robot.control_delay + added)])
+            write_control_delay(spec, robot.control_delay + added)
         return str(spec.to_xml())
 
 

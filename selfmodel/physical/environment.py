@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import CommandSource, make_batch
-from selfmodel.controllers.function import called, name_of
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import (
     InputError,
@@ -305,6 +304,8 @@ class EnvironmentRobot:
 
     def _targets(self, step: int, policy: Policy, observation: object) -> FloatArray:
         """Returns the motor targets of a policy; ``InputError`` before the robot moves."""
+        from selfmodel.controllers.function import called, name_of  # noqa: PLC0415  # few have one
+
         motors = self.robot.anatomy.motors
         try:
             return called(name_of(policy), policy, observation, (len(motors),), finite=True)

@@ -14,7 +14,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.build import build, edited_mjcf
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, notation_kinds
-from selfmodel.logs.export import export_diagnosis, status_of
+from selfmodel.logs.export import status_of
 from selfmodel.robot.robot import Robot
 from tests.helpers.command import SMALL, succeeds
 from tests.helpers.robots.arms import robot_of
@@ -152,10 +152,11 @@ def test_a_robot_with_a_delay_of_its_own_has_the_sum_in_its_edited_mjcf(quadrupe
 
 def test_files_are_written_once_and_read_by_mujoco(tmp_path: Path, quadruped: Robot):
     diagnosis, folder = diagnosed(quadruped, "motor:back_left_knee=0.3"), tmp_path / "new" / "out"
-    content = export_diagnosis(diagnosis, quadruped, folder)
+    assert selfmodel.export_diagnosis(diagnosis, quadruped, folder) == folder
     model = mujoco.MjModel.from_xml_path(str(folder / "model.xml"))
 
-    assert json.loads((folder / "status.json").read_text()) == content
+    content = json.loads((folder / "status.json").read_text())
+    assert content == status_of(diagnosis, quadruped)
     gain = quadruped.model.actuator("back_left_knee").gainprm[0]
     assert model.actuator("back_left_knee").gainprm[0] == pytest.approx(0.3 * gain, rel=1e-5)
     with pytest.raises(InputError, match=r"model\.xml exists, and is not overwritten"):
