@@ -39,7 +39,8 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
     rows = [[joint.name for joint in limb] for limb in limbs(anatomy)]
     rows.sort(key=lambda row: order.index(row[0]))
     within = {name for row in rows for name in row}
-    shown = [one.kind.affects_dynamics and one.kind != joints.ENCODER_OFFSET for one in best.faults]
+    lacking = {kind for kind in (fault.kind for fault in best.faults) if not kind.affects_dynamics}
+    lacking.add(joints.ENCODER_OFFSET)
     return {
         "robot": robot.name,
         "hypothesis": str(best),
@@ -47,7 +48,7 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
         "joints": rows,
         "status": [[status[name] for name in row] for row in rows],
         "other_joints": {name: status[name] for name in order if name not in within},
-        "not_in_model": [str(one) for one, is_shown in zip(best.faults, shown) if not is_shown],
+        "not_in_model": [str(one) for one in best.faults if one.kind in lacking],
         "hypotheses": [
             {"hypothesis": str(one), "probability": diagnosis.probability.get(str(one))}
             for one in (best, *diagnosis.indistinguishable)

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from selfmodel.controllers.compensation import RESPONSES, Compensated, Layer
+from selfmodel.controllers.compensation import Compensated, Layer
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.files import load_toml, read_file
@@ -78,29 +78,20 @@ def read_layer(path: Path, base: Controller) -> Controller:
     Raises:
         InputError: The file is invalid, or of other motors, or a number is larger than a layer's.
     """
-    what, motors = f"the layer of {base.design.description}", base.design.motors
     data = read_file(path, "a layer file", 2**20)
     try:
         file = msgspec.convert(load_toml(data.decode()), LayerFile)
-    except (ValueError, msgspec.ValidationError) as failure:  # no ValueError in msgspec 0.19
-        raise InputError(f"{path}: expected {what}: {failure}") from failure
-    rows = [file.motors[name] for name in motors if name in file.motors]
-    responses = [one.response for one in rows]
-    feedback, shift = any(responses), len(base.design.velocity or ())
-    widths = {len(one) for one in responses} - {RESPONSES * feedback}
-    if len(rows) != len(motors) or widths or len(file.velocity_shift) != shift:
-        raise InputError(
-            f"{path}: expected {what}: the motors {', '.join(motors)}, {RESPONSES} numbers of the "
-            f"response of all or none, and {shift} of a velocity_shift"
+        rows = [file.motors[name] for name in base.design.motors]
+        responses = [one.response for one in rows if one.response]
+        design = Compensated.around(base, feedback=bool(responses))
+        layer = Layer(
+            offset=np.array([[one.offset for one in rows]]),
+            gain=np.array([[one.gain for one in rows]]),
+            shift=np.array([file.velocity_shift], dtype=np.float64),
+            response=np.array([responses], dtype=np.float64),
         )
-    design = Compensated.around(base, feedback=feedback)
-    layer = Layer(
-        offset=np.array([[one.offset for one in rows]]),
-        gain=np.array([[one.gain for one in rows]]),
-        shift=np.array([file.velocity_shift], dtype=np.float64),
-        response=np.array([responses], dtype=np.float64).reshape(1, -1, RESPONSES),
-    )
-    genome = design.encode(layer)[0]
-    if (size := float(np.abs(genome).max())) > 1:
-        raise InputError(f"{path}: expected {what}: a number is {size:.3g} times the largest")
-    return Controller(design, genome)
+        return Controller(design, design.encode(layer))
+    # No ValueError in msgspec 0.19.
+    except (ValueError, KeyError, msgspec.ValidationError) as failure:
+        what = f"the layer of {base.design.description}"
+        raise InputError(f"{path}: expected {what}: {failure}") from failure

@@ -201,31 +201,17 @@ def _read(
 def _network(
     file: PolicyFile, folder: Path, named: str, function: Callable[[Any], Any] | None
 ) -> Graph | Function:
-    """Returns the network of a policy, or a function without a number of outputs."""
+    """Returns the network of a policy, or its function, without the number of outputs."""
     name = file.network
-    if (function is None) == (not name):
-        raise InputError(
-            f"{named}: expected either a network, a file or package.module:function, or a function "
-            f"beside it, got {'both' if name else 'neither'}"
-        )
+    if function is None and ":" in name:
+        function = imported(name, "function")
     if function is not None:
-        check_function("a policy", function)
-        return Function(name_of(function), function, 0, file.batched)
-    if ":" in name:
-        try:
-            found = imported(name)
-        except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
-            raise InputError(
-                f"{named}: cannot find the function {name}: {error}; expected "
-                f"package.module:function, importable from here"
-            ) from error
-        check_function(name, found)
-        return Function(name, found, 0, file.batched)
-    if file.batched:
-        raise InputError(f"{named}: batched is of a function, got the network {name}: leave it out")
-    if Path(name).name != name:
+        check_function(name or "a policy", function)
+        return Function(name or name_of(function), function, 0, file.batched)
+    if not name or Path(name).name != name:
         raise InputError(
-            f"{named}: expected a network beside this file, got {name!r}: copy it here"
+            f"{named}: expected a network beside this file, or package.module:function, got "
+            f"{name!r}: copy it here"
         )
     return read_network(folder / name, file.activation, file.last)
 

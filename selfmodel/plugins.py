@@ -99,14 +99,12 @@ class Registry:
         group: Group of the entry points of installed plug-ins.
         known: Selfmodel's own by name; None for a name that stands for no single object.
         takes: Arguments of the objects, if they are functions.
-        hint: Clause for an object that is none.
     """
 
     what: str
     group: str
     known: Mapping[str, object]
     takes: tuple[str, ...] = ()
-    hint: str = ""
 
 
 REGISTRIES: Mapping[str, Registry] = MappingProxyType(
@@ -126,8 +124,7 @@ REGISTRIES: Mapping[str, Registry] = MappingProxyType(
             "choice of the next trial", "selfmodel.next_trials", NEXT_TRIAL, ("loop",)
         ),
         "controller": Registry(
-            *("kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")),
-            hint="; a policy is given as a policy file, which may name a function as its network",
+            "kind of controller", "selfmodel.controllers", DESIGNS, ("robot", "hidden")
         ),
         "search": Registry(
             *("search", "selfmodel.searches", {**SEARCHES, REPERTOIRE: None}),
@@ -365,7 +362,7 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{source!r:.200} is no {registry.what}: expected a function of the arguments "
-            f"{', '.join(registry.takes)}, got {found!r:.200} ({error}){registry.hint}"
+            f"{', '.join(registry.takes)}, got {found!r:.200} ({error})"
         ) from error
     return cast("Callable[..., Any]", found)
 
@@ -393,15 +390,7 @@ def _found(parameter: str, name: str) -> object:
     path = _path_of(registry, name)
     if ":" not in path:
         raise unknown_name(registry.what, name, known)
-    try:
-        return imported(path)
-    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
-        moved = isinstance(error, ImportError) and (error.name or "").startswith("selfmodel")
-        hint = "; it was written for selfmodel 0.1, whose modules have moved: see the changelog"
-        raise InputError(
-            f"cannot find the {registry.what} {name!r}: {error}{hint if moved else ''}; expected "
-            f"package.module:object, importable from here, or one of {', '.join(known)}"
-        ) from error
+    return imported(path, registry.what, name, f", or one of {', '.join(known)}")
 
 
 def _path_of(registry: Registry, name: str) -> str:

@@ -154,16 +154,16 @@ class Compensated(Design):
         )
 
     def encode(self, layer: "Layer") -> FloatArray:
-        """Returns the genomes of numbers, ``(n, weights)``, but for rounding; see ``decode``."""
+        """Returns the genome of a layer, but for rounding; the inverse of ``decode``."""
         ones = self.decode(np.ones((1, self.weights)))
         parts = (
             layer.offset / ones.offset,
             np.log(layer.gain) / np.log(ones.gain),
-            layer.shift / ones.shift,
-            (layer.response / ones.response).reshape(len(layer.offset), -1),
+            layer.shift.reshape(ones.shift.shape) / ones.shift,
+            layer.response.reshape(ones.response.shape) / ones.response,
         )
-        genomes = np.concatenate(parts, axis=1)
-        return np.where(np.abs(genomes) < 1 + 1e-9, np.clip(genomes, -1, 1), genomes)
+        genome = np.concatenate([part.ravel() for part in parts])
+        return np.where(np.abs(genome) < 1 + 1e-9, np.clip(genome, -1, 1), genome)
 
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "CompensatedBatch":
         """Returns the batch of the layers of some genomes; see ``Design.batch``."""
