@@ -1,20 +1,11 @@
-"""Layer files: the numbers of a compensating layer by name, for the software of a robot.
-
-The comments of a file have the formula. The key ``layer`` of a policy file names one.
-"""
+"""Layer files: the numbers of a compensating layer by name, for the software of a robot."""
 
 import json
-from pathlib import Path
-from typing import Annotated
 
-import msgspec
 import numpy as np
-from msgspec import Meta, Struct
 
-from selfmodel.controllers.compensation import Compensated, Layer
+from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller
-from selfmodel.errors import InputError
-from selfmodel.files import load_toml, read_file
 
 HEADER = """\
 # A compensating layer, as selfmodel evolved it around
@@ -28,26 +19,6 @@ HEADER = """\
 # velocity_shift is added to the velocity that the controller within is commanded: m/s forward and
 #   to the left, and rad/s to the left.
 """
-
-Number = Annotated[float, Meta(gt=-1e9, lt=1e9)]
-
-
-class Motor(Struct, forbid_unknown_fields=True, frozen=True):
-    """Numbers of a motor; see ``HEADER``."""
-
-    gain: Annotated[float, Meta(gt=0, lt=1e9)]
-    offset: Number
-    neutral: Number
-    low: Number
-    high: Number
-    response: tuple[Number, ...] = ()
-
-
-class LayerFile(Struct, forbid_unknown_fields=True, frozen=True):
-    """The file."""
-
-    velocity_shift: tuple[Number, ...]
-    motors: dict[str, Motor]
 
 
 def layer_text(controller: Controller) -> str:
@@ -70,28 +41,3 @@ def layer_text(controller: Controller) -> str:
         values = ", ".join(f"{key} = {value!r}" for key, value in numbers.items())
         text += f"{json.dumps(motor)} = {{ {values} }}\n"
     return text
-
-
-def read_layer(path: Path, base: Controller) -> Controller:
-    """Returns a controller with the layer of a file around it.
-
-    Raises:
-        InputError: The file is invalid, or of other motors, or a number is larger than a layer's.
-    """
-    data = read_file(path, "a layer file", 2**20)
-    try:
-        file = msgspec.convert(load_toml(data.decode()), LayerFile)
-        rows = [file.motors[name] for name in base.design.motors]
-        responses = [one.response for one in rows if one.response]
-        design = Compensated.around(base, feedback=bool(responses))
-        layer = Layer(
-            offset=np.array([[one.offset for one in rows]]),
-            gain=np.array([[one.gain for one in rows]]),
-            shift=np.array([file.velocity_shift], dtype=np.float64),
-            response=np.array([responses], dtype=np.float64),
-        )
-        return Controller(design, design.encode(layer))
-    # No ValueError in msgspec 0.19.
-    except (ValueError, KeyError, msgspec.ValidationError) as failure:
-        what = f"the layer of {base.design.description}"
-        raise InputError(f"{path}: expected {what}: {failure}") from failure

@@ -38,7 +38,6 @@ from selfmodel.logs.controllers import (
     npz_errors,
     read_arrays,
 )
-from selfmodel.logs.layers import read_layer
 from selfmodel.robot.actuators import command_ranges, holding_commands
 from selfmodel.robot.robot import Robot
 
@@ -84,7 +83,6 @@ class PolicyFile(Section, frozen=True):
         newest_first: Whether a history begins with the newest observation; ``by_term``, whether it
             is stacked term by term.
         batched: Whether a function takes the observations of many robots, ``(n, inputs)``.
-        layer: File of a compensating layer around the policy; "" for none.
     """
 
     network: str = ""
@@ -102,7 +100,6 @@ class PolicyFile(Section, frozen=True):
     decimation: Count = 1
     period: Positive | None = None
     batched: bool = False
-    layer: str = ""
 
 
 def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
@@ -152,22 +149,6 @@ def read_policy(
             message names the file and what does not fit. Or a function cannot be imported, fails,
             or returns no action for the initial pose.
     """
-    return _read(source, robot, function)[1]
-
-
-def policy_controller(
-    source: Path | Mapping[str, Any], robot: Robot, function: Callable[[Any], Any] | None = None
-) -> Controller:
-    """Returns the controller of a policy file, with its layer; see ``read_policy``."""
-    file, policy = _read(source, robot, function)
-    controller = Controller(policy, np.zeros(policy.weights))
-    folder = source.parent if isinstance(source, Path) else Path()
-    return read_layer(folder / file.layer, controller) if file.layer else controller
-
-
-def _read(
-    source: Path | Mapping[str, Any], robot: Robot, function: Callable[[Any], Any] | None
-) -> tuple[PolicyFile, Policy]:
     what, named, path, data = "a policy file", "the policy", Path(), b""
     if isinstance(source, Path):
         named, path, data = str(source), source, read_file(source, what, 2**20)
@@ -187,7 +168,7 @@ def _read(
     except (ValueError, TrialError) as failure:
         raise InputError(f"{named} does not fit {robot.name}: {failure}") from failure
     if policy.function:
-        return file, policy
+        return policy
     # A log has it as a file of its own, and a layer around it in another.
     size = len(controller_bytes(Controller(policy, np.zeros(0))))
     if size > MAX_CONTROLLER_BYTES // 2:
@@ -195,7 +176,7 @@ def _read(
             f"{named}: expected a policy of at most {MAX_CONTROLLER_BYTES // 2} bytes in a log, "
             f"got {size}: export a smaller network"
         )
-    return file, policy
+    return policy
 
 
 def _network(
@@ -207,7 +188,8 @@ def _network(
         function = imported(name, "function")
     if function is not None:
         check_function(name or "a policy", function)
-        return Function(name or name_of(function), function, 0, file.batched)
+        name = name if ":" in name else name_of(function)
+        return Function(name, function, 0, file.batched)
     if not name or Path(name).name != name:
         raise InputError(
             f"{named}: expected a network beside this file, or package.module:function, got "

@@ -18,7 +18,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.files import path_of
 from selfmodel.logs import export, physical_trial
-from selfmodel.logs.files import make_folder, refuse_existing, replace_file
+from selfmodel.logs.files import create_file, make_folder
 from selfmodel.logs.journal import create_journal
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
@@ -364,9 +364,8 @@ def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Pat
 
     Args:
         diagnosis: The diagnosis.
-        robot: The self-model: a robot, its name, or the path of its MJCF or URDF file.
-        folder: Folder for ``model.xml``, the robot with the best hypothesis, and ``status.json``;
-            made if it is missing.
+        robot: The self-model, its name, or the path of its MJCF or URDF file.
+        folder: Folder, made if it is missing, for ``model.xml`` and ``status.json``.
 
     Raises:
         InputError: The folder has such a file.
@@ -374,11 +373,10 @@ def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Pat
     check_type(diagnosis, Diagnosis, "a Diagnosis")
     files = export.files_of(diagnosis, arguments.load_robot(robot))
     folder = path_of(folder, "a folder")
-    for name in files:
-        refuse_existing(folder / name)
     make_folder(folder)
     for name, data in files.items():
-        replace_file(folder / name, data)
+        with create_file(folder / name) as file:
+            file.write(data)
     return folder
 
 

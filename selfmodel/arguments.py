@@ -411,11 +411,11 @@ def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Con
         InputError: The file contains no controller, or one that does not fit.
     """
     if path.suffix.lower() == ".toml":
-        from selfmodel.logs.policies import policy_controller  # noqa: PLC0415  # few robots have one
+        from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one
 
-        controller = policy_controller(path, robot)
-        _check_neurons(path, controller.design, neurons)
-        return controller
+        policy = read_policy(path, robot)
+        _check_neurons(path, policy, neurons)
+        return Controller(policy, np.zeros(policy.weights))
     with _log_errors_as_input_errors():
         is_log = path.suffix.lower() == ".mcap"
         loaded = read_log(path).trial.plan.controller if is_log else load_controller(path)

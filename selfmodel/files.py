@@ -33,11 +33,9 @@ def search_here() -> None:
 
 
 def imported(path: str, what: str, name: str = "", others: str = "") -> Any:  # noqa: ANN401  # any object
-    """Returns the object that ``package.module:object`` names, importable from here.
+    """Returns the object that ``package.module:object`` names, or raises ``InputError``.
 
-    Raises:
-        InputError: It cannot be imported; the message has what it is, the name that was given for
-            the path, and the end ``others``.
+    The message has what it is, the name that was given for the path, and the end ``others``.
     """
     search_here()
     module, _, attribute = path.partition(":")

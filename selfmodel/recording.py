@@ -235,10 +235,10 @@ def load_policy(
         InputError: A file is invalid, the policy does not fit the robot, or the function fails, or
             returns no action for the initial pose.
     """
-    from selfmodel.logs.policies import policy_controller  # noqa: PLC0415  # few robots have one
+    from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one
 
     given = source if isinstance(source, Mapping) else path_of(source, "a policy file")
-    return policy_controller(given, arguments.load_robot(robot), function)
+    return Controller(read_policy(given, arguments.load_robot(robot), function), np.zeros(0))
 
 
 def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:

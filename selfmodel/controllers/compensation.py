@@ -153,18 +153,6 @@ class Compensated(Design):
             * response.reshape(len(genomes), felt, RESPONSES),
         )
 
-    def encode(self, layer: "Layer") -> FloatArray:
-        """Returns the genome of a layer, but for rounding; the inverse of ``decode``."""
-        ones = self.decode(np.ones((1, self.weights)))
-        parts = (
-            layer.offset / ones.offset,
-            np.log(layer.gain) / np.log(ones.gain),
-            layer.shift.reshape(ones.shift.shape) / ones.shift,
-            layer.response.reshape(ones.response.shape) / ones.response,
-        )
-        genome = np.concatenate([part.ravel() for part in parts])
-        return np.where(np.abs(genome) < 1 + 1e-9, np.clip(genome, -1, 1), genome)
-
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "CompensatedBatch":
         """Returns the batch of the layers of some genomes; see ``Design.batch``."""
         within = self.base.design.batch(np.tile(self.base.genome, (len(genomes), 1)), silent)

@@ -13,15 +13,13 @@ from selfmodel.errors import TrialError
 
 @dataclass(frozen=True)
 class Function:
-    """A function of an observation; it is called for one robot after another.
+    """A function of an observation, without a state: a search simulates many robots with it.
 
     Attributes:
         name: ``package.module:function``, or another name for error messages.
-        function: From an observation, ``(inputs,)``, to an action, ``(outputs,)``; if it is
-            batched, from ``(n, inputs)`` to ``(n, outputs)``. It must have no state: search
-            simulates many robots with it.
+        function: From ``(inputs,)`` to ``(outputs,)``; a batched one from ``(n, inputs)``.
         outputs: Numbers of an action.
-        batched: Whether it is called once for all robots.
+        batched: Whether it is called once for all robots, and not for one after another.
     """
 
     name: str
@@ -39,11 +37,7 @@ class Function:
     def step(
         self, rows: FloatArray, states: Sequence[FloatArray]
     ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Returns the action of each observation; NaN for one of a simulation that diverged.
-
-        Raises:
-            TrialError: The function fails, or returns anything but numbers of an action.
-        """
+        """Returns the action of each observation, as ``called``; NaN for one that is not finite."""
         actions = np.full((len(rows), self.outputs), np.nan)
         sound = np.flatnonzero(np.isfinite(rows).all(axis=1))
         if self.batched and len(sound):
@@ -56,12 +50,7 @@ class Function:
         return actions, tuple(states)
 
     def check(self, observation: FloatArray) -> None:
-        """Checks that an observation, ``(inputs,)``, has one finite action.
-
-        Raises:
-            TrialError: The function fails, or returns anything but finite numbers of an action, or
-                others for the same observation.
-        """
+        """Raises ``TrialError`` unless an observation, ``(inputs,)``, has one finite action."""
         shape = (1, self.outputs) if self.batched else (self.outputs,)
         given = observation[np.newaxis] if self.batched else observation
         first = called(self.name, self.function, given.copy(), shape, finite=True).ravel()

@@ -72,9 +72,7 @@ def _compiled(
 
 
 MIN_MASS = 1e-9
-"""Mass, kg, and moments of inertia, kg m^2, of a detached body in an MJCF, which has to have some.
-"""
-
+"""Mass, kg, and moments of inertia, kg m^2, of a detached body in an MJCF: 0 is refused."""
 
 _FLAGS = (
     ("geoms", "geom_", {k: k for k in ("contype", "conaffinity", "condim", "priority")}),

@@ -8,24 +8,15 @@ import pytest
 
 from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.controllers.cpg import Cpg
-from selfmodel.errors import InputError
-from selfmodel.logs.layers import layer_text, read_layer
 from selfmodel.logs.physical_trial import TrialRunner
-from selfmodel.logs.policies import policy_controller
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.policies import (
-    MOTORS,
     POLICY as POLICY_TEXT,
-    RANGES,
-    SENSORS,
-    policy,
     policy_of,
-    save_policy,
 )
 
 
@@ -72,46 +63,3 @@ def test_the_formula_on_a_recorded_trial_gives_its_commands(
         found = applied(layer, quadruped.anatomy.motors, within[0], np.array(felt))
         np.testing.assert_allclose(found, logged["commands"][k], rtol=0, atol=1e-12)
     assert np.ptp(logged["commands"], axis=0).min() > 0.01
-
-
-@pytest.mark.parametrize("base", [policy(), Cpg(SENSORS, MOTORS, 0.02, ranges=RANGES)])
-@pytest.mark.parametrize("feedback", [False, True])
-def test_a_layer_comes_back_from_its_file(tmp_path: Path, base: Design, *, feedback: bool):
-    before, path = layered(base, feedback=feedback), tmp_path / "layer.toml"
-    path.write_text(layer_text(before))
-    after = read_layer(path, before.design.base)
-
-    assert after.design == before.design
-    np.testing.assert_allclose(after.genome, before.genome, rtol=0, atol=1e-12)
-    assert "own - neutral) * (gain - 1)" in path.read_text()
-
-
-def test_a_policy_file_names_a_layer(tmp_path: Path, quadruped: Robot):
-    base = policy_of(tmp_path, quadruped)
-    before = layered(base.design)
-    (tmp_path / "layer.toml").write_text(layer_text(before))
-    path = save_policy(tmp_path, quadruped, 'layer = "layer.toml"\n' + POLICY_TEXT)
-    after = policy_controller(path, quadruped)
-
-    assert after.design == before.design
-    np.testing.assert_allclose(after.genome, before.genome, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "match"),
-    [
-        ('"hip"', '"hop"', "'hip'"),
-        ("response = [", "response = [1.0, ", "inhomogeneous|reshape"),
-        ("velocity_shift = [", "velocity_shift = [0.0, ", "reshape"),
-        ("gain = ", "gain = -", "Expected `float` > 0"),
-        ("gain = ", "gain = 90", r"every weight must lie in \[-1, 1\]"),
-        ("offset", "ofset", "unknown field `ofset`|missing required field `offset`"),
-    ],
-)
-def test_an_altered_layer_file_is_refused(tmp_path: Path, old: str, new: str, match: str):
-    before, path = layered(policy()), tmp_path / "layer.toml"
-    header, numbers = layer_text(before).split("\n\n", 1)
-    assert old in numbers
-    path.write_text(f"{header}\n\n{numbers.replace(old, new, 1)}")
-    with pytest.raises(InputError, match=rf"layer\.toml: expected the layer of .*{match}"):
-        read_layer(path, before.design.base)
