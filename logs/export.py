@@ -16,10 +16,8 @@ MODEL, STATUS = "model.xml", "status.json"
 """The robot with the best hypothesis, and what policies and training frameworks take."""
 
 LOST = (joints.BROKEN, joints.JAMMED, joints.JAMMED_AT_ANGLE, joints.MOTOR_OFF)
-"""Kinds that leave a joint without a torque that moves it."""
-
 WEAK = (joints.WEAK_MOTOR, joints.SERVO_GAIN)
-"""Kinds whose severity is the share of a motor that is left."""
+"""Kinds that leave a joint no torque, and those whose severity is the share that is left."""
 
 
 def files_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, bytes]:
@@ -39,8 +37,9 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
     rows = [[joint.name for joint in limb] for limb in limbs(anatomy)]
     rows.sort(key=lambda row: order.index(row[0]))
     within = {name for row in rows for name in row}
-    lacking = {kind for kind in (fault.kind for fault in best.faults) if not kind.affects_dynamics}
-    lacking.add(joints.ENCODER_OFFSET)
+    own = {one.kind for one in best.faults if not one.kind.affects_dynamics} | {
+        joints.ENCODER_OFFSET
+    }
     return {
         "robot": robot.name,
         "hypothesis": str(best),
@@ -48,7 +47,7 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
         "joints": rows,
         "status": [[status[name] for name in row] for row in rows],
         "other_joints": {name: status[name] for name in order if name not in within},
-        "not_in_model": [str(one) for one in best.faults if one.kind in lacking],
+        "not_in_model": [str(one) for one in best.faults if one.kind in own],
         "hypotheses": [
             {"hypothesis": str(one), "probability": diagnosis.probability.get(str(one))}
             for one in (best, *diagnosis.indistinguishable)

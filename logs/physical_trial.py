@@ -32,8 +32,6 @@ def run_trial(
         path: Name of the log; it must not exist.
         robot: Robot as its model describes it.
         header: Other content of the log's preamble; ``timed`` is taken from the physical robot.
-
-    A controller that no log holds, a function, is that of the plan.
     """
     timed = isinstance(physical, TimedRobot)
     samples = physical.run(plan.controller, plan.steps)
@@ -42,6 +40,7 @@ def run_trial(
 
 
 def _logged(path: Path, plan: TrialPlan) -> Trial:
+    """Returns the trial in a log; a function, which no log holds, is that of the plan."""
     trial = read_log(path).trial
     if isinstance(plan.controller, Controller) and plan.controller.design.function:
         trial = replace(trial, plan=plan)

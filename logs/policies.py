@@ -137,17 +137,13 @@ trains the policy."""
 def read_policy(
     source: Path | Mapping[str, Any], robot: Robot, function: Callable[[Any], Any] | None = None
 ) -> Policy:
-    """Returns the policy of a robot that a TOML file describes.
+    """Returns the policy of a robot that a TOML file describes, or its keys and values.
 
-    Args:
-        source: The file, or its keys and values.
-        robot: The robot.
-        function: Function from an observation to an action, in the place of a network.
+    A function from an observation to an action is in the place of its network, if given.
 
     Raises:
         InputError: A file cannot be read or is invalid, or the policy does not fit the robot; the
-            message names the file and what does not fit. Or a function cannot be imported, fails,
-            or returns no action for the initial pose.
+            message names the file and what does not fit. Or a function fails on the initial pose.
     """
     what, named, path, data = "a policy file", "the policy", Path(), b""
     if isinstance(source, Path):
@@ -201,12 +197,10 @@ def _network(
 def _initial_observation(policy: Policy, robot: Robot) -> FloatArray:
     """Returns what a policy observes of a robot at rest in its initial pose, ``(inputs,)``."""
     batch, model = PolicyBatch(policy, 1), robot.model
-    if (orientation := batch.observed.get("base_orientation")) is not None:
-        orientation[:, 0] = 1.0
-    if (positions := batch.observed.get("joint_positions")) is not None:
-        positions[:] = [model.qpos0[model.joint(name).qposadr[0]] for name in robot.anatomy.hinges]
-    (observation,) = batch.observation()
-    return np.asarray(observation)
+    pose = [model.qpos0[model.joint(name).qposadr[0]] for name in robot.anatomy.hinges]
+    for signal, values in batch.observed.items():
+        values[:] = {"base_orientation": [1, 0, 0, 0], "joint_positions": pose}.get(signal, [0])
+    return np.asarray(batch.observation()[0])
 
 
 def _policy(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy:

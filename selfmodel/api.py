@@ -355,9 +355,8 @@ def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Pat
 
     Example:
         >>> import selfmodel
-        >>> settings = selfmodel.Settings(generations=2).scaled(6)
-        >>> given = {"kinds": "paper", "settings": settings, "calibrate": False}
-        >>> diagnosis = selfmodel.diagnose("after.mcap", healthy="before.mcap", **given)
+        >>> small = selfmodel.Settings(generations=2).scaled(6)
+        >>> diagnosis = selfmodel.diagnose("after.mcap", kinds="paper", settings=small)
         >>> folder = selfmodel.export_diagnosis(diagnosis, "quadruped", "damaged")
         >>> sorted(path.name for path in folder.iterdir())
         ['model.xml', 'status.json']

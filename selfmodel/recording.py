@@ -232,8 +232,7 @@ def load_policy(
         function: Function from an observation to an action, in the place of the file's network.
 
     Raises:
-        InputError: A file is invalid, the policy does not fit the robot, or the function fails, or
-            returns no action for the initial pose.
+        InputError: A file is invalid, the policy does not fit the robot, or the function fails.
     """
     from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one
 

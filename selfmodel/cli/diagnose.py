@@ -57,8 +57,8 @@ def diagnose(options: Diagnose) -> None:
         seconds=perf_counter() - start,
     )
     if options.export is not None:
-        self_model = inputs.calibration.robot if inputs.calibration else robot
-        export_diagnosis(diagnosis, self_model, options.export)
+        fit = inputs.calibration
+        export_diagnosis(diagnosis, fit.robot if fit else robot, options.export)
     if options.as_json:
         print_json(values_of(result))
         return

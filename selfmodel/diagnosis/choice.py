@@ -62,9 +62,8 @@ def prepared_trial(
     driver = trial.plan.controller
     if isinstance(driver, Playback) and driver.function and not isinstance(request, Segments):
         raise TrialRefusedError(
-            f"{trial.path}: {comparator.name} simulates whole trials with the robot's controller, "
-            f"and the log has only the commands of the function {driver.function}, which do not "
-            f"react to a fault",
+            f"{trial.path}: {comparator.name} simulates whole trials, and the log has only the "
+            f"commands of the function {driver.function}, which do not react to a fault",
             "give the comparator segment-prediction",
         )
     states = (*request.states, "commands") if isinstance(request, Segments) else ()

@@ -74,22 +74,12 @@ def _compiled(
 MIN_MASS = 1e-9
 """Mass, kg, and moments of inertia, kg m^2, of a detached body in an MJCF: 0 is refused."""
 
-_FLAGS = (
-    ("geoms", "geom_", {k: k for k in ("contype", "conaffinity", "condim", "priority")}),
-    ("joints", "jnt_", {"limited": "limited"}),
-    ("tendons", "tendon_", {"limited": "limited"}),
-    ("equalities", "eq_", {"active": "active0"}),
-)
-
 
 def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
     """Returns the MJCF of a robot with the faults of a hypothesis, to six digits.
 
     Its parts are those of the robot's own, in the same order. A detached body has ``MIN_MASS``. A
     delay is the custom numeric ``CONTROL_DELAY``. Faults of readings and encoders are not in it.
-
-    Raises:
-        InputError: A fault does not apply to the model.
     """
     spec, compiled = _compiled(robot, hypothesis, 0)
     variant = apply_faults(compiled, robot.anatomy, hypothesis)
@@ -103,12 +93,16 @@ def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
         ranges[:] = np.where(ranges.any(axis=1, keepdims=True), ranges, getattr(nominal, name))
     with mujoco_errors_as_input_errors(f"write the model of {hypothesis}"):
         spec.copy_back(model)  # but for flags
-        for parts, prefix, names in _FLAGS:
-            for part in getattr(spec, parts):
-                for name, field in names.items():
-                    setattr(part, name, int(getattr(model, prefix + field)[part.id]))
-        added = added_steps(robot.control_delay, float(variant.added_delay[0]))
-        if added:
+        for geom in spec.geoms:
+            for name in ("contype", "conaffinity", "condim", "priority"):
+                setattr(geom, name, int(getattr(model, f"geom_{name}")[geom.id]))
+        for joint in spec.joints:
+            joint.limited = int(model.jnt_limited[joint.id])
+        for tendon in spec.tendons:
+            tendon.limited = int(model.tendon_limited[tendon.id])
+        for equality in spec.equalities:
+            equality.active = int(model.eq_active0[equality.id])
+        if added := added_steps(robot.control_delay, float(variant.added_delay[0])):
             write_control_delay(spec, robot.control_delay + added)
         return str(spec.to_xml())
 

@@ -114,10 +114,7 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
 
 
 def limbs(anatomy: Anatomy) -> list[tuple[Joint, ...]]:
-    """Returns the joints of each limb, the one nearest to the root body first.
-
-    Limbs with touch sensors come first.
-    """
+    """Returns the joints of each limb from the root body on; limbs with touch sensors first."""
     joints = {joint.name: joint for joint in anatomy.joints}
     beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
     ends = {name for name in joints if not beyond[name]}

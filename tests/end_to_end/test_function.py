@@ -100,7 +100,7 @@ def test_logs_of_a_function_are_diagnosed_by_their_commands_and_not_by_whole_tri
         succeeds("trial", "quadruped", *run, "--out", f"{name}.mcap", cwd=tmp_path)
     run = ("diagnose", "after.mcap", "before.mcap", *SMALL, "--no-calibrate", "--kinds", "break")
     found = printed(*run, "--json", cwd=tmp_path)
-    why = f"the log has only the commands of the function {module}:walk, which do not react"
+    why = f"commands of the function {module}:walk, which do not react"
 
     assert found["diagnosis"][0]["hypothesis"] == DAMAGE
     assert found["comparator"] == "segment-prediction"
