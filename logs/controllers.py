@@ -142,10 +142,13 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
         number = KINDS[design.name][1]
         return {number: np.array(getattr(design, number))}
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
+    from selfmodel.controllers.graph import Graph  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
 
     if isinstance(design, Policy):
         graph = design.graph
+        if not isinstance(graph, Graph):
+            raise InputError(f"no file holds the function {graph.name}: give its policy file again")
         of_graph = {name: getattr(graph, name) for name in _GRAPH}
         of_graph |= {"states": graph.states} if graph.states else {}
         content = msgspec.json.encode({**of_graph, "interface": design.interface})

@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
+from selfmodel.logs.controllers import LAYER
+from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
 from selfmodel.logs.writer import write_trial
@@ -33,7 +36,15 @@ def run_trial(
     timed = isinstance(physical, TimedRobot)
     samples = physical.run(plan.controller, plan.steps)
     write_trial(path, robot, plan, samples, replace(header, timed=timed))
-    return read_log(path).trial
+    return _logged(path, plan)
+
+
+def _logged(path: Path, plan: TrialPlan) -> Trial:
+    """Returns the trial in a log; a function, which no log holds, is that of the plan."""
+    trial = read_log(path).trial
+    if isinstance(plan.controller, Controller) and plan.controller.design.function:
+        trial = replace(trial, plan=plan)
+    return trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +69,16 @@ class TrialRunner:
     def __call__(self, physical: PhysicalRobot, plan: TrialPlan) -> Trial:
         """Runs a physical trial; see ``run_trial``.
 
+        The numbers of a compensating layer are in a file beside the log, ``NAME.toml``.
+
         A trial that the robot could not finish, such as after an emergency stop, is returned as far
         as it went.
         """
-        path = self.folder / f"{checked_name(plan.name)}.mcap"
+        path, driver = self.folder / f"{checked_name(plan.name)}.mcap", plan.controller
+        if isinstance(driver, Controller) and driver.design.name == LAYER and driver.genome.any():
+            from selfmodel.logs.layers import layer_text  # noqa: PLC0415  # few trials have one
+
+            replace_file(path.with_suffix(".toml"), layer_text(driver).encode())
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
         try:
             return run_trial(physical, plan, path, self.robot, header)
@@ -71,7 +88,7 @@ class TrialRunner:
             unsafe = isinstance(error, HangError) or bool(getattr(error, "__notes__", ()))
             if unsafe or plan.stage == "before" or not path.exists():
                 raise
-            trial = read_log(path).trial
+            trial = _logged(path, plan)
             if trial.trajectory.steps < MIN_STEPS:
                 raise
             return trial

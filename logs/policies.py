@@ -2,7 +2,7 @@
 
 ::
 
-    network = "policy.onnx"        # beside this file; or an .npz of layers
+    network = "policy.onnx"        # beside this file; or an .npz of layers, or "module:function"
     preset = "mujoco_playground"   # terms and action of a framework; a key below replaces its own
     velocity = [1.0, 0.0, 0.0]     # commanded: forward, to the left, m/s; turn to the left, rad/s
     joints = ["FR_hip_joint"]      # in the order of the network; the robot's by default
@@ -15,7 +15,8 @@
     scale = 0.5
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -26,10 +27,11 @@ from msgspec import Meta, Struct
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.function import Function, name_of
 from selfmodel.controllers.graph import Graph, Node, State, layers
-from selfmodel.controllers.policy import Action, Interface, Policy, Term
-from selfmodel.errors import InputError, unknown_name
-from selfmodel.files import load_toml, read_file
+from selfmodel.controllers.policy import Action, Interface, Policy, PolicyBatch, Term
+from selfmodel.errors import InputError, TrialError, check_function, unknown_name
+from selfmodel.files import imported, load_toml, read_file
 from selfmodel.logs.controllers import (
     MAX_CONTROLLER_BYTES,
     controller_bytes,
@@ -73,15 +75,17 @@ class PolicyFile(Section, frozen=True):
     """The file; see ``selfmodel.controllers.policy.Policy``.
 
     Attributes:
-        network: File of the network beside this one, ``.onnx`` or ``.npz``.
+        network: File of the network beside this one, ``.onnx`` or ``.npz``, or the name of a
+            function, ``package.module:function``; "" for one that is given beside the file.
         preset: Key of ``PRESETS``.
         activation: Operator between the layers of an ``.npz``, ``last`` that after them.
         pose: Positions of ``joints`` that count as 0, rad; the initial pose by default.
         newest_first: Whether a history begins with the newest observation; ``by_term``, whether it
             is stacked term by term.
+        batched: Whether a function takes the observations of many robots, ``(n, inputs)``.
     """
 
-    network: str
+    network: str = ""
     preset: str = ""
     activation: str = "Elu"
     last: str = "Identity"
@@ -95,6 +99,7 @@ class PolicyFile(Section, frozen=True):
     newest_first: bool = False
     decimation: Count = 1
     period: Positive | None = None
+    batched: bool = False
 
 
 def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
@@ -129,42 +134,76 @@ PRESETS: Mapping[str, tuple[tuple[Observed, ...], float, float]] = MappingProxyT
 trains the policy."""
 
 
-def read_policy(path: Path, robot: Robot) -> Policy:
-    """Returns the policy of a robot that a TOML file describes.
+def read_policy(
+    source: Path | Mapping[str, Any], robot: Robot, function: Callable[[Any], Any] | None = None
+) -> Policy:
+    """Returns the policy of a robot that a TOML file describes, or its keys and values.
+
+    A function from an observation to an action is in the place of its network, if given.
 
     Raises:
         InputError: A file cannot be read or is invalid, or the policy does not fit the robot; the
-            message names the file and what does not fit.
+            message names the file and what does not fit. Or a function fails on the initial pose.
     """
-    what = "a policy file"
-    data = read_file(path, what, 2**20)
+    what, named, path, data = "a policy file", "the policy", Path(), b""
+    if isinstance(source, Path):
+        named, path, data = str(source), source, read_file(source, what, 2**20)
     try:
-        file = msgspec.convert(load_toml(data.decode()), PolicyFile)
+        keys = load_toml(data.decode()) if isinstance(source, Path) else source
+        file = msgspec.convert(keys, PolicyFile)
     # No ValueError in msgspec 0.19.
     except (ValueError, msgspec.ValidationError) as failure:
-        raise InputError(f"{path}: expected {what} as TOML: {failure}") from failure
+        raise InputError(f"{named}: expected {what} as TOML: {failure}") from failure
     if file.preset and file.preset not in PRESETS:
-        raise InputError(f"{path}: {unknown_name('preset', file.preset, PRESETS)}")
-    if not file.network or Path(file.network).name != file.network:
-        raise InputError(
-            f"{path}: expected a network beside this file, got {file.network!r}: copy it here"
-        )
-    graph = read_network(path.parent / file.network, file.activation, file.last)
+        raise InputError(f"{named}: {unknown_name('preset', file.preset, PRESETS)}")
+    graph = _network(file, path.parent, named, function)
     try:
         policy = _policy(file, graph, robot)
-    except ValueError as failure:
-        raise InputError(f"{path} does not fit {robot.name}: {failure}") from failure
+        if isinstance(policy.graph, Function):
+            policy.graph.check(_initial_observation(policy, robot))
+    except (ValueError, TrialError) as failure:
+        raise InputError(f"{named} does not fit {robot.name}: {failure}") from failure
+    if policy.function:
+        return policy
     # A log has it as a file of its own, and a layer around it in another.
     size = len(controller_bytes(Controller(policy, np.zeros(0))))
     if size > MAX_CONTROLLER_BYTES // 2:
         raise InputError(
-            f"{path}: expected a policy of at most {MAX_CONTROLLER_BYTES // 2} bytes in a log, got "
-            f"{size}: export a smaller network"
+            f"{named}: expected a policy of at most {MAX_CONTROLLER_BYTES // 2} bytes in a log, "
+            f"got {size}: export a smaller network"
         )
     return policy
 
 
-def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
+def _network(
+    file: PolicyFile, folder: Path, named: str, function: Callable[[Any], Any] | None
+) -> Graph | Function:
+    """Returns the network of a policy, or its function, without the number of outputs."""
+    name = file.network
+    if function is None and ":" in name:
+        function = imported(name, "function")
+    if function is not None:
+        check_function(name or "a policy", function)
+        name = name if ":" in name else name_of(function)
+        return Function(name, function, 0, file.batched)
+    if not name or Path(name).name != name:
+        raise InputError(
+            f"{named}: expected a network beside this file, or package.module:function, got "
+            f"{name!r}: copy it here"
+        )
+    return read_network(folder / name, file.activation, file.last)
+
+
+def _initial_observation(policy: Policy, robot: Robot) -> FloatArray:
+    """Returns what a policy observes of a robot at rest in its initial pose, ``(inputs,)``."""
+    batch, model = PolicyBatch(policy, 1), robot.model
+    pose = [model.qpos0[model.joint(name).qposadr[0]] for name in robot.anatomy.hinges]
+    for signal, values in batch.observed.items():
+        values[:] = {"base_orientation": [1, 0, 0, 0], "joint_positions": pose}.get(signal, [0])
+    return np.asarray(batch.observation()[0])
+
+
+def _policy(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy:
     names, model = robot.anatomy.names, robot.model
     terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
     action = file.action
@@ -173,6 +212,8 @@ def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
         for name in chosen:
             if name not in known:
                 raise unknown_name(what, name, known)
+    if isinstance(graph, Function):
+        graph = replace(graph, outputs=len(motors))
     holding = dict(zip(names.motors, holding_commands(model).tolist(), strict=True))
     initial = [float(model.qpos0[model.joint(name).qposadr[0]]) for name in joints]
     given = scale if action.scale is None else action.scale

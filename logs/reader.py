@@ -122,7 +122,9 @@ def interpret(contents: Contents) -> TrialLog:
     if timing is not None:
         trajectory = replace(trajectory, late=timing.late)
     with contents.mismatch("it has no controller, and cannot be played back"):
-        driver = controller or played_back(trajectory.names.motors, trajectory["commands"])
+        driver = controller or played_back(
+            trajectory.names.motors, trajectory["commands"], record.function
+        )
     plan = TrialPlan(record.name, record.stage, driver, record.steps, record.seed)
     acceleration = None
     if IMU in contents.topics:

@@ -84,6 +84,7 @@ class TrialRecord(Struct, frozen=True, omit_defaults=True):
         model_sha256: SHA-256 of the attached model.
         motors: Names of the motors, as JSON, if ``/joint_commands`` has the names of the joints
             that they drive; "" if it has theirs.
+        function: Name of the function of Python that controlled the robot; "" if none did.
     """
 
     format: Text
@@ -97,6 +98,7 @@ class TrialRecord(Struct, frozen=True, omit_defaults=True):
     controller_sha256: Text
     model_sha256: Text
     motors: str = ""
+    function: Text = ""
 
 
 class ResultRecord(Struct, frozen=True, omit_defaults=True):

@@ -269,7 +269,8 @@ def _stop_reason(error: BaseException) -> str:
 def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:
     """Writes the records, attachments and robot description that precede the first step."""
     driver = plan.controller
-    controller = b"" if isinstance(driver, Playback) else controller_bytes(driver)
+    of = driver.function if isinstance(driver, Playback) else driver.design.function
+    controller = b"" if isinstance(driver, Playback) or of else controller_bytes(driver)
     model = robot.mjcf.encode()
     motors, driven = robot.anatomy.motors, driven_names(robot.model)
     record = records.TrialRecord(
@@ -284,6 +285,7 @@ def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHe
         controller_sha256=records.sha256(controller) if controller else "",
         model_sha256=records.sha256(model),
         motors="" if driven == motors else json.dumps(motors),
+        function=of,
     )
     software = {
         "selfmodel": __version__,

@@ -2,6 +2,7 @@ from .api import (
     calibrate as calibrate,
     diagnose as diagnose,
     evolve_controller as evolve_controller,
+    export_diagnosis as export_diagnosis,
     recover as recover,
     replay as replay,
 )
@@ -18,6 +19,7 @@ from .physical.interface import PhysicalRobot as PhysicalRobot
 from .recording import (
     Episode as Episode,
     evaluate as evaluate,
+    load_policy as load_policy,
     record as record,
     run_trial as run_trial,
     simulated_robot as simulated_robot,

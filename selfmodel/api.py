@@ -17,6 +17,8 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.files import path_of
+from selfmodel.logs import export
+from selfmodel.logs.files import create_file, make_folder
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.progress import Progress, ignore, timed
 from selfmodel.recovery import recover as recovery_loop
@@ -341,6 +343,35 @@ def recover(
         repair_settings=repair_settings,
     )
     return run_recovery(experiment, healthy, damaged, on_event)
+
+
+def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Path) -> Path:
+    """Writes a diagnosis for other software into a folder, and returns the folder.
+
+    Example:
+        >>> import selfmodel
+        >>> small = selfmodel.Settings(generations=2).scaled(6)
+        >>> diagnosis = selfmodel.diagnose("after.mcap", kinds="paper", settings=small)
+        >>> folder = selfmodel.export_diagnosis(diagnosis, "quadruped", "damaged")
+        >>> sorted(path.name for path in folder.iterdir())
+        ['model.xml', 'status.json']
+
+    Args:
+        diagnosis: The diagnosis.
+        robot: The self-model, its name, or the path of its MJCF or URDF file.
+        folder: Folder, made if it is missing, for ``model.xml`` and ``status.json``.
+
+    Raises:
+        InputError: The folder has such a file.
+    """
+    check_type(diagnosis, Diagnosis, "a Diagnosis")
+    files = export.files_of(diagnosis, arguments.load_robot(robot))
+    folder = path_of(folder, "a folder")
+    make_folder(folder)
+    for name, data in files.items():
+        with create_file(folder / name) as file:
+            file.write(data)
+    return folder
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """Files that a user names: bounded reading, digests, and writing that is complete or absent."""
 
 import hashlib
+import importlib
 import os
 import re
 import secrets
@@ -29,6 +30,24 @@ def search_here() -> None:
     """
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)
+
+
+def imported(path: str, what: str, name: str = "", others: str = "") -> Any:  # noqa: ANN401  # any object
+    """Returns the object that ``package.module:object`` names, or raises ``InputError``.
+
+    The message has what it is, the name that was given for the path, and the end ``others``.
+    """
+    search_here()
+    module, _, attribute = path.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
+        moved = isinstance(error, ImportError) and (error.name or "").startswith("selfmodel")
+        hint = "; it was written for selfmodel 0.1, whose modules have moved: see the changelog"
+        raise InputError(
+            f"cannot find the {what} {name or path!r}: {error}{hint if moved else ''}; expected "
+            f"package.module:object, importable from here{others}"
+        ) from error
 
 
 def read_file(path: Path, what: str, limit: int) -> bytes:

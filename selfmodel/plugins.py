@@ -3,7 +3,6 @@
 A plug-in is an entry point of an installed package, or ``package.module:object``.
 """
 
-import importlib
 import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from selfmodel.errors import InputError, check_type, items_of, unknown_name
 from selfmodel.evolution import Evolution
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
-from selfmodel.files import search_here
+from selfmodel.files import imported
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
@@ -370,7 +369,7 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
         InputError: The name is unknown, or its object is no function.
     """
     registry = REGISTRIES[parameter]
-    found = _found(parameter, source) if isinstance(source, str) else source
+    found: object = _found(parameter, source) if isinstance(source, str) else source
     try:
         signature(found).bind(*registry.takes)  # type: ignore[arg-type]  # it raises TypeError
     except (TypeError, ValueError) as error:
@@ -404,19 +403,10 @@ def _found(parameter: str, name: str) -> object:
     if own is not None:
         return own
     known = dict.fromkeys([*registry.known, *sorted(entry_points(group=registry.group).names)])
-    module, colon, attribute = _path_of(registry, name).partition(":")
-    if not colon:
+    path = _path_of(registry, name)
+    if ":" not in path:
         raise unknown_name(registry.what, name, known)
-    search_here()
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError) as error:
-        moved = isinstance(error, ImportError) and (error.name or "").startswith("selfmodel")
-        hint = "; it was written for selfmodel 0.1, whose modules have moved: see the changelog"
-        raise InputError(
-            f"cannot find the {registry.what} {name!r}: {error}{hint if moved else ''}; expected "
-            f"package.module:object, importable from here, or one of {', '.join(known)}"
-        ) from error
+    return imported(path, registry.what, name, f", or one of {', '.join(known)}")
 
 
 def _path_of(registry: Registry, name: str) -> str:

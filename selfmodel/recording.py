@@ -1,5 +1,6 @@
 """Physical trials: a robot that runs and is logged, a trial as a log, a robot in simulation."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,9 @@ import numpy as np
 
 from selfmodel import arguments, plugins
 from selfmodel.arguments import RobotSource, TrialSource
-from selfmodel.controllers.controller import CommandSource
+from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import CommandSource, Controller
+from selfmodel.controllers.function import name_of
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import TrialError, check_type, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -16,10 +19,10 @@ from selfmodel.files import path_of
 from selfmodel.logs import physical_trial
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import write_trial
-from selfmodel.physical.environment import Observe
+from selfmodel.physical.environment import Observe, Policy
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.physical.simulated import SimulatedRobot
-from selfmodel.physical.stepped import Policy, Stepped
+from selfmodel.physical.stepped import Stepped
 from selfmodel.recovery.falls import fall_of
 from selfmodel.recovery.scores import UPRIGHT, Score
 from selfmodel.robot.robot import Robot
@@ -95,7 +98,7 @@ def record(
         >>> given = {"robot": "quadruped", "steps": 60}
         >>> trial = selfmodel.record(env, lambda _: [0.1] * 8, "new.mcap", **given)
         >>> trial.plan.controller.summary
-        'other software; its commands are played back'
+        'the function <lambda>; its commands are played back'
 
     Args:
         env: A ``dm_env`` or Gymnasium environment, whose actions are the motor targets in the order
@@ -204,10 +207,38 @@ def _policy_of(
     """Returns the source of the commands of a trial, and the function that is in its place."""
     if callable(policy):
         motors = robot.anatomy.motors
-        return Playback(motors, np.zeros((1, len(motors)))), policy
+        return Playback(motors, np.zeros((1, len(motors))), name_of(policy)), policy
     if isinstance(policy, Playback):
         return policy, None
     return arguments.controller_of(policy, robot), None
+
+
+def load_policy(
+    source: str | Path | Mapping[str, Any],
+    robot: RobotSource,
+    function: Callable[[FloatArray], Any] | None = None,
+) -> Controller:
+    """Returns a trained policy, or a function of Python, as the controller of a robot.
+
+    Example:
+        >>> import selfmodel
+        >>> terms = [{"term": "gravity"}, {"term": "joint_positions"}]
+        >>> lean = lambda seen: 0.3 * seen[0] - seen[3:]
+        >>> selfmodel.load_policy({"observation": terms}, "quadruped", lean)
+        <Controller: a policy of 11 observations, 8 motors and the function <lambda>>
+
+    Args:
+        source: Path of the policy file, or its keys and values.
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+        function: Function from an observation to an action, in the place of the file's network.
+
+    Raises:
+        InputError: A file is invalid, the policy does not fit the robot, or the function fails.
+    """
+    from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one
+
+    given = source if isinstance(source, Mapping) else path_of(source, "a policy file")
+    return Controller(read_policy(given, arguments.load_robot(robot), function), np.zeros(0))
 
 
 def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:

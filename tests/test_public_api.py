@@ -23,7 +23,7 @@ PUBLIC = {
     *("write_log", "record", "evaluate", "Episode", "Study", "load"),
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "check_score", "check_next_trial"),
-    *("check_design", "check_search", "__version__"),
+    *("check_design", "check_search", "load_policy", "export_diagnosis", "__version__"),
 }
 
 LOGS = ROOT / "tests" / "data" / "logs-0.1" / "recovery" / "trials"

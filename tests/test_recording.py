@@ -100,8 +100,14 @@ def test_the_log_of_an_episode_that_ends_early_is_whole(tmp_path: Path):
         ({"robot": WALKER}, "steps of 0.01 s, and suite-walker-walk of 0.025 s"),
         ({"robot": "hexapod"}, "another body than hexapod .*: give the robot of this body"),
         ({"policy": 5}, "expected the path of a controller, or a Controller, got .* int"),
-        ({"policy": lambda _: [0.1]}, r"targets of the 8 motors of quadruped .* got \[0.1\]"),
-        ({"policy": lambda _: "left"}, "as an action of the policy, got 'left'"),
+        (
+            {"policy": lambda _: [0.1]},
+            r"<lambda> returns the shape \(1,\), expected \(8,\)",
+        ),
+        (
+            {"policy": lambda _: "left"},
+            "<lambda> failed: ValueError: .*'left'; the motors are",
+        ),
         ({"score": "uprigt"}, "unknown score 'uprigt': did you mean upright"),
         ({"episodes": 0}, "of 1 or above as episodes, got 0"),
         ({"steps": 0.5}, "of 2 or above as steps, got 0.5"),

@@ -194,6 +194,7 @@ class Diagnose(FromLogs):
     """
 
     files: list[Path]
+    export: Path | None = None
 
 
 class ReplayTrial(Simulated):

@@ -6,7 +6,7 @@ from pathlib import Path
 from time import perf_counter
 
 from selfmodel import arguments, plugins
-from selfmodel.api import LogDiagnosis, set_up_diagnosis
+from selfmodel.api import LogDiagnosis, export_diagnosis, set_up_diagnosis
 from selfmodel.cli.commands import Diagnose, FromLogs
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
@@ -18,6 +18,8 @@ from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.errors import counted
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
+from selfmodel.logs.export import STATUS
+from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
@@ -27,6 +29,8 @@ from selfmodel.trials.trial import by_stage, trial_names
 def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
+    if options.export is not None:
+        refuse_existing(options.export / STATUS)
     explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)
     evidence = direct_evidence(
         diagnosis.explained(inputs.damaged), robot.anatomy, trial_names(inputs.damaged)
@@ -52,6 +56,9 @@ def diagnose(options: Diagnose) -> None:
         distinct_hypotheses=inputs.search.distinct_hypotheses,
         seconds=perf_counter() - start,
     )
+    if options.export is not None:
+        fit = inputs.calibration
+        export_diagnosis(diagnosis, fit.robot if fit else robot, options.export)
     if options.as_json:
         print_json(values_of(result))
         return
@@ -67,6 +74,7 @@ def diagnose(options: Diagnose) -> None:
         *text.detectable_sentences(diagnosis),
         *text.evidence_sentences(evidence),
         *(f"from before the failure, not explained: {Path(one.path)}" for one in inputs.healthy),
+        *([f"For other software: {options.export}"] if options.export else []),
     )
 
 

@@ -99,6 +99,11 @@ class Compensated(Design):
         return self.base.design.neutral
 
     @property
+    def function(self) -> str:
+        """That of the controller within."""
+        return self.base.design.function
+
+    @property
     def velocity(self) -> tuple[float, ...] | None:
         """That of the controller within, without a shift."""
         return self.base.design.velocity

@@ -103,6 +103,11 @@ class Design(ABC):
         return tuple(centre for centre, _ in self.ranges)
 
     @property
+    def function(self) -> str:
+        """Name of the function of Python within, which no file holds; "" without one."""
+        return ""
+
+    @property
     def velocity(self) -> tuple[float, ...] | None:
         """Velocity that it is commanded, ``(3,)``; None if it is commanded none."""
         return None

@@ -16,6 +16,8 @@ class Playback:
         motors: Names of the motors, in order.
         commands: ``(steps, motors)``, each in its motor's unit. The last command is held after the
             end of the recording.
+        function: Name of the function of the robot's observations that gave the commands; "" if
+            none is known.
 
     Raises:
         ValueError: The commands have another shape or no rows, or a command is not finite.
@@ -23,6 +25,7 @@ class Playback:
 
     motors: tuple[str, ...]
     commands: FloatArray
+    function: str = ""
 
     def __post_init__(self) -> None:
         if self.commands.shape[1:] != (len(self.motors),) or not len(self.commands):
@@ -44,22 +47,23 @@ class Playback:
         return hash(self._key)
 
     @property
-    def _key(self) -> tuple[tuple[str, ...], bytes]:
-        return self.motors, self.commands.tobytes()
+    def _key(self) -> tuple[tuple[str, ...], bytes, str]:
+        return self.motors, self.commands.tobytes(), self.function
 
     @property
     def summary(self) -> str:
         """Short description, for the contents of a log."""
-        return "other software; its commands are played back"
+        who = f"the function {self.function}" if self.function else "other software"
+        return f"{who}; its commands are played back"
 
 
-def played_back(motors: tuple[str, ...], commands: FloatArray) -> Playback:
+def played_back(motors: tuple[str, ...], commands: FloatArray, function: str = "") -> Playback:
     """Returns the playback of a recording, with the command before each missing one, a NaN.
 
     Raises:
         ValueError: A command of the first step is missing.
     """
-    return Playback(motors, held(commands))
+    return Playback(motors, held(commands), function)
 
 
 class PlaybackBatch:

@@ -16,6 +16,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Design
+from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
 from selfmodel.rotation import directions, rotated
 
@@ -139,7 +140,7 @@ class Interface:
 
 @dataclass(frozen=True)
 class Policy(Design):
-    """A trained network with what it observes and what it commands; its genome is empty.
+    """A trained network, or a function, with what it observes and commands; its genome is empty.
 
     Raises:
         ValueError: The network does not have as many inputs or outputs as the terms and the motors
@@ -148,7 +149,7 @@ class Policy(Design):
 
     name: ClassVar[str] = "policy"
 
-    graph: Graph = field(kw_only=True)
+    graph: Graph | Function = field(kw_only=True)
     interface: Interface = field(kw_only=True)
 
     def __post_init__(self) -> None:
@@ -196,14 +197,19 @@ class Policy(Design):
             raise ValueError(
                 f"the network has {self.graph.outputs} outputs, and there are {motors} motors"
             )
-        size = own.history * sum(self.width(term.name) for term in own.terms)
-        if self.graph.inputs != size:
+        size = self.inputs
+        if isinstance(self.graph, Graph) and self.graph.inputs != size:
             widths = ", ".join(f"{term.name} {self.width(term.name)}" for term in own.terms)
             times = f", {own.history} times" if own.history > 1 else ""
             raise ValueError(
                 f"the network has {self.graph.inputs} inputs, and its terms {size} ({widths}"
                 f"{times})"
             )
+
+    @property
+    def inputs(self) -> int:
+        """Numbers of an observation."""
+        return self.interface.history * sum(self.width(term.name) for term in self.interface.terms)
 
     def width(self, term: str) -> int:
         """Numbers of a term."""
@@ -245,13 +251,20 @@ class Policy(Design):
     def description(self) -> str:
         """Numbers of observations, motors and weights as text."""
         graph, motors = self.graph, len(self.interface.action.motors)
-        return (
-            f"a policy of {graph.inputs} observations, {motors} motors and {graph.weights} weights"
+        of = (
+            f"{graph.weights} weights" if isinstance(graph, Graph) else f"the function {graph.name}"
         )
+        return f"a policy of {self.inputs} observations, {motors} motors and {of}"
 
     def summary(self, _genome: FloatArray) -> str:
-        """Returns the description, with a part of the digest of the network."""
-        return f"{self.description}, {self.graph.digest[:8]}"
+        """Returns the description, with a part of the digest of a network."""
+        part = f", {self.graph.digest[:8]}" if isinstance(self.graph, Graph) else ""
+        return f"{self.description}{part}"
+
+    @property
+    def function(self) -> str:
+        """Name of the function that is in the place of a network."""
+        return self.graph.name if isinstance(self.graph, Function) else ""
 
     def batch(self, genomes: FloatArray, _silent: Sequence[AbstractSet[int]]) -> "PolicyBatch":
         """Returns the batch of as many copies as there are genomes; see ``Design.batch``."""
@@ -294,7 +307,7 @@ class PolicyBatch:
         """Writes the commands of the next control step; see ``ControllerBatch``."""
         own = self._interface
         if self._step % own.decimation == 0:
-            output, self._states = self._graph.step(self._observation(), self._states)
+            output, self._states = self._graph.step(self.observation(), self._states)
             most = math.inf if own.action.clip is None else own.action.clip
             self._output = np.clip(output, -most, most)
         targets[:] = own.holding
@@ -302,8 +315,8 @@ class PolicyBatch:
         np.clip(targets, self._low, self._high, out=targets)
         self._step += 1
 
-    def _observation(self) -> FloatArray:
-        """Returns the input of the network, ``(n, inputs)``."""
+    def observation(self) -> FloatArray:
+        """Returns the input of the network, ``(n, inputs)``, of what is observed now."""
         own, last = self._interface, self._history
         newest = [
             (self._value(term.name) - offset) * scale

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import (
     Comparator,
     PiecewiseTrial,
@@ -56,6 +57,13 @@ def prepared_trial(
         raise TrialRefusedError(
             f"{comparator.name} compares the motion of the base, and the base of {robot.name} is "
             f"fixed",
+            "give the comparator segment-prediction",
+        )
+    driver = trial.plan.controller
+    if isinstance(driver, Playback) and driver.function and not isinstance(request, Segments):
+        raise TrialRefusedError(
+            f"{trial.path}: {comparator.name} simulates whole trials, and the log has only the "
+            f"commands of the function {driver.function}, which do not react to a fault",
             "give the comparator segment-prediction",
         )
     states = (*request.states, "commands") if isinstance(request, Segments) else ()

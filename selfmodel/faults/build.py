@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import mujoco
+import numpy as np
 from mujoco import MjModel, MjSpec
 
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
-from selfmodel.robot.anatomy import Anatomy, Joint
+from selfmodel.robot.anatomy import Anatomy, Joint, added_steps, write_control_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
@@ -53,16 +54,57 @@ def compile_model(
 
     The result is the robot's own model, not a copy, if the specification is not edited.
     """
-    faults = hypothesis.spec_part.faults
-    if not faults and not edits:
+    if not hypothesis.spec_part.faults and not edits:
         return robot.model
+    return _compiled(robot, hypothesis, seed, edits)[1]
+
+
+def _compiled(
+    robot: Robot, hypothesis: Hypothesis, seed: int, edits: Sequence[SpecEdit] = ()
+) -> tuple[MjSpec, MjModel]:
     spec = robot.specification()
-    for fault in faults:
+    for fault in hypothesis.spec_part.faults:
         fault.kind.edit_specification(spec, fault, seed)
     for edit in edits:
         edit(spec)
     with mujoco_errors_as_input_errors(f"compile the model of {hypothesis}"):
-        return spec.compile()
+        return spec, spec.compile()
+
+
+MIN_MASS = 1e-9
+"""Mass, kg, and moments of inertia, kg m^2, of a detached body in an MJCF: 0 is refused."""
+
+
+def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
+    """Returns the MJCF of a robot with the faults of a hypothesis, to six digits.
+
+    Its parts are those of the robot's own, in the same order. A detached body has ``MIN_MASS``. A
+    delay is the custom numeric ``CONTROL_DELAY``. Faults of readings and encoders are not in it.
+    """
+    spec, compiled = _compiled(robot, hypothesis, 0)
+    variant = apply_faults(compiled, robot.anatomy, hypothesis)
+    model, nominal = variant.model, robot.model
+    moving = compiled.body_mass > 0
+    model.body_mass[moving] = np.maximum(model.body_mass[moving], MIN_MASS)
+    model.body_inertia[moving] = np.maximum(model.body_inertia[moving], MIN_MASS)
+    # A range of 0 is refused; a motor without a gain needs none.
+    for name in ("actuator_forcerange", "jnt_actfrcrange"):
+        ranges = getattr(model, name)
+        ranges[:] = np.where(ranges.any(axis=1, keepdims=True), ranges, getattr(nominal, name))
+    with mujoco_errors_as_input_errors(f"write the model of {hypothesis}"):
+        spec.copy_back(model)  # but for flags
+        for geom in spec.geoms:
+            for name in ("contype", "conaffinity", "condim", "priority"):
+                setattr(geom, name, int(getattr(model, f"geom_{name}")[geom.id]))
+        for joint in spec.joints:
+            joint.limited = int(model.jnt_limited[joint.id])
+        for tendon in spec.tendons:
+            tendon.limited = int(model.tendon_limited[tendon.id])
+        for equality in spec.equalities:
+            equality.active = int(model.eq_active0[equality.id])
+        if added := added_steps(robot.control_delay, float(variant.added_delay[0])):
+            write_control_delay(spec, robot.control_delay + added)
+        return str(spec.to_xml())
 
 
 def apply_faults(

@@ -87,11 +87,11 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
         is_leg: Whether a limb is a leg, such as ``reaches_ground``, given its joints, the one
             nearest to the root body first.
     """
-    limbs = _limbs(anatomy)
-    limbs = [limb for limb in limbs if is_leg(limb)] or limbs
-    if not limbs:
+    every = limbs(anatomy)
+    every = [limb for limb in every if is_leg(limb)] or every
+    if not every:
         return {9: "intact", 10: "neuron:0"}
-    first, *others = limbs
+    first, *others = every
     failed = partial(_failed_sensor, anatomy)
     lost = f"break:{first[0].name}"
     # The paper jams the leg behind the detached leg, not the opposite leg.
@@ -113,19 +113,19 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
     return {number: notation for number, notation in by_number.items() if notation}
 
 
-def _limbs(anatomy: Anatomy) -> list[tuple[Joint, ...]]:
-    """Returns the joints of each limb, the one nearest to the root body first."""
+def limbs(anatomy: Anatomy) -> list[tuple[Joint, ...]]:
+    """Returns the joints of each limb from the root body on; limbs with touch sensors first."""
     joints = {joint.name: joint for joint in anatomy.joints}
     beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
     ends = {name for name in joints if not beyond[name]}
-    limbs = []
+    found = []
     for end in joints:
         if end in ends:
             # A joint with two chain ends beyond it belongs to no limb.
             chain = [one for one in joints if one == end or beyond[one] & ends == {end}]
             chain.sort(key=lambda name: -len(beyond[name]))
-            limbs.append(tuple(joints[name] for name in chain))
-    return sorted(limbs, key=lambda limb: not _failed_sensor(anatomy, "touch", limb))  # stable
+            found.append(tuple(joints[name] for name in chain))
+    return sorted(found, key=lambda limb: not _failed_sensor(anatomy, "touch", limb))  # stable
 
 
 def _failed_sensor(anatomy: Anatomy, kind: str, limb: Sequence[Joint]) -> str | None:

@@ -47,6 +47,9 @@ from selfmodel.robot.robot import Robot
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 from selfmodel.trials.trajectory import Sample, StepTiming
 
+Policy = Callable[[Any], ArrayLike]
+"""Function from an observation of an environment, as it is, to its action, the motor targets."""
+
 Observe = Callable[[Any], Mapping[str, Any] | None]
 """Function from an observation of the environment to signals by name, each ``(width,)``, with an
 optional ``time``. Absent signals and NaN count as not observed; None if there is no observation."""
@@ -135,7 +138,7 @@ class EnvironmentRobot:
     robot: Robot
     _: KW_ONLY
     observe: Observe = signals_by_name
-    policy: Callable[[Any], ArrayLike] | None = None
+    policy: Policy | None = None
     signals: Collection[Signal] = ()
     stop: Callable[[], object] | None = None
     safe: FloatArray | None = None
@@ -293,25 +296,23 @@ class EnvironmentRobot:
                     np.copyto(controllers.observed[signal][0], value, where=~np.isnan(value))
             controllers.step(commands)
             if self.policy is not None and result is not None and observation is not None:
-                commands[0] = self._targets(self.policy(result.observation))
+                commands[0] = self._targets(k, self.policy, result.observation)
             if not np.isfinite(commands).all():  # of a network that divides by 0, for example
                 raise TrialError(f"the controller's commands are not finite at step {k}")
             values["commands"] = commands[0].copy()
             yield Sample(k * timestep, values, timing)
 
-    def _targets(self, action: ArrayLike) -> FloatArray:
-        """Returns the action of a policy as motor targets, or raises ``InputError``."""
+    def _targets(self, step: int, policy: Policy, observation: object) -> FloatArray:
+        """Returns the motor targets of a policy; ``InputError`` before the robot moves."""
+        from selfmodel.controllers.function import called, name_of  # noqa: PLC0415  # few have one
+
         motors = self.robot.anatomy.motors
         try:
-            targets = np.asarray(action, dtype=np.float64).ravel()
-        except (ValueError, TypeError):
-            targets = np.empty(0)
-        if targets.shape != (len(motors),):
-            raise InputError(
-                f"expected targets of the {len(motors)} motors of {self.robot.name} "
-                f"({', '.join(motors)}) as an action of the policy, got {action!r:.80}"
-            )
-        return targets
+            return called(name_of(policy), policy, observation, (len(motors),), finite=True)
+        except TrialError as error:
+            if step:
+                raise
+            raise InputError(f"{error}; the motors are {', '.join(motors)}") from error
 
     def _step_environment(self, call: Call, targets: FloatArray | None) -> dm_env.TimeStep | None:
         """Returns the result of a step, or of a reset without targets; None after a timeout."""

@@ -1,25 +1,21 @@
 """A simulated environment of dm_env or Gymnasium, stepped as a robot, with its rewards."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import dm_env
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.physical.environment import EnvironmentRobot, Observe
+from selfmodel.physical.environment import EnvironmentRobot, Observe, Policy
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, SignalSource, current_value, signal_fields
 from selfmodel.trials.signals import SIGNALS, Signal
-
-Policy = Callable[[Any], ArrayLike]
-"""Function from an observation of an environment, as it is, to its action, the motor targets."""
 
 
 class Stepped:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from selfmodel.trials.signals import Names
 
 if TYPE_CHECKING:
-    from mujoco import MjModel
+    from mujoco import MjModel, MjSpec
 
 
 @dataclass(frozen=True)
@@ -134,6 +134,14 @@ def control_delay(model: "MjModel", substeps: int) -> float:
             f"{CONTROL_DELAY} must be {parts} from 0 to {MAX_CONTROL_DELAY}, got {delay:g}"
         )
     return as_delay(round(delay * allowed), allowed)
+
+
+def write_control_delay(spec: "MjSpec", delay: float) -> None:
+    """Writes a control delay, in control steps, into a specification."""
+    for numeric in spec.numerics:
+        if numeric.name == CONTROL_DELAY:
+            spec.delete(numeric)
+    spec.add_numeric(name=CONTROL_DELAY, data=[float(delay)])
 
 
 def as_delay(parts: int, substeps: int) -> float:
