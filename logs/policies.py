@@ -27,7 +27,7 @@ from msgspec import Meta, Struct
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.graph import Graph, Node, State, layers
-from selfmodel.controllers.policy import Action, Interface, Policy, Term
+from selfmodel.controllers.policy import TASK, Action, Interface, Policy, Term
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.logs.controllers import (
@@ -37,6 +37,7 @@ from selfmodel.logs.controllers import (
     read_arrays,
 )
 from selfmodel.robot.actuators import command_ranges, holding_commands
+from selfmodel.robot.observations import OBSERVATIONS, observation_of, observation_width
 from selfmodel.robot.robot import Robot
 
 Number = Annotated[float, Meta(gt=-1e9, lt=1e9)]
@@ -79,6 +80,8 @@ class PolicyFile(Section, frozen=True):
         pose: Positions of ``joints`` that count as 0, rad; the initial pose by default.
         newest_first: Whether a history begins with the newest observation; ``by_term``, whether it
             is stacked term by term.
+        task: Observation of the term ``task``, a key of ``robot.observations``; that of a body of
+            dm_control's suite by default.
     """
 
     network: str
@@ -95,6 +98,7 @@ class PolicyFile(Section, frozen=True):
     newest_first: bool = False
     decimation: Count = 1
     period: Positive | None = None
+    task: str = ""
 
 
 def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
@@ -151,7 +155,7 @@ def read_policy(path: Path, robot: Robot) -> Policy:
         )
     graph = read_network(path.parent / file.network, file.activation, file.last)
     try:
-        policy = _policy(file, graph, robot)
+        policy = policy_of(file, graph, robot)
     except ValueError as failure:
         raise InputError(f"{path} does not fit {robot.name}: {failure}") from failure
     # A log has it as a file of its own, and a layer around it in another.
@@ -164,7 +168,8 @@ def read_policy(path: Path, robot: Robot) -> Policy:
     return policy
 
 
-def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
+def policy_of(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
+    """Returns the policy of a file and its network; raises ``ValueError`` if it does not fit."""
     names, model = robot.anatomy.names, robot.model
     terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
     action = file.action
@@ -203,8 +208,21 @@ def _policy(file: PolicyFile, graph: Graph, robot: Robot) -> Policy:
             newest_first=file.newest_first,
             decimation=file.decimation,
             period=file.period or period,
+            **_task(file, robot),
         ),
     )
+
+
+def _task(file: PolicyFile, robot: Robot) -> dict[str, Any]:
+    """Returns the fields of an interface for the observation of a task, if a policy has it."""
+    if not file.task and all(each.term != TASK for each in file.observation):
+        return {}
+    if not (key := file.task or observation_of(robot.name)):
+        raise InputError(
+            f"{robot.name} is no body whose task has an observation: give task = one of "
+            f"{', '.join(OBSERVATIONS)}"
+        )
+    return {"task": key, "task_width": observation_width(key, robot.model)}
 
 
 def _row(numbers: Numbers | Sequence[float], count: int = 1) -> tuple[float, ...]:

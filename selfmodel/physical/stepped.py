@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import TASK_PREFIX
 from selfmodel.errors import InputError
 from selfmodel.physical.environment import EnvironmentRobot, Observe
+from selfmodel.robot.observations import observation_of, observation_source
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SignalSource, current_value, signal_fields
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -48,6 +50,7 @@ class Stepped:
         self.rewards: list[float] = []
         self.is_over = False
         self._fields: Mapping[Signal, SignalSource] = {}
+        self._tasks: Mapping[str, SignalSource] = {}
         if (state := self._state) is not None:
             try:
                 self._fields = signal_fields(robot, state[0])
@@ -58,6 +61,8 @@ class Stepped:
                         f"robot of this body"
                     ) from error
                 self._fields = signal_fields(robot)  # its motors have no names
+            if key := observation_of(robot.name):
+                self._tasks = {f"{TASK_PREFIX}{key}": observation_source(key, state[0])}
 
     def driven(self, observe: Observe | None, policy: Policy | None) -> EnvironmentRobot:
         """Returns the robot that is stepped through the environment, by a policy if given."""
@@ -97,7 +102,7 @@ class Stepped:
         named = observation if isinstance(observation, Mapping) else {}
         found: dict[str, Any] = {name: named[name] for name in SIGNALS if name in named}
         if (state := self._state) is not None:
-            for name, field in self._fields.items():
+            for name, field in (*self._fields.items(), *self._tasks.items()):
                 found.setdefault(name, current_value(field, state[1]))
         if not found:
             raise InputError(
