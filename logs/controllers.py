@@ -144,7 +144,7 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
 
-    if isinstance(design, Policy):
+    if isinstance(design, Policy) and design.name == POLICY:
         graph = design.graph
         of_graph = {name: getattr(graph, name) for name in _GRAPH}
         of_graph |= {"states": graph.states} if graph.states else {}
