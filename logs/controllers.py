@@ -145,7 +145,7 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     from selfmodel.controllers.graph import Graph  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
 
-    if isinstance(design, Policy):
+    if isinstance(design, Policy) and design.name == POLICY:
         graph = design.graph
         if not isinstance(graph, Graph):
             raise InputError(f"no file holds the function {graph.name}: give its policy file again")

@@ -29,7 +29,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.function import Function, name_of
 from selfmodel.controllers.graph import Graph, Node, State, layers
-from selfmodel.controllers.policy import Action, Interface, Policy, PolicyBatch, Term
+from selfmodel.controllers.policy import TASK, Action, Interface, Policy, PolicyBatch, Term
 from selfmodel.errors import InputError, TrialError, check_function, unknown_name
 from selfmodel.files import imported, load_toml, read_file
 from selfmodel.logs.controllers import (
@@ -39,6 +39,7 @@ from selfmodel.logs.controllers import (
     read_arrays,
 )
 from selfmodel.robot.actuators import command_ranges, holding_commands
+from selfmodel.robot.observations import OBSERVATIONS, observation_of, observation_width
 from selfmodel.robot.robot import Robot
 
 Number = Annotated[float, Meta(gt=-1e9, lt=1e9)]
@@ -83,6 +84,8 @@ class PolicyFile(Section, frozen=True):
         newest_first: Whether a history begins with the newest observation; ``by_term``, whether it
             is stacked term by term.
         batched: Whether a function takes the observations of many robots, ``(n, inputs)``.
+        task: Observation of the term ``task``, a key of ``robot.observations``; that of a body of
+            dm_control's suite by default.
     """
 
     network: str = ""
@@ -100,6 +103,7 @@ class PolicyFile(Section, frozen=True):
     decimation: Count = 1
     period: Positive | None = None
     batched: bool = False
+    task: str = ""
 
 
 def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
@@ -158,7 +162,7 @@ def read_policy(
         raise InputError(f"{named}: {unknown_name('preset', file.preset, PRESETS)}")
     graph = _network(file, path.parent, named, function)
     try:
-        policy = _policy(file, graph, robot)
+        policy = policy_of(file, graph, robot)
         if isinstance(policy.graph, Function):
             policy.graph.check(_initial_observation(policy, robot))
     except (ValueError, TrialError) as failure:
@@ -203,7 +207,8 @@ def _initial_observation(policy: Policy, robot: Robot) -> FloatArray:
     return np.asarray(batch.observation()[0])
 
 
-def _policy(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy:
+def policy_of(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy:
+    """Returns the policy of a file and its network; raises ``ValueError`` if it does not fit."""
     names, model = robot.anatomy.names, robot.model
     terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
     action = file.action
@@ -244,8 +249,21 @@ def _policy(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy:
             newest_first=file.newest_first,
             decimation=file.decimation,
             period=file.period or period,
+            **_task(file, robot),
         ),
     )
+
+
+def _task(file: PolicyFile, robot: Robot) -> dict[str, Any]:
+    """Returns the fields of an interface for the observation of a task, if a policy has it."""
+    if not file.task and all(each.term != TASK for each in file.observation):
+        return {}
+    if not (key := file.task or observation_of(robot.name)):
+        raise InputError(
+            f"{robot.name} is no body whose task has an observation: give task = one of "
+            f"{', '.join(OBSERVATIONS)}"
+        )
+    return {"task": key, "task_width": observation_width(key, robot.model)}
 
 
 def _row(numbers: Numbers | Sequence[float], count: int = 1) -> tuple[float, ...]:

@@ -68,7 +68,7 @@ def evolve_controller(
         score: Fitness, its name, or ``package.module:object``; by default that of the repair.
         repair: ``robust``, on rollouts under random conditions; or ``paper``, in one exact
             simulation.
-        search: ``cma-es``, ``ea`` or ``repertoire``; by default that of the repair.
+        search: ``cma-es``, ``ea``, ``es`` or ``repertoire``; by default that of the repair.
         repertoire: Gaits from which the search begins, or the path of their file.
         seed: Seed of all random numbers.
         threads: Threads of the physics; 0 for all processors.

@@ -4,7 +4,7 @@ A plug-in is an entry point of an installed package, or ``package.module:object`
 """
 
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import entry_points
@@ -12,11 +12,14 @@ from inspect import signature
 from types import MappingProxyType
 from typing import Any, cast
 
+import numpy as np
+
+from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
 from selfmodel.errors import InputError, check_type, items_of, unknown_name
-from selfmodel.evolution import Evolution
+from selfmodel.evolution import Evolution, GenomeSearch
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
 from selfmodel.files import imported
@@ -46,6 +49,7 @@ from selfmodel.recovery.scores import (
 )
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.tasks import Entry
 
 MakeDesign = Callable[[Robot, int | None], Design]
@@ -65,8 +69,21 @@ DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
 )
 """Name of the score of each repair, unless another is given."""
 
+
+def _strategy(
+    length: int, settings: Settings, rng: np.random.Generator, seeds: Sequence[FloatArray] = ()
+) -> GenomeSearch:
+    from selfmodel.recovery.evolution_strategy import EvolutionStrategy  # noqa: PLC0415  # rare
+
+    return EvolutionStrategy(length, settings, rng, seeds)
+
+
 SEARCHES: Mapping[str, MakeSearch] = MappingProxyType(
-    {"cma-es": CmaEs, "ea": partial(Evolution, draw=draw_genomes, noisy=True)}
+    {
+        "cma-es": CmaEs,
+        "ea": partial(Evolution, draw=draw_genomes, noisy=True),
+        "es": _strategy,
+    }
 )
 """Searches of the robust repair that need nothing else, by name."""
 

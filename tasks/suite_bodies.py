@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import TASK_PREFIX
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.environment import EnvironmentRobot
@@ -196,7 +197,10 @@ class _ObservedTask(SuiteTask):
 
     def __init__(self, task: "Task", robot: Robot, variant: ModelVariant) -> None:
         super().__init__(task, added_steps(robot.control_delay, float(variant.added_delay[0])))
-        self._robot, self._variant = robot, variant
+        from selfmodel.robot.observations import observation_of  # noqa: PLC0415  # few commands
+
+        self._robot, self._variant, key = robot, variant, observation_of(robot.name)
+        self._observation = f"{TASK_PREFIX}{key}" if key else ""
         joints = observed_fields(robot, [variant])["joint_positions"]
         self._fields = {**signal_fields(robot), "joint_positions": joints}
         self.returns: list[float] = []
@@ -222,6 +226,9 @@ class _ObservedTask(SuiteTask):
         for signal in SIGNALS:
             if signal not in ("sensors", "commands"):
                 observation[signal] = current_value(self._fields[signal], data)
+        if self._observation:
+            own = self._task.get_observation(physics).values()
+            observation[self._observation] = np.concatenate([np.ravel(one) for one in own])
         observation["time"] = physics.time()
         return observation
 

@@ -26,6 +26,7 @@ SUITE = group(
     {
         "list": ("List the domains and their cases.", "robots:list_bodies", "ListSuite"),
         "run": ("Run a study: bodies x cases x seeds.", "studies:run_suite", "RunSuite"),
+        "evolve": ("Evolve a policy for a task.", "training:evolve", "EvolvePolicy"),
     },
 )
 REPERTOIRE = group(

@@ -358,6 +358,24 @@ class RunSuite(Study, Repair, Searched):
     steps: int | None = None
 
 
+class EvolvePolicy(Command):
+    """Evolve a policy for a task of the suite: its observation, its return, its random starts.
+
+    The folder gets policy.toml with its network, which other commands take as --controller, the
+    progress, and the state, from which the same command goes on.
+    """
+
+    robot: str
+    out: Path
+    neurons: int = 0
+    population: int = 32
+    generations: int = 100
+    deviation: float = 0.1
+    rate: float = 0.05
+    seed: int = 0
+    threads: int = 0
+
+
 class RepeatPaper(Study):
     """Repeat the paper's experiment: its tables and figures, as PNG, PDF, CSV and Markdown.
 

@@ -26,6 +26,10 @@ TARGET_RANGE = np.pi / 4
 PAPER_RANGE = (0.0, TARGET_RANGE)
 """Command range of the paper's motors."""
 
+TASK_PREFIX = "task:"
+"""Prefix of the name of a signal that is the observation of a task of dm_control's suite, before a
+key of ``selfmodel.robot.observations``."""
+
 Ranges = tuple[tuple[float, float], ...]
 """Centre and half width of the command range per motor, in the motor's unit: rad for a position
 servo, rad/s for a velocity servo, a fraction of the largest torque for many torque motors."""

@@ -153,18 +153,22 @@ class Graph:
 
     @np.errstate(all="ignore")  # the numbers of a simulation that diverged
     def step(
-        self, rows: FloatArray, states: Sequence[FloatArray]
+        self,
+        rows: FloatArray,
+        states: Sequence[FloatArray],
+        own: Mapping[str, FloatArray] = MappingProxyType({}),
     ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         """Returns the output of each row, ``(n, outputs)``, and the next states.
 
         Args:
             rows: Inputs, ``(n, inputs)``.
             states: Those of ``initial``, or of the last evaluation.
+            own: Tensors of each row in place of those of the network, ``(n, ...)``, by name.
         """
         # In the order of C: otherwise numpy sums along a row in another order than of one row.
         rows = np.ascontiguousarray(rows)
-        values: dict[str, FloatArray] = {**self.tensors, self.input: rows}
-        values |= {own.input: each for own, each in zip(self.states, states, strict=True)}
+        values: dict[str, FloatArray] = {**self.tensors, **own, self.input: rows}
+        values |= {kept.input: each for kept, each in zip(self.states, states, strict=True)}
         left = MAX_NUMBERS * len(rows)
         for node in self.nodes:
             arguments: list[Any] = [values[name] if name else None for name in node.inputs]

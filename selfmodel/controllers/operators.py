@@ -21,10 +21,14 @@ Operator = Callable[[Arguments, Attributes], Sequence[FloatArray]]
 
 
 def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Returns ``rows @ matrix.T``; BLAS sums in an order that depends on the number of rows."""
+    """Returns ``rows @ matrix.T``; BLAS sums in an order that depends on the number of rows.
+
+    The matrix may be one for all rows, or of each row.
+    """
     if np.shape(rows)[-1] != np.shape(matrix)[-1]:  # einsum would repeat a single number
         raise ValueError("a product of other sizes")
-    return np.asarray(np.einsum("ni,ji->nj", np.ascontiguousarray(rows), matrix))
+    of_row = "ni,nji->nj" if np.ndim(matrix) == 3 else "ni,ji->nj"
+    return np.asarray(np.einsum(of_row, np.ascontiguousarray(rows), matrix))
 
 
 def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:

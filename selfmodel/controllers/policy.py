@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import Design
+from selfmodel.controllers.controller import TASK_PREFIX, Design
 from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
 from selfmodel.rotation import directions, rotated
@@ -63,7 +63,10 @@ INTERNAL = ("last_action", "velocity", "phase", "sensors")
 """Other terms: the network's last output, the commanded velocity, sine and cosine of the phase of a
 clock, and the readings of the paper's sensors."""
 
-TERMS = (*MEASURED, *INTERNAL)
+TASK = "task"
+"""Term that is the observation of a task of dm_control's suite."""
+
+TERMS = (*MEASURED, *INTERNAL, TASK)
 """Every term of an observation."""
 
 
@@ -121,6 +124,8 @@ class Interface:
         newest_first: Whether a history begins with the newest observation.
         decimation: Control steps per evaluation of the network.
         period: Period of the clock of the term ``phase``, s.
+        task: Observation of the term ``task``, such as ``walker``; "" without it.
+        task_width: Its numbers.
     """
 
     terms: tuple[Term, ...]
@@ -136,6 +141,8 @@ class Interface:
     newest_first: bool = False
     decimation: int = 1
     period: float = 1.0
+    task: str = ""
+    task_width: int = 0
 
 
 @dataclass(frozen=True)
@@ -214,6 +221,7 @@ class Policy(Design):
     def width(self, term: str) -> int:
         """Numbers of a term."""
         own = {"last_action": self.graph.outputs, "phase": 2, "sensors": len(self.sensors)}
+        own |= {TASK: self.interface.task_width}
         return len(self.interface.joints) if term in JOINT_TERMS else own.get(term, 3)
 
     @property
@@ -224,7 +232,9 @@ class Policy(Design):
     @property
     def observes(self) -> tuple[str, ...]:
         """Signals of the robot that the terms need, besides the readings."""
-        needed = (MEASURED[term.name][0] for term in self.interface.terms if term.name in MEASURED)
+        known = {name: signals for name, (signals, _) in MEASURED.items()}
+        known[TASK] = (f"{TASK_PREFIX}{self.interface.task}",)
+        needed = (known[term.name] for term in self.interface.terms if term.name in known)
         return tuple(dict.fromkeys(signal for signals in needed for signal in signals))
 
     @property
@@ -274,18 +284,28 @@ class Policy(Design):
 class PolicyBatch:
     """The policies of many robots; a ``ControllerBatch``.
 
+    Args:
+        policy: The policy.
+        count: Number of robots.
+        tensors: Tensors of the network of each robot, ``(count, ...)``, by name; the others are
+            those of the policy.
+
     Attributes:
         velocity: Commanded velocity of each robot, ``(n, 3)``.
     """
 
-    def __init__(self, policy: Policy, count: int) -> None:
+    def __init__(
+        self, policy: Policy, count: int, tensors: Mapping[str, FloatArray] | None = None
+    ) -> None:
         own = policy.interface
         action = own.action
         self._graph, self._interface = policy.graph, own
         self.readings = np.zeros((count, len(policy.sensors)))
         signals = {"joint_positions": own.hinges, "joint_velocities": own.hinges}
         widths = {signal: len(signals.get(signal, "xyz")) for signal in policy.observes}
-        widths |= {"base_orientation": 4} if "base_orientation" in widths else {}
+        self._task = f"{TASK_PREFIX}{own.task}"
+        other = {"base_orientation": 4, self._task: own.task_width}
+        widths |= {signal: width for signal, width in other.items() if signal in widths}
         self.observed: Mapping[str, FloatArray] = {
             signal: np.zeros((count, width)) for signal, width in widths.items()
         }
@@ -300,6 +320,7 @@ class PolicyBatch:
         self._scale, self._offset = np.array(action.scale), np.array(action.offset)
         self._output = np.zeros((count, policy.graph.outputs))
         self._states = policy.graph.initial(count)
+        self._tensors = tensors or {}
         self._history: list[list[FloatArray]] = []
         self._step = 0
 
@@ -307,7 +328,7 @@ class PolicyBatch:
         """Writes the commands of the next control step; see ``ControllerBatch``."""
         own = self._interface
         if self._step % own.decimation == 0:
-            output, self._states = self._graph.step(self.observation(), self._states)
+            output, self._states = self._graph.step(self.observation(), self._states, self._tensors)
             most = math.inf if own.action.clip is None else own.action.clip
             self._output = np.clip(output, -most, most)
         targets[:] = own.holding
@@ -335,5 +356,7 @@ class PolicyBatch:
         if term == "phase":
             turn = 2 * math.pi * self._step * self._interface.timestep / self._interface.period
             return np.tile((math.sin(turn), math.cos(turn)), (len(self.readings), 1))
+        if term == TASK:
+            return self.observed[self._task]
         own = {"last_action": self._output, "velocity": self.velocity, "sensors": self.readings}
         return own[term]

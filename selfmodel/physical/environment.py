@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.controllers.controller import CommandSource, make_batch
+from selfmodel.controllers.controller import TASK_PREFIX, CommandSource, make_batch
 from selfmodel.controllers.playback import Playback
 from selfmodel.errors import (
     InputError,
@@ -76,7 +76,11 @@ def signals_by_name(
             f"expected an observation that is a mapping by name, got a "
             f"{type(observation).__name__}: give observe=, a function to such a mapping"
         )
-    signals = {name: observation[name] for name in (*SIGNALS, TIMESTAMP) if name in observation}
+    signals = {
+        name: value
+        for name, value in observation.items()
+        if name in (*SIGNALS, TIMESTAMP) or str(name).startswith(TASK_PREFIX)
+    }
     if not signals:
         raise InputError(
             f"expected an observation with some of {', '.join(SIGNALS)}, got one of "
@@ -294,6 +298,8 @@ class EnvironmentRobot:
                             f"step {k}"
                         )
                     np.copyto(controllers.observed[signal][0], value, where=~np.isnan(value))
+            if observation is not None:
+                _read_task(controllers.observed, observation)
             controllers.step(commands)
             if self.policy is not None and result is not None and observation is not None:
                 commands[0] = self._targets(k, self.policy, result.observation)
@@ -349,6 +355,19 @@ class EnvironmentRobot:
         for limit in self.limits:
             if reason := limit.reason(values):
                 raise TrialError(f"a limit was exceeded at step {k}: {reason}")
+
+
+def _read_task(observed: Mapping[str, FloatArray], observation: Mapping[str, Any]) -> None:
+    """Writes the observation of a task into what a controller observes, if that is part of it."""
+    for name in (one for one in observed if one.startswith(TASK_PREFIX)):
+        shape, width = np.shape(observation.get(name, 0.0)), observed[name].shape[1]
+        if shape != (width,):
+            raise InputError(
+                f"expected {width} numbers as {name} in an observation, which the controller "
+                f"requires, got the shape {shape}: let observe= return them, or give a policy "
+                f"without the term task"
+            )
+        observed[name][0] = observation[name]
 
 
 def _signals(given: str | Collection[Signal]) -> tuple[Signal, ...]:

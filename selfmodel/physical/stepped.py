@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandSource, Controller
+from selfmodel.controllers.controller import TASK_PREFIX, CommandSource, Controller
 from selfmodel.errors import InputError
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.physical.environment import EnvironmentRobot, Observe, Policy
+from selfmodel.robot.observations import observation_of, observation_source
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import SensorReader, SignalSource, current_value, signal_fields
 from selfmodel.trials.signals import SIGNALS, Signal
@@ -51,6 +52,7 @@ class Stepped:
         self._variant, self._reads = build(robot, INTACT), False
         self._sensors = SensorReader(self._variant.model, robot.anatomy, [self._variant])
         self._data = mujoco.MjData(self._variant.model)
+        self._tasks: Mapping[str, SignalSource] = {}
         if (state := self._state) is not None:
             try:
                 self._fields = signal_fields(robot, state[0])
@@ -61,6 +63,8 @@ class Stepped:
                         f"robot of this body"
                     ) from error
                 self._fields = signal_fields(robot)  # its motors have no names
+            if key := observation_of(robot.name):
+                self._tasks = {f"{TASK_PREFIX}{key}": observation_source(key, state[0])}
 
     def driven(
         self, observe: Observe | None, policy: Policy | None, source: CommandSource
@@ -103,7 +107,7 @@ class Stepped:
         named = observation if isinstance(observation, Mapping) else {}
         found: dict[str, Any] = {name: named[name] for name in SIGNALS if name in named}
         if (state := self._state) is not None:
-            for name, field in self._fields.items():
+            for name, field in (*self._fields.items(), *self._tasks.items()):
                 found.setdefault(name, current_value(field, state[1]))
             if "sensors" not in found and _same_body(state[0], self._variant.model):
                 found["sensors"] = self._readings(state[1])

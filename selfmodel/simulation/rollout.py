@@ -4,7 +4,7 @@ The simulator and the simulated physical robot step the same rollout, so that th
 simulator's to the bit.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -14,7 +14,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.controllers.controller import CommandSource, make_batch
+from selfmodel.controllers.controller import TASK_PREFIX, CommandSource, make_batch
 from selfmodel.isolation import available_memory
 from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.anatomy import added_steps, split_delay
@@ -121,10 +121,10 @@ class RobotBatch:
         with self._failures():
             self._batch.forward(self._ids)
 
-    def step(self, substeps: int) -> None:
-        """Advances by a number of physics steps."""
+    def step(self, substeps: int, stage: mujoco.mjtStage = mujoco.mjtStage.mjSTAGE_NONE) -> None:
+        """Advances by a number of physics steps, and computes up to a stage of the next one."""
         with self._failures():
-            self._batch.step(self._ids, nstep=substeps)
+            self._batch.step(self._ids, nstep=substeps, stage=stage)
 
     def rollout(self, commands: FloatArray, fields: Sequence[str]) -> dict[str, FloatArray]:
         """Advances the running simulations by commands, ``(simulations, physics steps, motors)``.
@@ -162,6 +162,20 @@ def live_signals(
     }
 
 
+def task_signals(
+    robot: Robot, bind: Bind, observed: Iterable[str]
+) -> dict[str, Callable[[], FloatArray]]:
+    """Returns functions that read the observations of tasks among the signals of a controller."""
+    keys = [signal for signal in observed if signal.startswith(TASK_PREFIX)]
+    if not keys:
+        return {}
+    from selfmodel.robot.observations import observation_source  # noqa: PLC0415  # few have one
+
+    return {
+        key: observation_source(key.removeprefix(TASK_PREFIX), robot.model)(bind) for key in keys
+    }
+
+
 class Rollout:
     """Closed-loop rollouts of a batch of robots of one layout.
 
@@ -173,6 +187,7 @@ class Rollout:
         threads: Threads of MuJoCo's steps.
         stats: Statistics that are updated.
         start: Initial generalised positions, ``(n, nq)``; None for the reference pose.
+        speeds: Initial generalised velocities, ``(n, nv)``, with ``start``; None for rest.
         disturb: Changes the readings of each step, ``(n, sensors)``, and the other signals that
             the controllers observe, before they receive them.
         added_delay: Control delay in addition to that of the robot and its faults, control steps.
@@ -180,6 +195,7 @@ class Rollout:
     Attributes:
         live: Function that reads each recorded signal, ``(n, width)``. The arrays change with the
             next step.
+        bind: Returns the fields of the states, as of ``RobotBatch``.
 
     Raises:
         InputError: MuJoCo cannot simulate the models, such as for lack of memory.
@@ -195,6 +211,7 @@ class Rollout:
         threads: int = 1,
         stats: SimulationStats | None = None,
         start: FloatArray | None = None,
+        speeds: FloatArray | None = None,
         disturb: Disturb = lambda _readings, _observed: None,
         added_delay: int = 0,
     ) -> None:
@@ -202,11 +219,17 @@ class Rollout:
         self._substeps, self._disturb = robot.substeps, disturb
         model, sensors = variants[0].model, len(robot.anatomy.sensors)
         self._batch = batch = RobotBatch(model, variants, threads)
+        self.bind: Bind = batch.bind
         self._reader = SensorReader(model, robot.anatomy, variants)
         silent = [variant.silent_neurons for variant in variants]
         self._controllers = make_batch(drivers, silent, sensors)
-        observes = [signal for signal in SIGNALS if signal in self._controllers.observed]
+        observed = self._controllers.observed
+        observes = [signal for signal in SIGNALS if signal in observed]
         self._observe = live_signals(robot, batch.bind, variants, observes)
+        self._tasks = task_signals(robot, batch.bind, observed)
+        # An observation of a task is of the state after a step, as dm_control's are.
+        stages = mujoco.mjtStage
+        self._stage = stages.mjSTAGE_VEL if self._tasks else stages.mjSTAGE_NONE
         self._sensordata, self._qpos = batch.bind("sensordata"), batch.bind("qpos")
         whole, self._part = split_delay(robot.control_delay, robot.substeps)
         added = [
@@ -229,6 +252,8 @@ class Rollout:
         else:
             batch.reset(mujoco.mjtStage.mjSTAGE_NONE)
             self._qpos[:] = start
+            if speeds is not None:
+                batch.bind("qvel")[:] = speeds
             batch.forward()
 
     def steps(self, count: int) -> Iterator[int]:
@@ -239,16 +264,23 @@ class Rollout:
                     if self._part:
                         self._batch.step(self._part)
                         self._command(k)
-                    self._batch.step(self._substeps - self._part)
+                    self._batch.step(self._substeps - self._part, self._stage)
             self._reader.read(self._sensordata, self._qpos, self._controllers.readings)
             for signal, value in self._observe.items():
                 self._controllers.observed[signal][:] = value()
+            for key, value in self._tasks.items():
+                self._controllers.observed[key][:] = value()
             self._disturb(self._controllers.readings, self._controllers.observed)
             self._controllers.step(self._commands)
             self._sent[k % len(self._sent)] = self._commands
             self._command(k)
             self._stats.steps += len(self._batch.running)
             yield k
+
+    @property
+    def observed(self) -> Mapping[str, FloatArray]:
+        """What the controllers observe besides the readings, ``(n, width)`` each."""
+        return self._controllers.observed
 
     def _command(self, step: int) -> None:
         """Sends the motors the commands that reach them at a step, by the delay of each run."""

@@ -6,12 +6,14 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
 from selfmodel import arguments, plugins
-from selfmodel.arguments import AUTO, KindSource, comparator_choice, robot_entry
+from selfmodel.arguments import AUTO, KindSource, comparator_choice, read_controller, robot_entry
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.losses import check_limit, still_trial
 from selfmodel.errors import (
@@ -52,7 +54,7 @@ from selfmodel.studies.recoveries import (
     robot_key,
 )
 from selfmodel.studies.study import SHARED, Point, Study
-from selfmodel.tasks import ROBOTS
+from selfmodel.tasks import ROBOTS, Entry
 
 BANK = "bank"
 NEXT_TRIAL = (BANK, *plugins.NEXT_TRIAL)
@@ -64,6 +66,9 @@ GAITS = 6
 
 PAPER_COMPARATORS = (FORWARD_DISPLACEMENT.name, AUTO)
 """Comparators of the paper's experiment by default: the paper's, then selfmodel's."""
+
+GIVEN, CONTROLLER_FILES = "given", (".toml", ".npz", ".mcap")
+"""In place of a design: the controller of a file; and the endings of such files."""
 
 Needs = Callable[[Point], Mapping[str, Cell]]
 
@@ -178,7 +183,8 @@ def ablation(
     def gait(robot: str, number: int) -> Cell:
         if bank is None:
             return recoveries.gait_cell(models[robot], shared, number)
-        return recoveries.given_gait_cell(bank, models[robot], number)
+        given = recoveries.bank_gait(bank, robot, number)
+        return recoveries.given_gait_cell(given, models[robot], number)
 
     def needs(point: Point) -> dict[str, Cell]:
         robot, seed = point["robot"], point["seed"]
@@ -216,7 +222,7 @@ def suite(
     settings: Settings = Settings(),  # noqa: B008  # frozen
     comparator: str | Comparator = SEGMENT_PREDICTION.name,
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
-    controller: str | plugins.MakeDesign = "network",
+    controller: str | Path | plugins.MakeDesign = "network",
     neurons: int | None = None,
     kinds: KindSource = "paper",
     gap: float = 0.0,
@@ -231,7 +237,8 @@ def suite(
     Bodies are names of robots, or paths of MJCF or URDF files; by default those of all domains. A
     case or a damage that does not apply to a body or to its controllers is a row with the reason,
     of the first seed; one that applies to none is refused. The share is of bodies with their seeds.
-    The comparator may be ``auto``.
+    The comparator may be ``auto``. The controller may be that of a file, such as a policy's, with
+    which each body walks and is recovered.
     """
     bodies = bodies_of(tuple(DOMAINS), None) if bodies is None else names_of(bodies, ROBOT)
     cases = known_cases(bodies) if cases is None else whole_numbers("cases", cases, 1)
@@ -240,19 +247,23 @@ def suite(
     (comparator,), kinds = plugins.comparator_names([comparator]), plugins.kinds_named(kinds)
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     neurons = None if neurons is None else whole_number("neurons", neurons, 3)
-    controller = plugins.name_of("controller", controller)
+    entries = {body: robot_entry(body) for body in bodies}
+    known = _known_gaits(controller, entries, neurons)
+    controller = GIVEN if known else plugins.name_of("controller", controller)
     comparator_choice(comparator)
     plugins.kinds(kinds)
     _check_any(cases, damages)
-    chosen = repair_parameters(repair, search, score, repair_settings)
-    entries = {body: robot_entry(body) for body in bodies}
+    chosen = repair_parameters(repair, search, score, repair_settings, known=bool(known))
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
     check_cases("case of these bodies", cases, known_cases(bodies))
     asked: list[Asked] = [*((case, "") for case in cases), *((None, one) for one in damages)]
     failures: dict[str, list[tuple[int | None, str, str]]] = {}
     for body, entry in entries.items():
         check_score(chosen["score"], entry)
-        design = plugins.design(controller, entry.robot(), neurons)
+        if gait := known.get(body):
+            _, design, _ = plugins.repaired_around(chosen["repair"], gait.design, gait)
+        else:
+            design = plugins.design(controller, entry.robot(), neurons)
         failures[body] = judged(body, entry, design, asked, kinds)
     for number, damage in enumerate(damages, start=len(cases)):
         reasons = [found[number][2] for found in failures.values()]
@@ -267,7 +278,17 @@ def suite(
     ]
     shared = _shared(settings, kinds, chosen) | {"comparator": comparator, "gap": gap}
     shared |= {"controller": controller, "neurons": neurons}
-    return _study("suite", folder, points, shared, _one_gait(models, shared))
+    return _study("suite", folder, points, shared, _one_gait(models, shared, known))
+
+
+def _known_gaits(
+    controller: str | Path | plugins.MakeDesign, entries: Mapping[str, Entry], neurons: int | None
+) -> dict[str, Controller]:
+    """Returns the controller in a file for each body; none if a design is given."""
+    if not isinstance(controller, str | Path) or Path(controller).suffix not in CONTROLLER_FILES:
+        return {}
+    path = Path(controller)
+    return {body: read_controller(path, one.robot(), neurons) for body, one in entries.items()}
 
 
 def paper(
@@ -322,11 +343,17 @@ def _check_search(settings: Settings, known: str, remedy: str) -> None:
         )
 
 
-def _one_gait(models: Mapping[str, Mapping[str, str]], shared: Mapping[str, Any]) -> Needs:
-    """Returns the needs of a recovery: the gait of its robot and seed."""
+def _one_gait(
+    models: Mapping[str, Mapping[str, str]],
+    shared: Mapping[str, Any],
+    known: Mapping[str, Controller] = MappingProxyType({}),
+) -> Needs:
+    """Returns the needs of a recovery: the known gait of its robot, or that of its seed."""
 
     @cache
     def gait(robot: str, seed: int) -> Cell:
+        if robot in known:
+            return recoveries.given_gait_cell(known[robot], models[robot], 0)
         return recoveries.gait_cell(models[robot], shared, seed)
 
     return lambda point: {} if REASON in point else {"gait": gait(point["robot"], point["seed"])}

@@ -114,23 +114,26 @@ def repair_parameters(
     search: str | MakeSearch | None,
     score: Score | str | None,
     settings: Settings | None = None,
+    *,
+    known: bool = False,
 ) -> dict[str, Any]:
-    """Returns what determines a repair, the robust one by default, with its defaults.
+    """Returns what determines a repair, with its defaults.
 
-    Its settings are left out unless they are given.
+    It is the robust one by default, or with a known controller a layer around that. Its settings
+    are left out unless they are given.
     """
     check_type(settings, Settings | None, REPAIR_SETTINGS)
-    repair = plugins.ROBUST if repair is None else repair
+    repair = repair or (plugins.COMPENSATE if known else plugins.ROBUST)
     if search == plugins.REPERTOIRE:
         raise InputError(
             f"a repertoire is of one robot, and a study of many has none, got the search {search}: "
             f"give {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
             f"recover --repertoire FILE`"
         )
-    if repair == plugins.COMPENSATE:
+    if repair == plugins.COMPENSATE and not known:
         raise InputError(
-            f"a study evolves its gaits, and has no controller to begin from, got the repair "
-            f"{repair}: give {plugins.ROBUST} or {plugins.PAPER}"
+            f"the repair {repair} needs a controller that walks, and this study evolves its gaits: "
+            f"give {plugins.ROBUST} or {plugins.PAPER}, or `selfmodel suite run --controller FILE`"
         )
     search = None if search is None else plugins.name_of("search", search)
     plugins.repair(repair, search)
@@ -191,16 +194,11 @@ def evolve_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
     return {"evaluations": evaluations}
 
 
-def given_gait_cell(bank: Path, robot: Parameters, number: int) -> Cell:
-    """Returns the cell of a gait of a bank; its parameters contain the gait.
-
-    The bank is a folder with the file ``ROBOT-K.npz``, or the gaits of another study.
-    """
-    name = robot["robot"]
-    data = controller_bytes(bank_gait(bank, name, number))
-    parameters = {**robot, "controller": base64.b64encode(data).decode()}
-    function = f"{__name__}:keep_gait"
-    return Cell(function, f"{robot_key(name)}-{number}", parameters, kind="gaits")
+def given_gait_cell(gait: Controller, robot: Parameters, number: int) -> Cell:
+    """Returns the cell of a gait that is known; its parameters contain the gait."""
+    data = base64.b64encode(controller_bytes(gait)).decode()
+    name, parameters = f"{robot_key(robot['robot'])}-{number}", {**robot, "controller": data}
+    return Cell(f"{__name__}:keep_gait", name, parameters, kind="gaits")
 
 
 def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
@@ -210,7 +208,7 @@ def keep_gait(parameters: Parameters, _needs: Folders, folder: Path) -> Row:
 
 
 def bank_gait(bank: Path, robot: str, number: int) -> Controller:
-    """Returns a gait of a bank; see ``given_gait_cell``."""
+    """Returns a gait of a bank: a folder with ``ROBOT-K.npz``, or the gaits of another study."""
     key = robot_key(robot)
     evolved = sorted(bank.glob(f"{key}-seed{number:03d}-*/{GAIT}"))
     given = bank / f"{key}-{number}.npz"
@@ -290,8 +288,8 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     robot, (settings, of_repair) = entry.robot(), settings_of(parameters)
     if REASON in parameters:
         return {"recoveries": [{"robot": robot.name}]}
-    design = plugins.design(shared["controller"], robot, shared["neurons"])
     truth, gait = truth_of(parameters, robot), read_controller(needs["gait"] / GAIT, robot)
+    _, design, first = plugins.repaired_around(shared["repair"], gait.design, gait)
     check_silent_neurons(design, silent_neurons(truth))
     steps, seed = settings.steps, parameters["seed"]
     score, _ = experiments.choose_score(
@@ -309,7 +307,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         seed=seed,
         threads=1,
         folder=folder / RECOVERY,
-        gait=gait,
+        gait=first,
         design=design,
         next_trial=shared["next_trial"],
         score=score,

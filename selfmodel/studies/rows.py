@@ -160,10 +160,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "robot case truth seed best correct verdict trials score unit control_steps before "
             "after recovered upright_before upright_after upright displacement_before "
             "displacement_after displacement_recovered return_before return_after return_recovered "
-            "return_most diverged seconds repair search reason",
+            "return_most diverged simulated_steps seconds repair search reason",
             "score unit control_steps upright_before upright_after upright displacement_before "
             "displacement_after displacement_recovered return_before return_after return_recovered "
-            "return_most repair search reason",
+            "return_most simulated_steps repair search reason",
             "robot case truth seed",
             lambda _rows: iter(()),  # its bodies have one comparator, and are no pairs
         ),

@@ -103,8 +103,8 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
         ``after`` and ``recovered``, of the displacements and returns with these ends, and
         ``return_most``; ``recovery``, see ``recovered_over_before``, its median; ``upright``, the
         number of runs whose best recovery trial had no fall, None if that is unknown; the mean
-        number of ``trials``; the median of the ``seconds``; ``reason``, why the body cannot have
-        the failure.
+        number of ``trials``; the medians of the ``simulated_steps`` and the ``seconds``;
+        ``reason``, why the body cannot have the failure.
     """
     summaries = []
     for (robot,), own in grouped(rows, "robot").items():
@@ -131,7 +131,7 @@ def _summary(rows: Sequence[Row]) -> Row:
         "recovery": median(ratios) if ratios else None,
         "upright": sum(stayed) if stayed else None,
         "trials": fmean(row["trials"] for row in runs) if runs else None,
-        **medians(runs, "seconds"),
+        **medians(runs, "simulated_steps", "seconds"),
         "reason": first.get("reason"),
     }
 
@@ -348,6 +348,9 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
         if what != score and any(it[f"{what}_before"] is not None for it in every):
             values = ", ".join(_number(one[f"{what}_{end}"]) for end in ENDS) if runs else "-"
             texts[title] = f"{values} of {most:,}" if runs and most and what == RETURN else values
+    if any(it["simulated_steps"] for it in every):
+        steps = one["simulated_steps"]
+        texts["simulated steps"] = "-" if steps is None else f"{steps:,.0f}"
     return texts | ({"why not": one["reason"] or ""} if any(it["reason"] for it in every) else {})
 
 

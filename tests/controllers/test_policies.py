@@ -26,9 +26,9 @@ def seen(own: Policy, steps: int, sense: Callable[[PolicyBatch, int], None] = fe
     batch, rows = own.batch(np.empty((1, 0)), [frozenset()]), []
     network = batch._graph
 
-    def spy(observation: np.ndarray, states: tuple) -> tuple:
+    def spy(observation: np.ndarray, states: tuple, own: dict) -> tuple:
         rows.append(observation[0].tolist())
-        return network.step(observation, states)
+        return network.step(observation, states, own)
 
     batch._graph = SimpleNamespace(step=spy)
     for k in range(steps):

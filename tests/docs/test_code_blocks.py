@@ -51,7 +51,8 @@ def expanded(words: list[str]) -> list[str]:
 
 def in_one_process(words: list[str]) -> list[str]:
     """The arguments of a command, of which a study is computed by one process: to the same bits."""
-    is_study = words[0] in ("ablate", "suite") and "--out" in words
+    is_run = words[0] == "ablate" or words[:2] == ["suite", "run"]
+    is_study = is_run and "--out" in words
     return [*words, "--workers", "1"] if is_study and "--workers" not in words else words
 
 

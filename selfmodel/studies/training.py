@@ -1,0 +1,334 @@
+"""Policies evolved for a task of dm_control's suite: its own observation, return and episodes.
+
+The search is ``EvolutionStrategy``. The observation is normalised by its mean and its deviation in
+all episodes so far (Mania et al., arXiv:1803.07055). The state of a training is one file, written
+after each generation, from which the same training goes on to the bit.
+"""
+
+import io
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from selfmodel import evolution
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.controllers.controller import TASK_PREFIX, Controller
+from selfmodel.controllers.graph import layers
+from selfmodel.controllers.policy import Policy
+from selfmodel.controllers.trained import Trained, initial_layers
+from selfmodel.errors import InputError, unknown_name
+from selfmodel.evolution import Generation
+from selfmodel.faults.build import build
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs.controllers import NPZ_FAILURES, read_arrays
+from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.logs.policies import Commanded, Observed, PolicyFile, policy_of
+from selfmodel.progress import ignore
+from selfmodel.recovery.evolution_strategy import EvolutionStrategy
+from selfmodel.robot.actuators import command_ranges
+from selfmodel.robot.observations import Fields, observation_of, observation_width
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.rollout import Rollout
+from selfmodel.simulation.simulator import thread_count
+from selfmodel.tasks import suite_bodies
+from selfmodel.tasks.rewards import REWARDS, Starts, reward_of
+from selfmodel.tasks.suite_bodies import EPISODE
+
+SPAN = 10.0
+"""Largest change of a weight from that of the first network."""
+
+LEAST_SPREAD = 0.01
+"""Smallest standard deviation that a number of the observation is divided by."""
+
+POLICY, NETWORK, STATE, PROGRESS = "policy.toml", "policy.npz", "state.npz", "progress.csv"
+"""Files of a training."""
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """What determines a training, besides its task.
+
+    Attributes:
+        hidden: Hidden neurons of the network; 0 for a linear one.
+        pairs: Pairs of opposite policies of a generation, each with one episode.
+        deviation: Standard deviation of the weights of a generation about their mean.
+        rate: Largest step of the mean of the weights.
+        seed: Seed of all random numbers.
+    """
+
+    hidden: int = 0
+    pairs: int = 16
+    deviation: float = 0.1
+    rate: float = 0.05
+    seed: int = 0
+
+
+@dataclass
+class Moments:
+    """Count, mean and mean square deviation of observations, ``(width,)``."""
+
+    count: float
+    mean: FloatArray
+    square: FloatArray
+
+    def add(self, rows: int, shifted: FloatArray, squares: FloatArray) -> None:
+        """Adds rows by the sums of their differences from the mean, and of the squares of these."""
+        total, step = self.count + rows, shifted / (self.count + rows)
+        self.square = (self.count * self.square + squares) / total - step**2
+        self.mean, self.count = self.mean + step, total
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviation; 1 without an observation."""
+        return np.maximum(np.sqrt(self.square), LEAST_SPREAD)
+
+
+class Training:
+    """An evolution of a policy for a task, generation by generation.
+
+    Args:
+        robot: Name of a body of the suite, such as ``suite-walker-walk``.
+        settings: What determines the training.
+        threads: Threads of the physics.
+
+    Raises:
+        InputError: The task has no observation or reward that a policy is evolved for.
+    """
+
+    def __init__(self, robot: str, settings: TrainingSettings, threads: int = 1) -> None:
+        self.name, self.settings = robot, settings
+        self._robot, parts = _body(robot)
+        self._threads = threads
+        self._reward, self._starts = reward_of(*parts), Starts(*parts)
+        self._rng = np.random.default_rng(settings.seed)
+        key = observation_of(robot)
+        self._observation = f"{TASK_PREFIX}{key}"
+        width = observation_width(key, self._robot.model)
+        self._moments = Moments(0.0, np.zeros(width), np.ones(width))
+        motors = len(self._robot.anatomy.motors)
+        self._first = layers(
+            initial_layers(width, settings.hidden, motors, self._rng), "Tanh", "Tanh"
+        )
+        self._search = EvolutionStrategy(
+            self._first.weights,
+            Settings(),
+            self._rng,
+            start=np.zeros(self._first.weights),
+            pairs=settings.pairs,
+            deviation=settings.deviation / SPAN,
+            rate=settings.rate / SPAN,
+        )
+        self.rows: list[tuple[float, ...]] = []
+        self._seconds, self._clock = 0.0, process_time()
+
+    @property
+    def generation(self) -> int:
+        """Generations so far."""
+        return self._search.generation
+
+    @property
+    def file(self) -> PolicyFile:
+        """The policy file, with the normalisation so far."""
+        own, ranges = self._moments, command_ranges(self._robot.model)
+        seen = Observed("task", tuple(1 / own.spread), tuple(own.mean))
+        action = Commanded(tuple(half for _, half in ranges), tuple(mid for mid, _ in ranges))
+        return PolicyFile(
+            NETWORK, activation="Tanh", last="Tanh", observation=(seen,), action=action
+        )
+
+    @property
+    def design(self) -> Trained:
+        """The design of the policies of the next generation."""
+        policy = policy_of(self.file, self._first, self._robot)
+        own = {name: getattr(policy, name) for name in ("sensors", "motors", "ranges", "interface")}
+        return Trained(**own, graph=self._first, span=SPAN)
+
+    @property
+    def policy(self) -> Policy:
+        """The policy of the mean of the search."""
+        return self.design.policy(self._search.mean)
+
+    def run(self, generations: int, after: Callable[[Generation], None] = ignore) -> None:
+        """Runs further generations, and calls ``after`` with each."""
+        if generations > 0:
+            end = self.generation + generations
+            loop = (self._search, self._fitness, after, lambda: end - self.generation)
+            evolution.evolve(*loop, noisy=True)
+
+    def _fitness(self, genomes: FloatArray) -> FloatArray:
+        """Returns the returns of genomes; the two of a pair have the same initial state."""
+        seeds = np.tile(self._rng.integers(2**32, size=len(genomes) // 2), 2)
+        design = self.design
+        found = self.returns([Controller(design, one) for one in genomes], seeds, learn=True)
+        finite = found[np.isfinite(found)]
+        now = process_time()
+        self._seconds, self._clock = self._seconds + now - self._clock, now
+        count = self._search.generation + 1
+        steps = count * len(genomes) * EPISODE
+        mean, most = (float(finite.mean()), float(finite.max())) if len(finite) else (0.0, 0.0)
+        self.rows.append((count, steps, self._seconds, mean, most))
+        return found
+
+    def returns(
+        self, controllers: Sequence[Controller], seeds: IndexArray, *, learn: bool = False
+    ) -> FloatArray:
+        """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
+
+        Args:
+            controllers: Policies of the task, of one design.
+            seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
+            learn: Whether the observations count in the normalisation.
+        """
+        robot, count = self._robot, len(controllers)
+        start, speeds = self._starts.draw(seeds)
+        variants = [build(robot, INTACT)] * count
+        rollout = Rollout(
+            robot, variants, controllers, (), threads=self._threads, start=start, speeds=speeds
+        )
+        fields = Fields(robot.model, rollout.bind)
+        commands = np.zeros((count, len(robot.anatomy.motors)))
+        self._reward(fields, commands)  # binds its fields before the first step
+        total, own = np.zeros(count), self._moments
+        shifted, squares = np.zeros_like(own.mean), np.zeros_like(own.mean)
+        for k in rollout.steps(EPISODE + 1):
+            if k:
+                total += self._reward(fields, commands)
+            commands[:] = rollout.live["commands"]()
+            difference = rollout.observed[self._observation] - own.mean
+            shifted += difference.sum(axis=0)
+            squares += (difference**2).sum(axis=0)
+        if learn and np.isfinite(squares).all():
+            own.add(count * (EPISODE + 1), shifted, squares)
+        return np.where(rollout.diverged() | ~np.isfinite(total), -math.inf, total)
+
+    def judged(self, episodes: int) -> FloatArray:
+        """Returns the returns of the policy in episodes that no training has, ``(episodes,)``."""
+        seeds = np.arange(2**32 - episodes, 2**32)
+        return self.returns([Controller(self.policy, np.zeros(0))] * episodes, seeds)
+
+    # ---------------------------------------------------------------- files
+
+    def save(self, folder: Path) -> None:
+        """Writes the policy, the progress and the state; each file is whole at any time."""
+        design, own = self.design, self._moments
+        tensors = {name: one[0] for name, one in design.tensors(self._search.mean[None]).items()}
+        about = {"robot": self.name, **asdict(self.settings), "seconds": self._seconds}
+        about |= {"rng": self._rng.bit_generator.state}
+        state = {
+            **self._search.state(),
+            "count": np.array(own.count),
+            "average": own.mean,
+            "square": own.square,
+            "rows": np.array(self.rows),
+            "about": np.array(json.dumps(about)),
+        }
+        table = "".join(f"{','.join(map(str, row))}\n" for row in (COLUMNS, *self.rows))
+        for name, content in (
+            (NETWORK, _npz(tensors)),
+            (POLICY, _policy_text(self.file).encode()),
+            (PROGRESS, table.encode()),
+            (STATE, _npz(state)),
+        ):
+            replace_file(folder / name, content)
+
+    def resume(self, path: Path) -> None:
+        """Continues from a state file.
+
+        Raises:
+            InputError: The file is of another training, or none.
+        """
+        try:
+            found = read_arrays(path.read_bytes(), 2**30)
+            about = json.loads(str(found["about"]))
+            rng, seconds = about.pop("rng"), float(about.pop("seconds"))
+            moments = Moments(float(found["count"]), found["average"], found["square"])
+            rows = [(int(k), int(steps), *own) for k, steps, *own in found["rows"].tolist()]
+        except (OSError, *NPZ_FAILURES) as error:
+            raise InputError(f"{path}: expected the state of a training: {error}") from error
+        mine = {"robot": self.name, **asdict(self.settings)}
+        if differ := [name for name in mine if about.get(name) != mine[name]]:
+            raise InputError(
+                f"{path} is of a training with another {', '.join(differ)}: give its options, or "
+                f"another folder"
+            )
+        self._search.resume(found)
+        self._rng.bit_generator.state = rng
+        self._seconds, self._moments, self.rows = seconds, moments, rows
+
+
+COLUMNS = ("generation", "steps", "cpu_seconds", "mean_return", "best_return")
+"""Columns of the progress."""
+
+
+def _body(name: str) -> tuple[Robot, tuple[str, str]]:
+    """Returns a body of the suite by its name, with its domain and its task."""
+    known = {
+        suite_bodies.name(*parts): parts for parts in suite_bodies.BODIES if parts[0] in REWARDS
+    }
+    known = {body: parts for body, parts in known.items() if observation_of(body)}
+    if name not in known:
+        raise unknown_name("task that policies are evolved for", name, known)
+    return suite_bodies.robot(*known[name]), known[name]
+
+
+def _npz(arrays: Mapping[str, Any]) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **arrays)
+    return file.getvalue()
+
+
+def _policy_text(file: PolicyFile) -> str:
+    """Returns a policy file as TOML."""
+    (seen,) = file.observation
+    tables: dict[str, dict[str, Any]] = {
+        "": {"network": file.network, "activation": file.activation, "last": file.last},
+        "[[observation]]": {"term": seen.term, "scale": seen.scale, "offset": seen.offset},
+        "[action]": {"scale": file.action.scale, "offset": file.action.offset},
+    }
+    blocks = (
+        "\n".join([heading, *(f"{key} = {json.dumps(value)}" for key, value in table.items())])
+        for heading, table in tables.items()
+    )
+    return "\n\n".join(blocks).lstrip() + "\n"
+
+
+def evolve_policy(
+    robot: str,
+    folder: Path,
+    settings: TrainingSettings,
+    *,
+    generations: int,
+    threads: int = 0,
+    on_event: Callable[[Generation], None] = ignore,
+) -> Training:
+    """Evolves a policy for a task into a folder, or goes on with that in it.
+
+    Args:
+        robot: Name of a body of the suite, such as ``suite-walker-walk``.
+        folder: Gets the policy, ``policy.toml`` and its network, the state and the progress.
+        settings: What determines the training.
+        generations: Generations in all, those in the folder included.
+        threads: Threads of the physics; 0 for all processors.
+        on_event: Called after each generation.
+
+    Raises:
+        InputError: The task is unknown, or the folder has another training.
+    """
+    training = Training(robot, settings, thread_count(threads))
+    make_folder(folder)
+    if (folder / STATE).exists():
+        training.resume(folder / STATE)
+
+    def after(generation: Generation) -> None:
+        training.save(folder)
+        on_event(generation)
+
+    training.run(generations - training.generation, after)
+    return training
