@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ class Function:
         self,
         rows: FloatArray,
         states: Sequence[FloatArray],
-        _own: Mapping[str, FloatArray],
+        _own: Mapping[str, FloatArray] = MappingProxyType({}),
     ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         """Returns the action of each observation, as ``called``; NaN for one that is not finite."""
         actions = np.full((len(rows), self.outputs), np.nan)
@@ -57,7 +58,7 @@ class Function:
         shape = (1, self.outputs) if self.batched else (self.outputs,)
         given = observation[np.newaxis] if self.batched else observation
         first = called(self.name, self.function, given.copy(), shape, finite=True).ravel()
-        again, _ = self.step(np.tile(observation, (2, 1)), (), {})
+        again, _ = self.step(np.tile(observation, (2, 1)), ())
         # A batch may round otherwise than a row.
         if not np.allclose(again, first, rtol=1e-5, atol=1e-6):
             raise TrialError(
