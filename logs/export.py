@@ -37,9 +37,7 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
     rows = [[joint.name for joint in limb] for limb in limbs(anatomy)]
     rows.sort(key=lambda row: order.index(row[0]))
     within = {name for row in rows for name in row}
-    own = {one.kind for one in best.faults if not one.kind.affects_dynamics} | {
-        joints.ENCODER_OFFSET
-    }
+    own = {one.kind for one in best.faults if not one.kind.affects_dynamics}
     return {
         "robot": robot.name,
         "hypothesis": str(best),
@@ -47,7 +45,9 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
         "joints": rows,
         "status": [[status[name] for name in row] for row in rows],
         "other_joints": {name: status[name] for name in order if name not in within},
-        "not_in_model": [str(one) for one in best.faults if one.kind in own],
+        "not_in_model": [
+            str(one) for one in best.faults if one.kind in {*own, joints.ENCODER_OFFSET}
+        ],
         "hypotheses": [
             {"hypothesis": str(one), "probability": diagnosis.probability.get(str(one))}
             for one in (best, *diagnosis.indistinguishable)
