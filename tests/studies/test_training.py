@@ -58,6 +58,7 @@ def test_a_task_without_reward_or_observation_is_refused(body: str):
         Training(body, SMALL)
 
 
+@pytest.mark.search
 def test_a_training_learns(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(training, "EPISODE", 100)
     own = Training(CHEETAH, TrainingSettings(pairs=8, seed=1))
@@ -95,6 +96,7 @@ def test_observations_are_normalised_by_their_moments():
     np.testing.assert_allclose(own.spread, rows.std(axis=0))
 
 
+@pytest.mark.search
 def test_a_study_recovers_bodies_around_the_controller_of_a_file(tmp_path: Path):
     evolve_policy(HOPPER, tmp_path, SMALL, generations=1, threads=1)
     given = {"bodies": HOPPER, "cases": (), "damages": "jam:knee", "score": "return"}
