@@ -42,6 +42,7 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
         "robot": robot.name,
         "hypothesis": str(best),
         "verdict": diagnosis.verdict,
+        "doubt": diagnosis.doubt.reason if diagnosis.doubt else None,
         "joints": rows,
         "status": [[status[name] for name in row] for row in rows],
         "other_joints": {name: status[name] for name in order if name not in within},
@@ -52,7 +53,7 @@ def status_of(diagnosis: Diagnosis, robot: Robot) -> dict[str, Any]:
             {"hypothesis": str(one), "probability": diagnosis.probability.get(str(one))}
             for one in (best, *diagnosis.indistinguishable)
         ],
-        "ranges": list(_ranges(diagnosis, anatomy)),
+        "ranges": [] if diagnosis.doubt else list(_ranges(diagnosis, anatomy)),
     }
 
 

@@ -102,11 +102,11 @@ def test_the_log_of_an_episode_that_ends_early_is_whole(tmp_path: Path):
         ({"policy": 5}, "expected the path of a controller, or a Controller, got .* int"),
         (
             {"policy": lambda _: [0.1]},
-            r"<lambda> returns the shape \(1,\), expected \(8,\)",
+            r"<lambda> returns .* of the shape \(1,\), expected .* \(8,\)",
         ),
         (
             {"policy": lambda _: "left"},
-            "<lambda> failed: ValueError: .*'left'; the motors are",
+            "<lambda> failed: ValueError: .*'left'.*; the motors are",
         ),
         ({"score": "uprigt"}, "unknown score 'uprigt': did you mean upright"),
         ({"episodes": 0}, "of 1 or above as episodes, got 0"),

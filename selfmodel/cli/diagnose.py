@@ -18,7 +18,7 @@ from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.errors import counted
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
-from selfmodel.logs.export import STATUS
+from selfmodel.logs.export import MODEL, STATUS
 from selfmodel.logs.files import refuse_existing
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
@@ -30,7 +30,8 @@ def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
     if options.export is not None:
-        refuse_existing(options.export / STATUS)
+        for name in (MODEL, STATUS):
+            refuse_existing(options.export / name)
     explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)
     evidence = direct_evidence(
         diagnosis.explained(inputs.damaged), robot.anatomy, trial_names(inputs.damaged)

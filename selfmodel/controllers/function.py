@@ -83,14 +83,16 @@ def called(
         TrialError: The function fails, or returns something else; the message names it.
     """
     try:
-        action = np.asarray(function(observation), dtype=np.float64)
+        given = np.asarray(function(observation))
+        action = np.real(given).astype(np.float64)
     except Exception as error:  # a user's function may raise any: raised as a TrialError
         reason = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
         raise TrialError(f"the function {name} failed: {reason}") from error
-    if action.size != math.prod(shape):
+    is_whole = action.size == math.prod(shape) and (len(shape) == 1 or action.shape == shape)
+    if not is_whole or np.iscomplexobj(given):
         raise TrialError(
-            f"the function {name} returns the shape {action.shape}, expected {shape}, a number for "
-            f"each motor"
+            f"the function {name} returns {given.dtype} numbers of the shape {given.shape}, "
+            f"expected real ones of the shape {shape}, one for each motor"
         )
     if finite and not np.isfinite(action).all():
         raise TrialError(f"the function {name} returns {action.tolist()}, expected finite numbers")

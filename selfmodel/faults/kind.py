@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal, Optional
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
+from selfmodel.errors import InputError, check_type
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.trajectory import Trajectory
 
@@ -82,6 +83,13 @@ class FaultKind:
     base: Literal["any", "free", "fixed"] = "any"
 
     def __post_init__(self) -> None:
+        check_type(self.name, str, "the name of a fault kind as text")
+        for name, numbers in (("levels", self.levels), ("bounds", self.bounds or ())):
+            check_type(numbers, tuple | list, f"{name} as a tuple of numbers")
+        if self.bounds is not None and not (
+            len(self.bounds) == 2 and self.bounds[0] <= self.bounds[1]
+        ):
+            raise InputError(f"expected (lowest, highest) as bounds, got {self.bounds}")
         object.__setattr__(self, "keyword", self.keyword or self.name)
 
     def __repr__(self) -> str:

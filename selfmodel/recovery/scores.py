@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, held
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, check_function, check_type
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.interface import ObservedRobot, PhysicalRobot
@@ -82,6 +82,10 @@ class Score:
     needs_touch: bool = False
     optional: tuple[Signal, ...] = ()
     episode: int | None = None
+
+    def __post_init__(self) -> None:
+        check_type(self.name, str, "the name of a score as text")
+        check_function("of", self.of)
 
     def most(self, steps: int) -> int | None:
         """Returns the largest return of a trial of some control steps; None for other scores."""

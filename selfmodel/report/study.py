@@ -6,7 +6,7 @@ from statistics import median
 
 import pandas as pd
 
-from selfmodel.errors import counted
+from selfmodel.errors import counted, listed
 from selfmodel.report.charts import BarChart, Cell, Estimate, Group, IntervalChart, Section, Table
 from selfmodel.studies.comparisons import p_text
 from selfmodel.studies.rows import LoadedStudy, label_of, methods_of, whole
@@ -53,6 +53,9 @@ def compared(study: LoadedStudy) -> tuple[str, tuple[str, ...], list[Section]]:
 
 def _best(table: tuple[str, ...], means: pd.DataFrame, pairs: pd.DataFrame) -> str:
     first = means.sort_values("mean", ascending=False, kind="stable").iloc[0]
+    equal = means["method"][means["mean"] == first["mean"]]
+    if len(equal) > 1:
+        return f"{', '.join(table)}: {listed([*equal])} have the largest mean, {first['mean']:.3g}."
     better = int(((pairs["table"] == table) & (pairs["better"] == first["method"])).sum())
     return (
         f"{', '.join(table)}: {first['method']} has the largest mean, {first['mean']:.3g}, and is "

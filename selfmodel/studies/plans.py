@@ -288,7 +288,14 @@ def _known_gaits(
     if not isinstance(controller, str | Path) or Path(controller).suffix not in CONTROLLER_FILES:
         return {}
     path = Path(controller)
-    return {body: read_controller(path, one.robot(), neurons) for body, one in entries.items()}
+    known = {body: read_controller(path, one.robot(), neurons) for body, one in entries.items()}
+    for one in known.values():
+        if one.design.function:
+            raise InputError(
+                f"{path} has the function {one.design.function}, and the cells of a study hold "
+                f"networks: give a policy with a network, or use `selfmodel recover`"
+            )
+    return known
 
 
 def paper(

@@ -166,13 +166,15 @@ def recovered_over_before(rows: Sequence[Row]) -> list[float]:
 class Table:
     """A table, whose file has its name: the rows with all digits, and as texts for readers.
 
-    The first columns for readers, ``texts`` of them, are texts, the others numbers.
+    The first columns for readers, ``texts`` of them, are texts, the others numbers. ``note`` says
+    what the columns are.
     """
 
     name: str
     records: pd.DataFrame
     shown: pd.DataFrame
     texts: int
+    note: str = ""
 
 
 def table_of(
@@ -240,25 +242,27 @@ def ablation_results(folder: str | Path, style: str | Path | None = None) -> Res
         drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
+    legend = _ablation_legend(rows, shared_in(folder))
     return Results(
         facts,
-        [_score_table(scores)],
+        [dataclasses.replace(_score_table(scores), note=legend)],
         _score_table(shown),
-        _ablation_legend(shared_in(folder)),
+        legend,
         _files("ablate", facts) | {f"figures/{name}": data for name, data in drawn.items()},
         [f"warning: {warning}" for warning in warnings],
     )
 
 
-def _ablation_legend(shared: Mapping[str, Any]) -> str:
-    """Returns what the columns are, and at which cost the comparators are compared."""
+def _ablation_legend(rows: Sequence[Row], shared: Mapping[str, Any]) -> str:
+    """Returns what the columns are, and with which search and cost comparators are compared."""
     limit = shared.get("settings", {}).get("max_simulated_steps")
-    text = "With 95 % intervals; time as a multiple of the paper's comparator's."
+    searches = dict.fromkeys(str(row["diagnostic_search"]) for row in rows)
+    text = "With 95 % intervals; time as a multiple of forward-displacement's, if that is there."
     if limit is None:
         return text
     return (
-        f"{text} A diagnosis simulated at most {limit:,} control steps for each trial, whatever "
-        f"the comparator and the search; simulated steps: the median."
+        f"{text} Each comparator has the search {' and '.join(searches)}, and simulated at most "
+        f"{limit:,} control steps for each trial; simulated steps: the median."
     )
 
 
@@ -385,7 +389,8 @@ def markdown_of(table: Table) -> str:
     titles, rows = list(table.shown.columns), table.shown.to_numpy().tolist()
     rule = ["---" if place < table.texts else "---:" for place in range(len(titles))]
     lines = [[text.translate(safe) for text in line] for line in (titles, *rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
+    text = "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
+    return f"{text}\n{table.note}\n" if table.note else text
 
 
 def _latex(table: Table) -> bytes:
@@ -393,7 +398,7 @@ def _latex(table: Table) -> bytes:
     text = table.shown.style.hide(axis="index").format(_mathematical, escape="latex")
     text = text.format_index(escape="latex", axis="columns")
     latex: str = text.to_latex(column_format=sides, hrules=True)
-    return latex.encode()
+    return (f"% {table.note}\n{latex}" if table.note else latex).encode()
 
 
 def _mathematical(text: str) -> str:

@@ -26,8 +26,9 @@ from selfmodel.errors import InputError, unknown_name
 from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
+from selfmodel.files import read_file
 from selfmodel.logs.controllers import NPZ_FAILURES, read_arrays
-from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.logs.files import make_folder, refuse_existing, replace_file
 from selfmodel.logs.policies import Commanded, Observed, PolicyFile, policy_of
 from selfmodel.progress import ignore
 from selfmodel.recovery.evolution_strategy import EvolutionStrategy
@@ -172,7 +173,7 @@ class Training:
         self._seconds, self._clock = self._seconds + now - self._clock, now
         count = self._search.generation + 1
         steps = count * len(genomes) * EPISODE
-        mean, most = (float(finite.mean()), float(finite.max())) if len(finite) else (0.0, 0.0)
+        mean, most = (float(finite.mean()), float(finite.max())) if len(finite) else (math.nan,) * 2
         self.rows.append((count, steps, self._seconds, mean, most))
         return found
 
@@ -196,17 +197,19 @@ class Training:
         commands = np.zeros((count, len(robot.anatomy.motors)))
         self._reward(fields, commands)  # binds its fields before the first step
         total, own = np.zeros(count), self._moments
-        shifted, squares = np.zeros_like(own.mean), np.zeros_like(own.mean)
+        shifted, squares = np.zeros((2, count, len(own.mean)))
         for k in rollout.steps(EPISODE + 1):
             if k:
                 total += self._reward(fields, commands)
             commands[:] = rollout.live["commands"]()
             difference = rollout.observed[self._observation] - own.mean
-            shifted += difference.sum(axis=0)
-            squares += (difference**2).sum(axis=0)
-        if learn and np.isfinite(squares).all():
-            own.add(count * (EPISODE + 1), shifted, squares)
-        return np.where(rollout.diverged() | ~np.isfinite(total), -math.inf, total)
+            shifted += difference
+            squares += difference**2
+        finite = np.isfinite(total) & ~rollout.diverged()
+        if learn and finite.any():
+            rows = int(finite.sum()) * (EPISODE + 1)
+            own.add(rows, shifted[finite].sum(axis=0), squares[finite].sum(axis=0))
+        return np.where(finite, total, -math.inf)
 
     def judged(self, episodes: int) -> FloatArray:
         """Returns the returns of the policy in episodes that no training has, ``(episodes,)``."""
@@ -217,15 +220,12 @@ class Training:
 
     def save(self, folder: Path) -> None:
         """Writes the policy, the progress and the state; each file is whole at any time."""
-        design, own = self.design, self._moments
+        design = self.design
         tensors = {name: one[0] for name, one in design.tensors(self._search.mean[None]).items()}
         about = {"robot": self.name, **asdict(self.settings), "seconds": self._seconds}
         about |= {"rng": self._rng.bit_generator.state}
         state = {
-            **self._search.state(),
-            "count": np.array(own.count),
-            "average": own.mean,
-            "square": own.square,
+            **self._arrays,
             "rows": np.array(self.rows),
             "about": np.array(json.dumps(about)),
         }
@@ -238,30 +238,52 @@ class Training:
         ):
             replace_file(folder / name, content)
 
+    @property
+    def _arrays(self) -> dict[str, FloatArray]:
+        """Arrays of the state, besides the progress; their shapes are those of the task."""
+        own = self._moments
+        average = {"count": np.array(own.count), "average": own.mean, "square": own.square}
+        return {**self._search.state(), **average}
+
     def resume(self, path: Path) -> None:
         """Continues from a state file.
 
         Raises:
             InputError: The file is of another training, or none.
         """
-        try:
-            found = read_arrays(path.read_bytes(), 2**30)
-            about = json.loads(str(found["about"]))
-            rng, seconds = about.pop("rng"), float(about.pop("seconds"))
-            moments = Moments(float(found["count"]), found["average"], found["square"])
-            rows = [(int(k), int(steps), *own) for k, steps, *own in found["rows"].tolist()]
-        except (OSError, *NPZ_FAILURES) as error:
-            raise InputError(f"{path}: expected the state of a training: {error}") from error
+        data = read_file(path, "the state of a training", MAX_STATE_BYTES)
         mine = {"robot": self.name, **asdict(self.settings)}
-        if differ := [name for name in mine if about.get(name) != mine[name]]:
+        try:
+            found = read_arrays(data, MAX_STATE_BYTES)
+            about = json.loads(str(found["about"]))
+            differ = [OPTIONS.get(name, name) for name in mine if about.get(name) != mine[name]]
+            if not differ:
+                self._continue(found, about)
+        except NPZ_FAILURES as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{path}: expected the state of a training: {reason}") from error
+        if differ:
             raise InputError(
                 f"{path} is of a training with another {', '.join(differ)}: give its options, or "
                 f"another folder"
             )
-        self._search.resume(found)
-        self._rng.bit_generator.state = rng
-        self._seconds, self._moments, self.rows = seconds, moments, rows
 
+    def _continue(self, found: Mapping[str, Any], about: Mapping[str, Any]) -> None:
+        for name, own in self._arrays.items():
+            if found[name].shape != own.shape or not np.isfinite(found[name]).all():
+                raise ValueError(f"{name} is not {own.shape} finite numbers")
+        self.rows = [(int(k), int(steps), *own) for k, steps, *own in found["rows"].tolist()]
+        self._rng.bit_generator.state = about["rng"]
+        self._seconds = float(about["seconds"])
+        self._moments = Moments(float(found["count"]), found["average"], found["square"])
+        self._search.resume(found)
+
+
+OPTIONS = {"hidden": "neurons", "pairs": "population"}
+"""Options of the command line that settings are given by, where the names differ."""
+
+MAX_STATE_BYTES = 2**30
+"""Largest state of a training."""
 
 COLUMNS = ("generation", "steps", "cpu_seconds", "mean_return", "best_return")
 """Columns of the progress."""
@@ -319,12 +341,16 @@ def evolve_policy(
         on_event: Called after each generation.
 
     Raises:
-        InputError: The task is unknown, or the folder has another training.
+        InputError: The task is unknown, or the folder has another training, or a policy of another
+            source.
     """
     training = Training(robot, settings, thread_count(threads))
     make_folder(folder)
     if (folder / STATE).exists():
         training.resume(folder / STATE)
+    else:
+        for name in (POLICY, NETWORK):
+            refuse_existing(folder / name)
 
     def after(generation: Generation) -> None:
         training.save(folder)

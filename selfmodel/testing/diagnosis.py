@@ -99,14 +99,12 @@ def check_comparator(
     if trial is None or simulated is None:
         trial, simulated = _walk(comparator)
     name = comparator.name
-    require(name and name == name.strip(), f"a comparator needs a name, got {name!r}")
+    require(
+        isinstance(name, str) and name and name == name.strip(),
+        f"a comparator needs a name, got {name!r}",
+    )
     logged = _bits(trial.trajectory.signals)
-    prepared, again = comparator.prepare(trial), comparator.prepare(trial)
-    for one in (prepared, again):
-        require(
-            isinstance(one, PreparedTrial | PiecewiseTrial),
-            f"prepare must return an object with request and losses or distances, got {one!r}",
-        )
+    prepared, again = _prepared(comparator, trial), _prepared(comparator, trial)
     request = prepared.request
     _check_request(request, trial)
     require(
@@ -150,13 +148,22 @@ def _walk(comparator: Comparator) -> tuple[Trial, Trajectory]:
     logged = simulator.run([(INTACT, controller)], CHECKED_STEPS, SIGNALS).trajectory.run(0)
     plan = TrialPlan("check", "single", controller, CHECKED_STEPS, 0)
     trial = Trial(plan, robot.name, logged, "check")
-    request = comparator.prepare(trial).request
+    request = _prepared(comparator, trial).request
     _check_request(request, trial)
     broken = parse_hypothesis("break:front_left_knee", robot)
     runs = simulate(simulator, request, trial, [INTACT, broken]).trajectory
     exact = shown(request, trial)
     signals = {one: np.concatenate([exact[one], runs[one][1:]]) for one in request.record}
     return trial, replace(runs, signals=signals)
+
+
+def _prepared(comparator: Comparator, trial: Trial) -> PreparedTrial | PiecewiseTrial:
+    prepared = comparator.prepare(trial)
+    require(
+        isinstance(prepared, PreparedTrial | PiecewiseTrial),
+        f"prepare must return an object with request and losses or distances, got {prepared!r}",
+    )
+    return prepared
 
 
 def _bits(arrays: Mapping[Any, NDArray[Any]]) -> dict[Any, bytes]:

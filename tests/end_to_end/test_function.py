@@ -76,7 +76,10 @@ def test_a_function_drives_a_trial_as_its_network_does_and_its_log_has_the_comma
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        ("short", "own.toml does not fit quadruped: the function {}:short returns the shape (3,)"),
+        (
+            "short",
+            "own.toml does not fit quadruped: the function {}:short returns float64 numbers of",
+        ),
         ("broken", "the function {}:broken failed: RuntimeError: no model"),
         ("NUMBER", "expected a function as {}:NUMBER, got 5"),
         ("wlak", "cannot find the function '{}:wlak'"),

@@ -45,7 +45,7 @@ def test_a_training_that_goes_on_has_the_bits_of_a_whole_one(tmp_path: Path):
 def test_a_folder_of_another_training_is_refused(tmp_path: Path):
     evolve_policy(HOPPER, tmp_path, SMALL, generations=1, threads=1)
     other = TrainingSettings(hidden=2, pairs=3, seed=5)
-    with pytest.raises(InputError, match="of a training with another hidden, seed: give its opt"):
+    with pytest.raises(InputError, match="of a training with another neurons, seed: give its opt"):
         evolve_policy(HOPPER, tmp_path, other, generations=2, threads=1)
     (tmp_path / training.STATE).write_bytes(b"PK")
     with pytest.raises(InputError, match=r"state.npz: expected the state of a training"):

@@ -12,7 +12,7 @@ from selfmodel.errors import InputError, listed, unknown_name
 from selfmodel.robot.actuators import ancestors, command_range, command_ranges
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
-from selfmodel.robot.mjcf.settings import check_patterns, value_of
+from selfmodel.robot.mjcf.settings import MIN_CONTROL_TIMESTEP, check_patterns, value_of
 from selfmodel.robot.mjcf.work import UniqueNames, Work, format_numbers
 
 _JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
@@ -51,7 +51,8 @@ def _hinges(model: mujoco.MjModel) -> list[str]:
 def set_physics(work: Work) -> None:
     """Sets the time step, the contacts and the hinges to the values of the settings."""
     settings, hinges = work.settings, _hinges(work.model)
-    joints = [joint for joint in work.root.iter("joint") if joint.get("name") in hinges]
+    world = work.section("worldbody")
+    joints = [joint for joint in world.iter("joint") if joint.get("name") in hinges]
     for attribute, values in (
         ("armature", settings.armature),
         ("damping", settings.damping),
@@ -65,8 +66,9 @@ def set_physics(work: Work) -> None:
     if settings.timestep is not None:
         work.section("option").set("timestep", repr(settings.timestep))
     if settings.solref is not None:
-        for geom in work.root.iter("geom"):
-            geom.set("solref", format_numbers(np.array(settings.solref)))
+        pairs = work.root.findall("contact/pair")
+        for element in (*world.iter("geom"), *pairs):
+            element.set("solref", format_numbers(np.array(settings.solref)))
 
 
 def note_stiff_servos(work: Work) -> None:
@@ -74,22 +76,24 @@ def note_stiff_servos(work: Work) -> None:
     model = work.model
     timestep, periods, lacking = model.opt.timestep, dict[str, float](), 0.0
     for motor in range(model.nu):
-        if not (model.actuator_gainprm[motor, 0] > 0 and _drives_hinge(model, motor, _AFFINE)):
+        stiffness = -model.actuator_biasprm[motor, 1] * model.actuator_gear[motor, 0] ** 2
+        if not (_drives_hinge(model, motor, _AFFINE) and stiffness > 0):
             continue
         joint = int(model.actuator_trnid[motor, 0])
         inertia = model.dof_M0[model.jnt_dofadr[joint]]
-        stiffness = model.actuator_gainprm[motor, 0] * model.actuator_gear[motor, 0] ** 2
         period = 2 * np.pi * np.sqrt(inertia / stiffness) / timestep
         if period < MIN_PERIOD:
             periods[model.joint(joint).name] = period
             lacking = max(lacking, inertia * ((MIN_PERIOD / period) ** 2 - 1))
     if periods:
         least = min(periods.values())
+        control = work.settings.control_timestep or MIN_CONTROL_TIMESTEP
+        shorter = control / np.ceil(control / (timestep * least / MIN_PERIOD))
         work.notes.append(
             f"servos of {listed([*periods], _MAX_LISTED)} are stiff for a physics time step of "
             f"{timestep:g} s: they oscillate within {least:.1f} steps, and the motion may depend "
-            f"on the step; set timestep to {timestep * least / MIN_PERIOD:.2g}, or armature, the "
-            f"inertia of the rotors at their joints, to {lacking:.2g} kg m² more"
+            f"on the step; set timestep to {shorter:.6g}, or armature, the inertia of the rotors "
+            f"at their joints, to {1.05 * lacking:.2g} kg m² more"
         )
 
 

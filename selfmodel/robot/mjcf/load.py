@@ -21,6 +21,7 @@ from selfmodel.isolation import Message, run_isolated
 from selfmodel.robot.mjcf import equipment, meshes, pose, structure, untrusted
 from selfmodel.robot.mjcf.settings import (
     MAX_CONTROL_TIMESTEP,
+    MIN_CONTROL_TIMESTEP,
     MjcfSettings,
     checked_settings,
     read_settings,
@@ -29,9 +30,6 @@ from selfmodel.robot.mjcf.work import Work, read_mjcf
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot, check_usable
 from selfmodel.robot.urdf import read_urdf
-
-MIN_CONTROL_TIMESTEP = 0.01
-"""Lower bound of the default control time step, s."""
 
 MAX_SUBSTEPS = 1000
 """Largest number of physics steps per control step; the model of a log has the same limit."""

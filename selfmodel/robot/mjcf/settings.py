@@ -27,6 +27,9 @@ FORWARD_DIRECTIONS: Mapping[str, float] = {"x": 0.0, "y": 90.0, "-x": 180.0, "-y
 MAX_CONTROL_TIMESTEP = 10.0
 """Upper bound of the control time step, s."""
 
+MIN_CONTROL_TIMESTEP = 0.01
+"""Lower bound of the default control time step, s."""
+
 MIN_TIMESTEP = 1e-6
 """Smallest physics time step, s."""
 
