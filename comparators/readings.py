@@ -94,11 +94,12 @@ def command_errors(trial: Trial) -> FloatArray:
     Returns:
         ``(steps, motors)`` in each motor's unit, exactly 0 where the robot executed its controller.
         NaN from the first reading that was not observed, because the controller's state is unknown
-        from there. All 0 for a playback, whose controller is unknown.
+        from there. All 0 for a playback, whose controller is unknown, and for a policy that
+        observes more than the readings: that is logged with other noise, or not at all.
     """
     trajectory, source = trial.trajectory, trial.plan.controller
     commands, readings = trajectory["commands"], trajectory["sensors"]
-    if isinstance(source, Playback):
+    if isinstance(source, Playback) or source.design.observes:
         return np.zeros_like(commands)
     batch = make_batch([source], [frozenset()], readings.shape[1])
     errors = np.full_like(commands, np.nan)

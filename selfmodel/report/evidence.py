@@ -221,9 +221,11 @@ def _separating_trials(subject: Subject) -> tuple[Item, ...]:
 
 
 def _separating_controller(subject: Subject, steps: int) -> Controller | None:
-    """Returns a controller evolved to separate the hypotheses; None for recordings alone."""
+    """Returns a controller evolved to separate the hypotheses; None without one that can evolve."""
     drivers = [trial.plan.controller for trial in reversed(subject.damaged)]
-    newest_first = [one for one in dict.fromkeys(drivers) if isinstance(one, Controller)]
+    newest_first = [
+        one for one in dict.fromkeys(drivers) if isinstance(one, Controller) and len(one.genome)
+    ]
     if not newest_first or steps < 2:
         return None
     settings, rng = Settings(steps=steps).scaled(POPULATION), np.random.default_rng(SEED)

@@ -18,6 +18,7 @@ from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPredic
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.recording import load_policy
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.testing import shown
@@ -193,6 +194,15 @@ def test_a_playback_has_errors_of_exactly_0(quadruped: Robot):
     played = dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=driver))
 
     assert np.array_equal(command_errors(played), np.zeros((STEPS, len(driver.motors))))
+
+
+def test_a_policy_has_errors_of_exactly_0_whatever_it_observes(quadruped: Robot):
+    terms = {"observation": [{"term": "joint_positions"}, {"term": "angular_velocity"}]}
+    policy = load_policy(terms, quadruped, lambda seen: 0.3 - seen[:8])
+    one = trial_of(quadruped, "intact", policy, steps=STEPS)
+
+    assert np.ptp(one.trajectory["commands"], axis=0).all()
+    assert not command_errors(one).any()
 
 
 SEGMENTS, ROWS, SENSORS = 80, 13, 4

@@ -10,6 +10,7 @@ from selfmodel.diagnosis.diagnosis import Change
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs.controllers import parse_controller
+from selfmodel.recording import load_policy
 from selfmodel.report.charts import Attachment, BarChart, HeatMap, LineChart, Section, Table
 from selfmodel.report.evidence import residual_section, separation_section
 from selfmodel.report.subject import Subject
@@ -90,3 +91,17 @@ def test_a_trial_is_evolved_that_separates_the_alternatives_and_can_be_saved(sub
     controller = parse_controller(attachment.data, attachment.name)
     assert controller.design == subject.damaged[0].plan.controller.design
     assert controller not in [trial.plan.controller for trial in subject.damaged]
+
+
+def test_no_trial_is_evolved_from_a_policy_which_has_no_weights(subject: Subject):
+    terms = {"observation": [{"term": "joint_positions"}]}
+    policy = load_policy(terms, subject.robot, lambda seen: -seen)
+    damaged = tuple(
+        dataclasses.replace(one, plan=dataclasses.replace(one.plan, controller=policy))
+        for one in subject.damaged
+    )
+    other = parse("jam:back_left_knee=0.5", subject.robot.anatomy)
+    diagnosis = dataclasses.replace(subject.diagnosis, indistinguishable=(other,))
+    changed = dataclasses.replace(subject, damaged=damaged, diagnoses=(diagnosis,))
+
+    assert [type(item) for item in separation_section(changed).items] == [Table, BarChart]
