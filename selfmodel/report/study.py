@@ -166,14 +166,6 @@ def recovered(rows: Sequence[Row]) -> tuple[str, list[Section]]:
     runs = [row for row in rows if None not in (row["before"], row["recovered"])]
     robots = counted(len({row["robot"] for row in runs}), "robot")
     headline = f"{counted(len(runs), 'run')} of {robots} with a failure"
-    walked = [row for row in runs if row["before"] > 0]
-    stayed = [row for row in walked if row.get("upright") is not False]  # a fall is no recovery
-    if walked:
-        after = median(row["after"] / row["before"] for row in walked)
-        headline += f": a median of {after:.0%} of the score remains"
-    if stayed:
-        best = median(row["recovered"] / row["before"] for row in stayed)
-        headline += f", {best:.0%} is recovered"
     if falls := sum(row.get("upright") is False for row in runs):
         headline += f"; in {falls} the best trial fell, which is not recovered"
     scores = grouped([{"score": None, "unit": None, **row} for row in runs], "score", "unit")
