@@ -15,6 +15,17 @@ found.unnamed = await page.$$eval("figure, svg[role=img], canvas, input, select,
     .map((one) => one.outerHTML.slice(0, 120)),
 );
 
+// Labels of bars that are on a bar or beyond the page, where they cannot be read.
+found.illegible = await page.$$eval(".track .value", (all) =>
+  all
+    .filter((one) => {
+      const bar = one.parentElement.querySelector(".fill").getBoundingClientRect();
+      const label = one.getBoundingClientRect();
+      return (label.left < bar.right - 2 && bar.left < label.right) || label.right > document.body.clientWidth;
+    })
+    .map((one) => one.textContent),
+);
+
 // Every table: those of sections, and those that are made as "Data as a table" is opened.
 await page.$$eval("details.data", (all) => all.forEach((one) => (one.open = true)));
 await page.waitForFunction(() => [...document.querySelectorAll("details.data")].every((one) => one.querySelector("table")));

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from selfmodel.arrays import data_frame, finite_or_none
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -144,18 +146,24 @@ class Recovery:
 
     @property
     def best_trial(self) -> int:
-        """Number of the recovery trial with the largest score; of the first if all are NaN."""
-        known = [-math.inf if math.isnan(score) else score for score in self.scores]
-        return max(range(2, len(known)), key=known.__getitem__)
+        """Number of the recovery trial with the largest score, of those without a fall if any.
+
+        It is the first of them if all scores are NaN.
+        """
+        scored = [
+            (not math.isnan(one.value), one.fall is None, np.nan_to_num(one.value))
+            for one in self.scored
+        ]
+        return max(range(2, len(scored)), key=scored.__getitem__)
 
     @property
     def fell(self) -> bool:
-        """Whether the robot fell in the recovery trial with the largest score."""
+        """Whether the robot fell in the best recovery trial, and so in all that have a score."""
         return self.falls[self.best_trial] is not None
 
     @property
     def best_score(self) -> float:
-        """Largest score of the recovery trials; NaN if unobserved in all."""
+        """Score of the best recovery trial; NaN if unobserved in all."""
         return self.scores[self.best_trial]
 
     @property
@@ -170,7 +178,7 @@ class Recovery:
 
     @property
     def recovered(self) -> float:
-        """Forward displacement in the recovery trial with the largest score, m.
+        """Forward displacement in the best recovery trial, m.
 
         NaN if the base was not observed in that trial.
         """

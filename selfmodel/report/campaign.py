@@ -19,7 +19,7 @@ from selfmodel.errors import InputError, counted
 from selfmodel.files import check_regular, encodable, read_file
 from selfmodel.logs.results import parse_json
 from selfmodel.report.charts import Cell, Picture, Report, Section, Table
-from selfmodel.report.study import CORRECT, compared, methods_in, recovered, shares
+from selfmodel.report.study import CORRECT, compared, methods_in, recoveries, shares
 from selfmodel.studies.rows import kind_of, load
 from selfmodel.studies.statistics import proportion
 
@@ -86,7 +86,7 @@ def _findings(
     names = (name for name, one in tables.items() if kind_of({key for row in one for key in row}))
     study = load(folder / name) if (name := next(names, "")) else None
     if study is not None and study.kind == "suite":
-        headline, sections = recovered(to_json(study.rows.to_dict("records")))
+        headline, sections = recoveries(to_json(study.rows.to_dict("records")))
         return headline, (), [*sections, shares(rows, by_method=True)]
     if study is not None and study.outcomes["method"].nunique() > 1:
         headline, best, sections = compared(study)

@@ -9,12 +9,10 @@ import pandas as pd
 from selfmodel.errors import counted, listed
 from selfmodel.report.charts import BarChart, Cell, Estimate, Group, IntervalChart, Section, Table
 from selfmodel.studies.comparisons import p_text
-from selfmodel.studies.rows import LoadedStudy, label_of, methods_of, whole
+from selfmodel.studies.recoveries import ENDS
+from selfmodel.studies.rows import LoadedStudy, label_of, methods_of, outcomes_text, whole
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, grouped
-
-ENDS = ("before", "after", "recovered")
-"""Columns of the scores of a recovery."""
 
 CORRECT = "correct"
 """Column of the rows of a study: whether a diagnosis is right."""
@@ -161,24 +159,28 @@ def _numbers_first(name: str) -> tuple[float, str]:
     return (math.inf if math.isnan(value) else value), name
 
 
-def recovered(rows: Sequence[Row]) -> tuple[str, list[Section]]:
+def recoveries(rows: Sequence[Row]) -> tuple[str, list[Section]]:
     """Returns headline and sections of a study of bodies: what they did after a failure."""
-    runs = [row for row in rows if None not in (row["before"], row["recovered"])]
+    runs = [row for row in rows if None not in (row["before"], row["best_trial"])]
     robots = counted(len({row["robot"] for row in runs}), "robot")
     headline = f"{counted(len(runs), 'run')} of {robots} with a failure"
-    if falls := sum(row.get("upright") is False for row in runs):
-        headline += f"; in {falls} the best trial fell, which is not recovered"
+    if outcomes := outcomes_text(runs):
+        headline += f": {outcomes}"
     scores = grouped([{"score": None, "unit": None, **row} for row in runs], "score", "unit")
     charts = tuple(
         BarChart(
-            title="Before the failure, after it, and recovered",
+            title="Before the failure, after it, and in the best trial since",
             x_label=label_of(same),
-            names=ENDS,
+            names=tuple(end.replace("_", " ") for end in ENDS),
             groups=tuple(_body(*key, own) for key, own in _failures(same).items()),
         )
         for same in scores.values()
     )
-    text = "Medians over the seeds of a body and a failure. A hatched bar has a trial that fell."
+    text = (
+        "Medians over the seeds of a body and a failure. A hatched bar has a trial that fell. The "
+        "best trial is one without a fall, unless the robot fell in all. A failure has no effect "
+        "if it took at most 5 % of the score, and made no robot fall."
+    )
     reasons = dict.fromkeys(
         f"{row['robot']}: {row['reason']}." for row in rows if row.get("reason")
     )
@@ -196,8 +198,8 @@ def _failures(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
 
 def _body(robot: str, failure: str, rows: Sequence[Row]) -> Group:
     notes = []
-    for column in ("upright_before", "upright_after", "upright"):
-        falls = sum(row.get(column) is False for row in rows)
+    for end in ENDS:
+        falls = sum(row.get(f"upright_{end}") is False for row in rows)
         notes.append(f"fell in {falls} of {len(rows)}" if falls else "")
     values = tuple(float(median(row[name] for row in rows)) for name in ENDS)
     return Group(f"{robot}, {failure}", values, tuple(notes))

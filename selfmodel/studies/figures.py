@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import counted
 from selfmodel.robot.robot import Robot
-from selfmodel.studies.recoveries import robot_key
+from selfmodel.studies.recoveries import ENDS, robot_key
 from selfmodel.studies.rows import failure_of, label_of, methods_of, whole
 from selfmodel.studies.study import Row, grouped
 from selfmodel.style import (
@@ -140,7 +140,7 @@ def of_suite(rows: Sequence[Row]) -> dict[str, bytes]:
 
 @figure_style()
 def by_body(rows: Sequence[Row]) -> Figure:
-    """Returns the score of each body and failure before, after and recovered, a dot per run.
+    """Returns the scores of each body and failure at the ``ENDS``, a dot per run.
 
     A cross in place of a dot is a trial in which the robot fell.
     """
@@ -148,20 +148,19 @@ def by_body(rows: Sequence[Row]) -> Figure:
     labels = [f"{robot}, {truth} ({counts_text([len(own)])})" for (robot, _, truth), own in places]
     size = (3.7 + 0.068 * max(map(len, labels)), 0.5 + 0.36 * len(places))
     figure, (axes,) = panels_of(1, 1, size=size, margin=(0.4, 0.8), share=False)
-    ends = ("before", "upright_before"), ("after", "upright_after"), ("recovered", "upright")
-    for number, (end, upright) in enumerate(ends):
+    for number, end in enumerate(ENDS):
         values: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
         for place, (_, own) in enumerate(places):
             y = place + 0.24 * (number - 1)
             for row in own:
-                values[row.get(upright) is False].append((row[end], y))
+                values[row.get(f"upright_{end}") is False].append((row[end], y))
         for fell, points in values.items():
             style: Style = look(number) | {"linestyle": "none", "alpha": 0.8, "markersize": 5}
             axes.plot(
                 *np.array(points, dtype=float).reshape(-1, 2).T,
-                **style | ({"marker": "x"} if fell else {"label": end}),
+                **style | ({"marker": "x"} if fell else {"label": end.replace("_", " ")}),
             )
-    if any(row.get(upright) is False for row in rows for _, upright in ends):
+    if any(row.get(f"upright_{end}") is False for row in rows for end in ENDS):
         axes.plot([], [], color="0.3", marker="x", linestyle="none", label="fell")
     axes.axvline(0, color="0.3", linewidth=0.8)
     axes.set_yticks(range(len(places)), labels, fontsize=text_size(0.8))

@@ -263,7 +263,9 @@ def _share(before: float, best: float, **_row: object) -> float:
 
 
 def _summary(rows: Sequence[Row]) -> Row:
-    first, ratios = rows[0], tables.recovered_over_before(rows)
+    first = rows[0]
+    known = [row for row in rows if None not in (row["before"], row["recovered"])]
+    ratios = [row["recovered"] / row["before"] for row in known if row["before"] > 0]
     return {
         **{name: first[name] for name in ("robot", "case", "truth", "comparator")},
         "runs": len(rows),

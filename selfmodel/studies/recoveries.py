@@ -38,7 +38,7 @@ from selfmodel.logs.journal import RECOVERY
 from selfmodel.logs.physical_trial import run_trial
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.results import RecoveryResult
+from selfmodel.logs.results import RecoveryResult, TrialResult
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.recover import diagnose_trials, random_stream
 from selfmodel.recovery.repair import MakeSearch, RepairSearch
@@ -70,6 +70,12 @@ ON_ROBOT = "evolution-on-robot"
 
 REPAIR = "repair_settings"
 """Parameter with the settings of the repair, where they are others."""
+
+ENDS = ("before", "after", "best_trial")
+"""What is reported of a recovery: before and after the failure, and in its best trial since."""
+
+NO_EFFECT = 0.05
+"""Largest loss by a failure without an effect, as a share of the score before it."""
 
 TRIAL_COLUMNS = ("stage", "hypothesis", "score", "robust_mean", "displacement", "fell_at_step")
 """Columns of a trial of a recovery that are those of its result."""
@@ -321,10 +327,11 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     recovery, result = outcome.recovery, experiments.result_of(experiment, outcome)
     result.write(experiment.folder, settings, of_repair)
     before, after, *recoveries = recovery.scores
+    _, _, *tried = result.trials or ()
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
-        tried = recoveries[: row["trials"] - 1]
-        found = {"before": before, "after": after, "recovered": max(tried, default=None)}
+        best = max(recoveries[: row["trials"] - 1], default=None)
+        found = {"before": before, "after": after, "recovered": best}
         row |= {**found, **_named(parameters)}
     own = {
         "robot": robot.name,
@@ -334,6 +341,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "correct": outcome.correct,
         "verdict": recovery.diagnosis.verdict,
         "trials": len(recovery.trials) - 1,
+        "recovered": max((one.score for one in tried if one.score is not None), default=None),
         **_ends(result, recovery.best_trial, entry, steps),
         "distinct_hypotheses": recovery.distinct_hypotheses,
         "diverged": outcome.stats.diverged,
@@ -362,12 +370,36 @@ def _ends(result: RecoveryResult, best: int, entry: Entry, steps: int) -> Row:
     """Returns what was reached before and after the failure, and in the best recovery trial."""
     trials, task = result.trials or (), entry.episode_return
     row: Row = {"score": result.score.name, "unit": result.score.unit, "control_steps": steps}
-    for name, one in (("before", trials[0]), ("after", trials[1]), ("recovered", trials[best])):
+    ends = trials[0], trials[1], trials[best]
+    for name, one in zip(ENDS, ends, strict=True):
         row[name] = one.score
-        row["upright" if name == "recovered" else f"upright_{name}"] = one.fell_at_step is None
+        row[f"upright_{name}"] = one.fell_at_step is None
         row[f"displacement_{name}"] = one.displacement
         row[f"return_{name}"] = one.reward_sum
+    row["regained"], row["outcome"] = outcome_of(*ends)
     return {**row, "return_most": None if task is None else task.most(steps)}
+
+
+def outcome_of(
+    before: TrialResult, after: TrialResult, best: TrialResult
+) -> tuple[float | None, str | None]:
+    """Returns the share of the lost score that the best recovery trial regained, and the outcome.
+
+    The outcome is ``no effect`` if the failure took at most ``NO_EFFECT`` of the score, and the
+    robot fell after it only if it had before; ``fell``, which is no recovery; and ``better`` or
+    ``not better`` than after the failure. The first two have no share; nor has a failure that made
+    the robot fall and took no score. Both are None without all scores.
+    """
+    if before.score is None or after.score is None or best.score is None:
+        return None, None
+    loss = before.score - after.score
+    has_lost = loss > NO_EFFECT * abs(before.score)
+    if not has_lost and (after.fell_at_step is None or before.fell_at_step is not None):
+        return None, "no effect"
+    if best.fell_at_step is not None:
+        return None, "fell"
+    share = (best.score - after.score) / loss if has_lost else None
+    return share, "better" if share is None or share > 0 else "not better"
 
 
 def _evolve_on_robot(parameters: Parameters, needs: Folders) -> Rows:

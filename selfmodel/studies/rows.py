@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from selfmodel.files import path_of, read_file
 from selfmodel.plugins import RETURN
 from selfmodel.recovery.scores import score_label
 from selfmodel.studies import comparisons
+from selfmodel.studies.recoveries import ENDS
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, rows_in, shared_in
 
@@ -37,6 +39,11 @@ AFTER = (1, 3, 20)
 
 ORACLE = "oracle"
 """Name of the method that is a bound, and is not compared."""
+
+MEASURED = ("upright", "displacement", RETURN)
+"""What is reported at these ends beside the score; the return of a robot with a task."""
+
+AT_ENDS = tuple(f"{what}_{end}" for what in MEASURED for end in ENDS)
 
 OutcomeRows = Iterator[tuple[Any, ...]]
 
@@ -157,13 +164,11 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         ),
         "suite": Kind(
             "recoveries",
-            "robot case truth seed best correct verdict trials score unit control_steps before "
-            "after recovered upright_before upright_after upright displacement_before "
-            "displacement_after displacement_recovered return_before return_after return_recovered "
-            "return_most diverged simulated_steps seconds repair search reason",
-            "score unit control_steps upright_before upright_after upright displacement_before "
-            "displacement_after displacement_recovered return_before return_after return_recovered "
-            "return_most simulated_steps repair search reason",
+            "robot case truth seed best correct verdict trials score unit control_steps "
+            f"{' '.join(ENDS)} regained outcome {' '.join(AT_ENDS)} return_most diverged "
+            "simulated_steps seconds repair search reason",
+            f"score unit control_steps regained outcome {' '.join(AT_ENDS)} return_most "
+            "simulated_steps repair search reason",
             "robot case truth seed",
             lambda _rows: iter(()),  # its bodies have one comparator, and are no pairs
         ),
@@ -386,3 +391,9 @@ def label_of(rows: Sequence[Row]) -> str:
     score, unit = rows[0].get("score") or "score", rows[0].get("unit") or ""
     limits = {row.get("return_most") if score == RETURN else None for row in rows}
     return score_label(score, unit, limits.pop() if len(limits) == 1 else None)
+
+
+def outcomes_text(rows: Sequence[Row]) -> str:
+    """Returns the outcomes of recoveries with their numbers as text, the most frequent first."""
+    counts = Counter(row["outcome"] for row in rows if row.get("outcome"))
+    return ", ".join(f"{number} {outcome}" for outcome, number in counts.most_common())

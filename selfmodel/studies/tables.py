@@ -21,12 +21,15 @@ from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
+from selfmodel.studies.recoveries import ENDS
 from selfmodel.studies.rows import (
+    AT_ENDS,
     KINDS,
     REFERENCE,
     frame_of,
     methods_of,
     outcomes_of,
+    outcomes_text,
     study_rows,
     whole,
 )
@@ -43,12 +46,6 @@ TRIAL_COLUMNS = (
 
 SINGLE = (1, 2, 3, 5, 6)
 """Numbers of the cases with a single fault."""
-
-ENDS = ("before", "after", "recovered")
-"""What is reported of a recovery: before and after the failure, and in its best trial since."""
-
-MEASURED = ("displacement", RETURN)
-"""What is reported at these ends beside the score; the return of a robot with a task."""
 
 
 def ablation_scores(rows: Sequence[Row]) -> list[Row]:
@@ -100,11 +97,11 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
         ``robot``; ``case`` and ``truth``, None and "" for all single faults of Table I; ``runs``
         and ``right``, their numbers; ``correct``, the proportion of right diagnoses with Wilson's
         interval; ``score``, its ``unit``, and the ``control_steps``; the medians of ``before``,
-        ``after`` and ``recovered``, of the displacements and returns with these ends, and
-        ``return_most``; ``recovery``, see ``recovered_over_before``, its median; ``upright``, the
-        number of runs whose best recovery trial had no fall, None if that is unknown; the mean
-        number of ``trials``; the medians of the ``simulated_steps`` and the ``seconds``;
-        ``reason``, why the body cannot have the failure.
+        ``after`` and ``best_trial``, of the displacements and returns with these ends, and
+        ``return_most``; the median of ``regained`` and the number of each of the ``outcomes``, see
+        ``recoveries.outcome_of``; ``upright`` with these ends, the number of runs without a fall in
+        that trial, None if that is unknown; the mean number of ``trials``; the medians of the
+        ``simulated_steps`` and the ``seconds``; ``reason``, why the body cannot have the failure.
     """
     summaries = []
     for (robot,), own in grouped(rows, "robot").items():
@@ -121,15 +118,15 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
 
 def _summary(rows: Sequence[Row]) -> Row:
     runs, first = [row for row in rows if not row.get("reason")], rows[0]
-    ratios = recovered_over_before(runs)
-    stayed = [row["upright"] for row in runs if row.get("upright") is not None]
+    up = {name: [row[name] for row in runs if row.get(name) is not None] for name in AT_ENDS[:3]}
     return {
         **_right(runs),
         **{name: first.get(name) for name in ("score", "unit", "control_steps")},
-        **medians(runs, *ENDS, *(f"{what}_{end}" for what in MEASURED for end in ENDS)),
+        **medians(runs, *ENDS, "regained"),
+        "outcomes": outcomes_text(runs),
+        **{name: sum(stayed) if stayed else None for name, stayed in up.items()},
+        **medians(runs, *AT_ENDS[3:]),
         "return_most": first.get("return_most"),
-        "recovery": median(ratios) if ratios else None,
-        "upright": sum(stayed) if stayed else None,
         "trials": fmean(row["trials"] for row in runs) if runs else None,
         **medians(runs, "simulated_steps", "seconds"),
         "reason": first.get("reason"),
@@ -146,20 +143,6 @@ def medians(rows: Sequence[Row], *names: str) -> Row:
     """Returns the medians of some columns, of the known values; None without any."""
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in names}
     return {name: median(values) if values else None for name, values in known.items()}
-
-
-def recovered_over_before(rows: Sequence[Row]) -> list[float]:
-    """Returns the recovered part of the score before the failure, where that is above 0.
-
-    A robot that fell in its best recovery trial, which is not ``upright``, is not recovered.
-    """
-    return [
-        row["recovered"] / row["before"]
-        for row in rows
-        if row.get("upright") is not False
-        and None not in (row["before"], row["recovered"])
-        and row["before"] > 0
-    ]
 
 
 @dataclass(frozen=True)
@@ -292,8 +275,10 @@ def _legend(summaries: Sequence[Row]) -> str:
         return "\n".join(lines)
     text = (
         f"The score is {run['score']}, of trials of {run['control_steps']} control steps: medians "
-        f"before and after the failure, and in the best trial since. A robot that fell in that "
-        f"trial is not recovered, and counts in no recovered ÷ before. "
+        f"before and after the failure, and in the best trial since, which is one without a fall "
+        f"unless the robot fell in all. Loss regained is (best trial - after) / (before - after), "
+        f"the median. A robot that fell is not recovered, and a failure that took at most 5 % of "
+        f"the score, and made no robot fall, has no effect: both have no loss regained. "
     )
     if most := next((one["return_most"] for one in summaries if one["return_most"]), None):
         which = "as these trials" if most == EPISODE else f"of which these trials have {most:,}"
@@ -340,14 +325,12 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
         "right": f"{one['right']} of {runs}{interval}" if runs else "-",
     }
     for end in ENDS:
-        title = f"{score} {end}, {unit}".strip(", ")
         limit = f" of {most:,}" if runs and most and score == RETURN else ""
-        texts[title] = _number(one[end]) + limit
-    stayed = one["upright"]
-    if stayed is not None and stayed < runs:
-        texts[title] += f", {runs - stayed} of {runs} fell"
-    texts["recovered ÷ before"] = _number(one["recovery"])
-    texts["upright"] = "-" if stayed is None else f"{stayed} of {runs}"
+        texts[f"{score} {_words(end)}, {unit}".strip(", ")] = _number(one[end]) + limit
+    texts["loss regained, %"] = _number(one["regained"] and 100 * one["regained"], ".0f")
+    texts["outcome"] = one["outcomes"] or "-"
+    stayed = ", ".join(_number(one[f"upright_{end}"], "d") for end in ENDS)
+    texts["upright"] = f"{stayed} of {runs}" if runs else "-"
     for what, title in (("displacement", "displacements, m"), (RETURN, "returns")):
         if what != score and any(it[f"{what}_before"] is not None for it in every):
             values = ", ".join(_number(one[f"{what}_{end}"]) for end in ENDS) if runs else "-"
@@ -356,6 +339,10 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
         steps = one["simulated_steps"]
         texts["simulated steps"] = "-" if steps is None else f"{steps:,.0f}"
     return texts | ({"why not": one["reason"] or ""} if any(it["reason"] for it in every) else {})
+
+
+def _words(end: str) -> str:
+    return end.replace("_", " ")
 
 
 def _number(value: float | None, form: str = ".3f") -> str:

@@ -10,6 +10,7 @@ from selfmodel.report.charts import Table
 from selfmodel.report.content import shots_of, trials_section
 from selfmodel.report.subject import subject_of_run
 from selfmodel.studies import figures, load
+from selfmodel.studies.recoveries import ENDS
 from selfmodel.studies.study import Study
 from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 
@@ -100,16 +101,14 @@ def test_bodies_of_the_suite_and_of_the_user_fail_and_recover_once(tmp_path: Pat
     said = [(row["score"], row["unit"], row["control_steps"], row["return_most"]) for row in rows]
     assert said[1:] == [("displacement", "m", 60, None), *[("displacement", "m", 60, 59)] * 2]
     assert own["return_before"] is None, "the user's robot has no task"
-    assert all(row["displacement_recovered"] == row["recovered"] for row in rows)
+    assert all(row["displacement_best_trial"] == row["best_trial"] for row in rows)
     trials = [one for one in told["trials"] if one["robot"] != "biped" and one["case"] == 1]
-    ends = [broken[f"return_{end}"] for end in ("before", "after", "recovered")]
-    assert [one["return"] for one in trials] == ends
-    assert [one["fell_at_step"] is None for one in trials] == [
-        broken[name] for name in ("upright_before", "upright_after", "upright")
-    ]
+    assert [one["return"] for one in trials] == [broken[f"return_{end}"] for end in ENDS]
+    upright = [broken[f"upright_{end}"] for end in ENDS]
+    assert [one["fell_at_step"] is None for one in trials] == upright
     (run,) = (tmp_path / "out" / "runs").glob("suite-walker-walk-case01*")
     alone = json.loads(succeeds("report", str(run), "--json", cwd=tmp_path).stdout)
-    assert f"The robot moved {broken['recovered']:.3f} m at best" in alone["headline"]
+    assert f"The robot moved {broken['best_trial']:.3f} m at best" in alone["headline"]
     table = trials_section(subject := subject_of_run(run), shots_of(subject)).items[-1]
     assert isinstance(table, Table)
     cells = [dict(zip(table.columns, row, strict=True)) for row in table.rows]

@@ -39,10 +39,12 @@ def body(seed: int = 0, **changes: object) -> Row:
         "trials": 2,
         "before": 2.0,
         "after": 0.0,
-        "recovered": 1.0,
+        "best_trial": 1.0,
         "diverged": 0,
         "seconds": 3.0,
-        "upright": True,
+        "regained": 0.5,
+        "outcome": "better",
+        "upright_best_trial": True,
     }
     return dict.fromkeys(KINDS["suite"].columns) | usual | changes
 

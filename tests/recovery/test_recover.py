@@ -341,17 +341,27 @@ def test_a_repair_is_for_the_diagnosed_robot_and_its_candidates_are_tried_in_tur
     assert stubbed.scored == ["intact", "intact", TRUTH, *[TRUTH, TRUTH] * 2]
 
 
-@pytest.mark.parametrize(("scores", "fell"), [((0.0, 2.0), True), ((2.0, math.nan), False)])
-def test_a_recovery_fell_if_the_robot_fell_in_its_best_trial(
-    stubbed: SimpleNamespace, scores: tuple[float, float], *, fell: bool
+@pytest.mark.parametrize(
+    ("scores", "falls"),
+    [
+        ((3.0, 2.0), (5, 12)),
+        ((2.0, 3.0), (None, 12)),  # upright, and not the largest score
+        ((2.0, math.nan), (None, 12)),
+        ((2.0, math.nan), (7, None)),
+    ],
+)
+def test_the_best_trial_is_one_without_a_fall_unless_the_robot_fell_in_all(
+    stubbed: SimpleNamespace, scores: tuple[float, float], falls: tuple[int | None, int | None]
 ):
-    ends = zip(stubbed.recovery.scored, (9.0, 9.0, *scores), (None, None, None, 12), strict=True)
+    fell = falls[0] is not None
+    best = max(scores) if fell else 2.0
+    ends = zip(stubbed.recovery.scored, (9.0, 9.0, *scores), (None, None, *falls), strict=True)
     scored = [dataclasses.replace(one, value=value, fall=fall) for one, value, fall in ends]
     outcome = dataclasses.replace(stubbed.recovery, scored=tuple(scored))
     assert outcome.fell == fell
-    assert outcome.best_score == 2.0
+    assert outcome.best_score == best
     assert fell == (outcome.recovery is None), "a robot that fell is not recovered"
-    assert outcome.recovered == outcome.trials[2 + scores.index(2.0)].displacement
+    assert outcome.recovered == outcome.trials[2 + scores.index(best)].displacement
 
 
 @pytest.mark.search

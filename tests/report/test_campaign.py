@@ -12,6 +12,7 @@ from selfmodel.report.campaign import (
     report_of_campaign,
 )
 from selfmodel.report.charts import Cell, IntervalChart, Picture, Report, Table, html_of
+from selfmodel.studies.recoveries import ENDS
 from selfmodel.studies.rows import KINDS, frame_of
 from selfmodel.studies.tables import csv_bytes
 from tests.helpers.browser import browses, read_report
@@ -102,11 +103,12 @@ def test_a_study_of_comparators_begins_with_its_paired_comparisons_of_each_robot
 
 
 def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_path: Path):
-    rows = [body(), body(1, recovered=2.0, upright=False), body(robot="b", after=1.0)]
+    rows = [body(), body(robot="b", after=1.0)]
+    rows += [body(1, best_trial=2.0, upright_best_trial=False, outcome="fell")]
     report = study(tmp_path, "suite", rows)
     (chart,) = report.sections[0].items
 
-    said = "3 runs of 2 robots with a failure; in 1 the best trial fell, which is not recovered."
+    said = "3 runs of 2 robots with a failure: 2 better, 1 fell."
     assert report.headline == said  # and no number of all bodies together
     assert [(group.label, group.values) for group in chart.groups] == [
         ("a, case 1", (2.0, 0.0, 1.5)),
@@ -116,6 +118,16 @@ def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_p
     paid = [body(score="return", unit="", return_most=199)]
     (chart,) = study(tmp_path, "suite", paid).sections[0].items
     assert chart.x_label == "return (of 199)"
+
+
+@browses
+@pytest.mark.process
+def test_the_label_of_a_bar_is_beside_it(tmp_path: Path):
+    fell = {f"upright_{end}": False for end in ENDS}
+    found = study(tmp_path, "suite", [body(**fell), body(robot="b", before=-1.0, best_trial=-2.0)])
+    (page := tmp_path / "page.html").write_bytes(html_of(found))
+
+    assert read_report(page)["illegible"] == []
 
 
 @browses

@@ -15,7 +15,7 @@ from tests.helpers.study_rows import body, diagnosis, recovery, rival
 DATA = Path(__file__).parents[2] / "docs" / "results" / "data"
 TABLES = {
     "ablate": [diagnosis("a"), diagnosis("b", correct=False, case=None, distance=0.1 + 0.2)],
-    "suite": [body(), body(1, upright=None)],
+    "suite": [body(), body(1, upright_best_trial=None)],
     "paper": [recovery(), recovery(comparator="b")],
 }
 PUBLISHED = {

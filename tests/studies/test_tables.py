@@ -55,10 +55,10 @@ def test_time_is_compared_on_the_runs_that_both_have():
     assert ours["recovery"] is None
 
 
-def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
-    rows = [body(), body(1, before=-1.0, recovered=3.0, correct=False)]
-    rows += [body(2, before=4.0, recovered=4.0, upright=False)]
-    rows += [body(3, before=2.0, recovered=1.5, case=2, truth="break:y")]
+def test_summaries_are_medians_and_count_outcomes():
+    rows = [body(), body(1, before=-1.0, regained=None, outcome="no effect", correct=False)]
+    rows += [body(2, before=4.0, regained=None, outcome="fell", upright_best_trial=False)]
+    rows += [body(3, before=2.0, regained=-0.25, outcome="not better", case=2, truth="break:y")]
     rows += [body(4, case=None, truth="friction=0.4", displacement_after=None)]
     none = {"robot": "b", "case": 1, "truth": "", "seed": 0, "reason": "no limb of two joints"}
     rows += [dict.fromkeys(KINDS["suite"].columns) | none]
@@ -66,24 +66,27 @@ def test_summaries_are_medians_and_leave_out_ratios_that_mean_nothing():
 
     keys = [(one["case"], one["truth"]) for one in (case, other, damage, single, lacking)]
     assert keys == [(1, "break:x"), (2, "break:y"), (None, "friction=0.4"), (None, ""), (1, "")]
-    assert (case["right"], case["runs"], case["upright"]) == (2, 3, 2)
+    assert (case["right"], case["runs"], case["upright_best_trial"]) == (2, 3, 2)
+    assert case["upright_before"] is None, "tables of earlier versions lack it"
     assert case["before"] == 2.0
-    assert case["recovery"] == 0.5, "a gait that went backwards and a robot that fell count nothing"
+    assert (case["regained"], case["outcomes"]) == (0.5, "1 better, 1 no effect, 1 fell")
     assert case["correct"].low < 2 / 3 < case["correct"].high
     assert single["runs"] == 4
-    assert single["recovery"] == 0.625
-    assert (lacking["runs"], lacking["correct"], lacking["recovery"]) == (0, None, None)
+    assert single["regained"] == 0.125
+    assert (lacking["runs"], lacking["correct"], lacking["regained"]) == (0, None, None)
     assert lacking["reason"] == "no limb of two joints"
 
 
 def test_the_table_of_bodies_says_score_steps_returns_falls_and_what_was_not_run(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    ends = {"return_before": 50.0, "return_after": 5.0, "return_recovered": 40.0}
+    ends = {"return_before": 50.0, "return_after": 5.0, "return_best_trial": 40.0}
     found = {**ends, "return_most": 199, "control_steps": 200, "score": "return", "unit": ""}
-    found |= {"before": 50.0, "after": 5.0, "recovered": 40.0, "displacement_before": -1.0}
+    found |= {"before": 50.0, "after": 5.0, "best_trial": 40.0, "displacement_before": -1.0}
+    found |= {"upright_before": True, "upright_after": False, "regained": 0.7777}
     ours = body(robot="quadruped", **found | {"return_most": None})
-    rows = [body(**found), body(1, **found, upright=False), ours]
+    fell = {"upright_best_trial": False, "regained": None, "outcome": "fell"}
+    rows = [body(**found), body(1, **found | fell), ours]
     none = {"robot": "fish", "case": 1, "truth": "", "reason": "it has no limb of two joints"}
     rows += [dict.fromkeys(KINDS["suite"].columns) | none]
     tables = {None: rows, "trials": []}
@@ -92,10 +95,11 @@ def test_the_table_of_bodies_says_score_steps_returns_falls_and_what_was_not_run
     first, second = results.shown.shown.to_dict("records")
 
     assert first["return before"] == "50.000 of 199"
-    assert first["return recovered"] == "40.000 of 199, 1 of 2 fell"
-    assert first["recovered ÷ before"] == "0.800"
+    assert first["return best trial"] == "40.000 of 199"
+    assert (first["loss regained, %"], first["outcome"]) == ("78", "1 better, 1 fell")
+    assert first["upright"] == "2, 0, 1 of 2", "before, after, best trial"
     assert first["displacements, m"] == "-1.000, -, -"
-    assert second["return recovered"] == "40.000", "speeds have no largest sum"
+    assert second["return best trial"] == "40.000", "speeds have no largest sum"
     assert "The score is return, of trials of 200 control steps" in results.legend
     assert "1,000 rewards of up to 1, of which these trials have 199" in results.legend
     assert results.legend.endswith("Not run: fish, case 1: it has no limb of two joints")
@@ -104,7 +108,8 @@ def test_the_table_of_bodies_says_score_steps_returns_falls_and_what_was_not_run
 
 
 def test_a_fall_is_a_cross_in_the_figure_of_bodies():
-    figure = figures.by_body([body(), body(1, upright=False), body(2, upright_after=False)])
+    fell = [body(1, upright_best_trial=False), body(2, upright_after=False)]
+    figure = figures.by_body([body(), *fell])
     drawn = {
         (line.get_label(), line.get_marker()): len(line.get_xdata())
         for line in figure.axes[0].lines
@@ -112,7 +117,7 @@ def test_a_fall_is_a_cross_in_the_figure_of_bodies():
     }
     crosses = sum(n for (label, marker), n in drawn.items() if marker == "x" and label != "fell")
 
-    assert [drawn[key] for key in drawn if key[0] in ("before", "after", "recovered")] == [3, 2, 2]
+    assert [drawn[key] for key in drawn if key[0] in ("before", "after", "best trial")] == [3, 2, 2]
     assert crosses == 2
     assert ("fell", "x") in drawn
     assert figure.axes[0].get_yticklabels()[0].get_text() == "a, break:x (n = 3)"

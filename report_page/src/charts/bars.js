@@ -37,7 +37,7 @@ function bar(value, i, share, name, note) {
     "div",
     { class: "track", title: name },
     h("div", { class: note ? `fill s${i} noted` : `fill s${i}`, style: { left: `${left}%`, width: `${right - left}%` } }),
-    h("span", { class: right > 80 ? "value inside" : "value", style: right > 80 ? { right: `${100 - right}%` } : { left: `${right}%` } }, [value === null ? "diverged" : short(value), note].filter(Boolean).join(", ")),
+    h("span", { class: "value", style: { left: `${right}%` } }, [value === null ? "diverged" : short(value), note].filter(Boolean).join(", ")),
   );
 }
 
