@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from selfmodel.arrays import data_frame, finite_or_none
 from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -150,11 +148,8 @@ class Recovery:
 
         It is the first of them if all scores are NaN.
         """
-        scored = [
-            (not math.isnan(one.value), one.fall is None, np.nan_to_num(one.value))
-            for one in self.scored
-        ]
-        return max(range(2, len(scored)), key=scored.__getitem__)
+        ranks = [(not math.isnan(it.value), it.fall is None, it.value) for it in self.scored]
+        return max(range(2, len(ranks)), key=ranks.__getitem__)
 
     @property
     def fell(self) -> bool:

@@ -9,7 +9,7 @@ import pandas as pd
 from selfmodel.errors import counted, listed
 from selfmodel.report.charts import BarChart, Cell, Estimate, Group, IntervalChart, Section, Table
 from selfmodel.studies.comparisons import p_text
-from selfmodel.studies.recoveries import ENDS
+from selfmodel.studies.recoveries import ENDS, RULE
 from selfmodel.studies.rows import LoadedStudy, label_of, methods_of, outcomes_text, whole
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, grouped
@@ -163,9 +163,7 @@ def recoveries(rows: Sequence[Row]) -> tuple[str, list[Section]]:
     """Returns headline and sections of a study of bodies: what they did after a failure."""
     runs = [row for row in rows if None not in (row["before"], row["best_trial"])]
     robots = counted(len({row["robot"] for row in runs}), "robot")
-    headline = f"{counted(len(runs), 'run')} of {robots} with a failure"
-    if outcomes := outcomes_text(runs):
-        headline += f": {outcomes}"
+    headline = _with_outcomes(f"{counted(len(runs), 'run')} of {robots} with a failure", runs)
     scores = grouped([{"score": None, "unit": None, **row} for row in runs], "score", "unit")
     charts = tuple(
         BarChart(
@@ -176,15 +174,11 @@ def recoveries(rows: Sequence[Row]) -> tuple[str, list[Section]]:
         )
         for same in scores.values()
     )
-    text = (
-        "Medians over the seeds of a body and a failure. A hatched bar has a trial that fell. The "
-        "best trial is one without a fall, unless the robot fell in all. A failure has no effect "
-        "if it took at most 5 % of the score, and made no robot fall."
-    )
+    text = "Medians over the seeds of a body and a failure. A hatched bar has a trial that fell."
     reasons = dict.fromkeys(
         f"{row['robot']}: {row['reason']}." for row in rows if row.get("reason")
     )
-    section = Section("recoveries", "Recoveries", (text, *reasons), charts)
+    section = Section("recoveries", "Recoveries", (f"{text} {RULE}", *reasons), charts)
     return f"{headline}.", [section] if charts else []
 
 
@@ -197,9 +191,11 @@ def _failures(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
 
 
 def _body(robot: str, failure: str, rows: Sequence[Row]) -> Group:
-    notes = []
-    for end in ENDS:
-        falls = sum(row.get(f"upright_{end}") is False for row in rows)
-        notes.append(f"fell in {falls} of {len(rows)}" if falls else "")
+    falls = [sum(row.get(f"upright_{end}") is False for row in rows) for end in ENDS]
+    notes = tuple(f"fell in {number} of {len(rows)}" if number else "" for number in falls)
     values = tuple(float(median(row[name] for row in rows)) for name in ENDS)
-    return Group(f"{robot}, {failure}", values, tuple(notes))
+    return Group(_with_outcomes(f"{robot}, {failure}", rows), values, notes)
+
+
+def _with_outcomes(text: str, rows: Sequence[Row]) -> str:
+    return ": ".join(filter(None, (text, outcomes_text(rows))))

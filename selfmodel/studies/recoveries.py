@@ -77,6 +77,13 @@ ENDS = ("before", "after", "best_trial")
 NO_EFFECT = 0.05
 """Largest loss by a failure without an effect, as a share of the score before it."""
 
+RULE = (
+    f"The best trial is one without a fall, unless the robot fell in all, which is no recovery. A "
+    f"failure has no effect if it took at most {100 * NO_EFFECT:g} % of the score, and the robot "
+    f"did not fall because of it."
+)
+"""What ``outcome_of`` means, for readers."""
+
 TRIAL_COLUMNS = ("stage", "hypothesis", "score", "robust_mean", "displacement", "fell_at_step")
 """Columns of a trial of a recovery that are those of its result."""
 
@@ -327,7 +334,6 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     recovery, result = outcome.recovery, experiments.result_of(experiment, outcome)
     result.write(experiment.folder, settings, of_repair)
     before, after, *recoveries = recovery.scores
-    _, _, *tried = result.trials or ()
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
         best = max(recoveries[: row["trials"] - 1], default=None)
@@ -341,7 +347,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
         "correct": outcome.correct,
         "verdict": recovery.diagnosis.verdict,
         "trials": len(recovery.trials) - 1,
-        "recovered": max((one.score for one in tried if one.score is not None), default=None),
+        "recovered": diagnoses[-1]["recovered"],  # of the last one, in all trials
         **_ends(result, recovery.best_trial, entry, steps),
         "distinct_hypotheses": recovery.distinct_hypotheses,
         "diverged": outcome.stats.diverged,
@@ -385,10 +391,9 @@ def outcome_of(
 ) -> tuple[float | None, str | None]:
     """Returns the share of the lost score that the best recovery trial regained, and the outcome.
 
-    The outcome is ``no effect`` if the failure took at most ``NO_EFFECT`` of the score, and the
-    robot fell after it only if it had before; ``fell``, which is no recovery; and ``better`` or
-    ``not better`` than after the failure. The first two have no share; nor has a failure that made
-    the robot fall and took no score. Both are None without all scores.
+    The outcome is by the ``RULE`` ``no effect`` or ``fell``; or else ``better`` or ``not better``
+    than after the failure, with a share unless the failure took no score. A fall that there was
+    before the failure too is not its effect. Both are None without all scores.
     """
     if before.score is None or after.score is None or best.score is None:
         return None, None

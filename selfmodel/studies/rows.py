@@ -40,10 +40,8 @@ AFTER = (1, 3, 20)
 ORACLE = "oracle"
 """Name of the method that is a bound, and is not compared."""
 
-MEASURED = ("upright", "displacement", RETURN)
+AT_ENDS = tuple(f"{it}_{end}" for it in ("upright", "displacement", RETURN) for end in ENDS)
 """What is reported at these ends beside the score; the return of a robot with a task."""
-
-AT_ENDS = tuple(f"{what}_{end}" for what in MEASURED for end in ENDS)
 
 OutcomeRows = Iterator[tuple[Any, ...]]
 

@@ -21,7 +21,7 @@ from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
-from selfmodel.studies.recoveries import ENDS
+from selfmodel.studies.recoveries import ENDS, RULE
 from selfmodel.studies.rows import (
     AT_ENDS,
     KINDS,
@@ -275,10 +275,8 @@ def _legend(summaries: Sequence[Row]) -> str:
         return "\n".join(lines)
     text = (
         f"The score is {run['score']}, of trials of {run['control_steps']} control steps: medians "
-        f"before and after the failure, and in the best trial since, which is one without a fall "
-        f"unless the robot fell in all. Loss regained is (best trial - after) / (before - after), "
-        f"the median. A robot that fell is not recovered, and a failure that took at most 5 % of "
-        f"the score, and made no robot fall, has no effect: both have no loss regained. "
+        f"before and after the failure, and in the best trial since. {RULE} Otherwise, loss "
+        f"regained is (best trial - after) / (before - after). "
     )
     if most := next((one["return_most"] for one in summaries if one["return_most"]), None):
         which = "as these trials" if most == EPISODE else f"of which these trials have {most:,}"
@@ -326,7 +324,8 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
     }
     for end in ENDS:
         limit = f" of {most:,}" if runs and most and score == RETURN else ""
-        texts[f"{score} {_words(end)}, {unit}".strip(", ")] = _number(one[end]) + limit
+        title = f"{score} {end.replace('_', ' ')}, {unit}".strip(", ")
+        texts[title] = _number(one[end]) + limit
     texts["loss regained, %"] = _number(one["regained"] and 100 * one["regained"], ".0f")
     texts["outcome"] = one["outcomes"] or "-"
     stayed = ", ".join(_number(one[f"upright_{end}"], "d") for end in ENDS)
@@ -339,10 +338,6 @@ def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
         steps = one["simulated_steps"]
         texts["simulated steps"] = "-" if steps is None else f"{steps:,.0f}"
     return texts | ({"why not": one["reason"] or ""} if any(it["reason"] for it in every) else {})
-
-
-def _words(end: str) -> str:
-    return end.replace("_", " ")
 
 
 def _number(value: float | None, form: str = ".3f") -> str:

@@ -111,8 +111,8 @@ def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_p
     said = "3 runs of 2 robots with a failure: 2 better, 1 fell."
     assert report.headline == said  # and no number of all bodies together
     assert [(group.label, group.values) for group in chart.groups] == [
-        ("a, case 1", (2.0, 0.0, 1.5)),
-        ("b, case 1", (2.0, 1.0, 1.0)),
+        ("a, case 1: 1 better, 1 fell", (2.0, 0.0, 1.5)),
+        ("b, case 1: 1 better", (2.0, 1.0, 1.0)),
     ]
     assert [group.notes for group in chart.groups] == [("", "", "fell in 1 of 2"), ("", "", "")]
     paid = [body(score="return", unit="", return_most=199)]
