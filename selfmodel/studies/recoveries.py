@@ -336,7 +336,7 @@ def recover(parameters: Parameters, needs: Folders, folder: Path) -> Rows:
     before, after, *recoveries = recovery.scores
     diagnoses = watch.rows(shared, robot, truth, recovery.trials[1:])
     for row in diagnoses:
-        best = max(recoveries[: row["trials"] - 1], default=None)
+        best = max(filter(math.isfinite, recoveries[: row["trials"] - 1]), default=None)
         found = {"before": before, "after": after, "recovered": best}
         row |= {**found, **_named(parameters)}
     own = {

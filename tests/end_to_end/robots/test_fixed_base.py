@@ -102,5 +102,5 @@ def test_suite_run_recovers_arms_and_records_that_they_stayed_upright(folder: Pa
         *("--out", "study"),
     )
     (row,) = found["rows"]
-    assert row["upright"]
+    assert row["upright_best_trial"]
     assert row["before"] == 0 > row["after"]
