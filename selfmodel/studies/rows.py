@@ -40,6 +40,14 @@ AFTER = (1, 3, 20)
 ORACLE = "oracle"
 """Name of the method that is a bound, and is not compared."""
 
+FORMER = {
+    "recovered": "best_trial",
+    "upright": "upright_best_trial",
+    "displacement_recovered": "displacement_best_trial",
+    "return_recovered": "return_best_trial",
+}
+"""Names of columns of a study of bodies by those that they had in version 0.1."""
+
 AT_ENDS = tuple(f"{it}_{end}" for it in ("upright", "displacement", RETURN) for end in ENDS)
 """What is reported at these ends beside the score; the return of a robot with a task."""
 
@@ -269,6 +277,7 @@ def load(path: str | Path) -> LoadedStudy:
                 f"{place}: expected the rows of a study by {', '.join(KINDS)}, got the columns "
                 f"{', '.join(map(str, rows.columns))[:300]}"
             )
+        rows = rows.rename(columns=FORMER) if name == "suite" else rows
     if not len(rows):
         raise InputError(f"{place}: expected the rows of a study, got none: run the study first")
     for column, kinds in (("correct", "b"), ("gap", "fi"), ("seed", "iu"), ("case", "iu")):
@@ -287,9 +296,9 @@ def load(path: str | Path) -> LoadedStudy:
 
 def kind_of(columns: Collection[str]) -> str:
     """Returns the kind of study whose rows have these columns; an empty text if none has."""
-    given = set(columns)
     fitting = (
         name
+        for given in (set(columns), {FORMER.get(column, column) for column in columns})
         for name, kind in KINDS.items()
         if set(kind.columns) - set(kind.may_lack.split()) <= given <= set(kind.columns)
     )
