@@ -19,12 +19,21 @@ def partial_path(path: Path) -> Path:
 
 def taken(path: Path) -> InputError:
     """Returns the error of a new file whose name is taken."""
+    if path.is_dir():
+        return InputError(f"{path} is a folder: give the name of a new file, such as one in it")
     return InputError(f"{path} exists, and is not overwritten: choose another name")
 
 
 def no_folder(path: Path) -> InputError:
     """Returns the error of a new file whose folder does not exist."""
     return InputError(f"{path}: there is no folder {path.parent}: make it, or choose another")
+
+
+def refuse_file(folder: Path) -> None:
+    """Checks that a folder to write into, or a folder above it, is no file, before any work."""
+    for one in (folder, *folder.parents):
+        if one.exists() and not one.is_dir():
+            raise InputError(f"{one}: expected a folder, got a file: choose another name")
 
 
 def refuse_existing(path: Path) -> None:
@@ -99,6 +108,7 @@ def make_folder(path: Path, within: Path | None = None) -> None:
     for folder in above[: above.index(within)] if within else ():
         if folder.is_symlink():
             raise InputError(f"{folder}: expected a folder, got a link: remove it, or rename it")
+    refuse_file(path)
     missing = [folder for folder in above if not folder.exists()]
     try:
         with suppress(FileNotFoundError):  # another process removed an empty parent meanwhile

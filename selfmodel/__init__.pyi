@@ -32,6 +32,7 @@ from .simulation.simulator import Simulator as Simulator
 from .studies.rows import load as load
 from .studies.study import Study as Study
 from .testing import (
+    ContractError as ContractError,
     check_comparator as check_comparator,
     check_design as check_design,
     check_fault_kind as check_fault_kind,

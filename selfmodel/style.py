@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.style import use as use_style
 
 from selfmodel.errors import InputError
-from selfmodel.files import check_regular
+from selfmodel.files import check_regular, path_of
 
 STYLE = Path(__file__).with_name("figures.mplstyle")
 """Style file of matplotlib: ``matplotlib.style.use(STYLE)`` draws other figures alike."""
@@ -87,9 +87,10 @@ def figure_style(style: str | Path | None = None) -> Iterator[None]:
 
 def read_style(style: str | Path | None) -> Mapping[str, Any]:
     """Returns the settings of matplotlib of a style; see ``figure_style``."""
-    if style is None or style in WIDTHS:
+    if style is None or str(style) in WIDTHS:
         return WIDTHS.get(str(style), {})
-    path, what = Path(style), f"{', '.join(WIDTHS)}, or a style file of matplotlib, FILE.mplstyle"
+    what = f"{', '.join(WIDTHS)}, or a style file of matplotlib, FILE.mplstyle"
+    path = path_of(style, what)
     check_regular(path, what)
     try:
         own = mpl.rc_params_from_file(path, fail_on_error=True, use_default_template=False)
@@ -235,8 +236,7 @@ def values_by_name(
     places = np.arange(len(names))
     shown = np.where(np.isfinite(values), values, np.nan)
     size = (3.5 + 0.07 * max(map(len, names), default=0), 1.1 + 0.27 * len(names))
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panels_of(1, 1, size=size, margin=(0, 0), share=False)
     if ends is None:
         axes.barh(places, np.nan_to_num(shown), height=0.6)
     else:

@@ -23,7 +23,8 @@ PUBLIC = {
     *("write_log", "record", "evaluate", "Episode", "Study", "load"),
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "check_score", "check_next_trial"),
-    *("check_design", "check_search", "load_policy", "export_diagnosis", "__version__"),
+    *("check_design", "check_search", "load_policy", "export_diagnosis", "ContractError"),
+    "__version__",
 }
 
 LOGS = ROOT / "tests" / "data" / "logs-0.1" / "recovery" / "trials"
@@ -33,6 +34,7 @@ WITHOUT_EXAMPLE = {
     **dict.fromkeys(("Comparator", "PhysicalRobot"), "a protocol, implemented by the user"),
     **dict.fromkeys(("Controller", "Diagnosis", "Recovery", "Robot", "Trial"), "a returned record"),
     "Episode": "a returned record",
+    "ContractError": "an error",
     **dict.fromkeys(("Study", "load"), "a module or a folder is needed: docs have one"),
     "EnvironmentRobot": "an environment is needed: docs and tests/end_to_end drive one",
     "FaultKind": "an example is a whole plug-in: docs have one",

@@ -22,6 +22,7 @@ from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import ENERGY, Recovery, make_repertoire
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
+from selfmodel.simulation import ClosedLoop
 from selfmodel.tasks import entry
 from selfmodel.testing import check_comparator, check_fault_kind
 from selfmodel.trials.trial import Trial
@@ -270,6 +271,14 @@ ACCEPTED: dict[str, tuple[Call, Call]] = {
         lambda _: planned(seeds=np.arange(1), cases=1, gaps=0.0, repair="robust"),
         lambda _: planned(),
     ),
+    "no settings of a study": (
+        lambda _: planned(settings=None),
+        lambda _: planned(settings=Settings()),
+    ),
+    "a list of signals": (
+        lambda _: ClosedLoop(record=["sensors"]).record,
+        lambda _: ["sensors"],
+    ),
     "a large seed": (
         lambda p: evolved(p, seed=10**400 + 1) != evolved(p, seed=10**400),
         lambda _: True,
@@ -326,7 +335,10 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda _: planned(score=dataclasses.replace(ENERGY, name="stranger")),
         "no variable of an imported module: .* or as package.module:object",
     ),
-    "a repertoire": (lambda p: filled(p, robot="quadruped"), "selfmodel.load_robot.*got .* str"),
+    "a repertoire": (
+        lambda p: filled(p, robot="quadruped"),
+        "selfmodel.load_robot.*got .* str",
+    ),
     "a batch": (lambda p: filled(p, batch=0), "of 1 or above as batch, got 0"),
     "a signal": (lambda p: driven(p, signals=["sensor"]), "unknown signal 'sensor': did you mean"),
     "patience": (lambda p: driven(p, patience=1.5), "as patience, got 1.5"),
@@ -376,6 +388,10 @@ REFUSED: dict[str, tuple[Call, str]] = {
         "no kind of controller: expected a function of the arguments robot, hidden, got .*Dtw",
     ),
     "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
+    "a trajectory to follow in an ablation": (
+        lambda _: planned(score="tracking"),
+        "the score tracking follows a gait, and .* evolves its gaits: give bank=",
+    ),
 }
 
 
@@ -431,5 +447,5 @@ def test_a_comparator_that_depends_on_the_batch_fails_the_check_of_one_argument(
 
             return Ours()
 
-    with pytest.raises(ValueError, match="must not depend on the other runs"):
+    with pytest.raises(ValueError, match=r"other runs, .* differ by up to 0\.\d+. It may"):
         check_comparator(Uneven())

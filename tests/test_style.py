@@ -20,6 +20,16 @@ def test_the_size_of_the_font_rules_every_size_that_a_style_leaves_open(tmp_path
     assert sizes["legend.fontsize"] == 4.5
 
 
+def test_a_style_rules_the_width_of_the_figure_of_a_result(tmp_path: Path):
+    style = tmp_path / "own.mplstyle"
+    style.write_text("figure.figsize: 2.5, 9\n", encoding="utf-8")
+    with figure_style(style):
+        drawn = values_by_name("title", "metres", ["a long name of a method"], [1.0])
+
+    assert drawn.get_figwidth() == 2.5
+    assert values_by_name("title", "metres", ["a long name"], [1.0]).get_figwidth() > 2.5
+
+
 @pytest.mark.parametrize(
     "wrong", ["figure.figsize: 100000, 3", "savefig.dpi: 10000000", "font.colour: red", ""]
 )

@@ -19,7 +19,7 @@ from selfmodel.errors import counted
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.export import MODEL, STATUS
-from selfmodel.logs.files import refuse_existing
+from selfmodel.logs.files import refuse_existing, refuse_file
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
@@ -30,6 +30,7 @@ def diagnose(options: Diagnose) -> None:
     """Rank hypotheses by how well they predict logged trials, without a robot."""
     start = perf_counter()
     if options.export is not None:
+        refuse_file(options.export)
         for name in (MODEL, STATUS):
             refuse_existing(options.export / name)
     explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)

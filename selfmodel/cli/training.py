@@ -20,12 +20,18 @@ def evolve(options: EvolvePolicy) -> None:
         seed=options.seed,
     )
     with display() as show:
-        training = evolve_policy(
-            *(options.robot, options.out, settings),
-            generations=options.generations,
-            threads=options.threads,
-            on_event=show,
-        )
+        try:
+            training = evolve_policy(
+                *(options.robot, options.out, settings),
+                generations=options.generations,
+                threads=options.threads,
+                on_event=show,
+            )
+        except KeyboardInterrupt as interruption:
+            interruption.add_note(
+                f"finished generations are kept in {options.out}; the same command continues"
+            )
+            raise
     returns = training.judged(EPISODES)
     generation, steps, seconds, *_ = training.rows[-1]
     if options.as_json:

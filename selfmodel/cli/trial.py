@@ -1,6 +1,7 @@
 """``selfmodel trial``: one logged trial of the simulated physical robot."""
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.settings import Settings
 from selfmodel.studies.experiment import draw_reality
-from selfmodel.trials.trial import TrialPlan, stage_of
+from selfmodel.trials.trial import Stage, TrialPlan
 
 
 def trial(options: RunTrial) -> None:
@@ -37,7 +38,7 @@ def trial(options: RunTrial) -> None:
         driver = Controller(design, weights)
     check_silent_neurons(driver.design, silent_neurons(hidden))
     settings = Settings(steps=options.steps)
-    plan = TrialPlan("trial", stage_of(options.stage), driver, settings.steps, options.seed)
+    plan = TrialPlan("trial", cast("Stage", options.stage), driver, settings.steps, options.seed)
     header = TrialHeader(settings, hidden=str(hidden), gap=gap.text)
     try:
         logged = run_trial(SimulatedRobot(robot, hidden, gap), plan, options.out, robot, header)

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmodel.errors import InputError, WorkError
-from selfmodel.files import read_file, sync_folder
+from selfmodel.files import path_of, read_file, sync_folder
 from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
 from selfmodel.logs.results import digest_of, versions
@@ -135,7 +135,7 @@ def finished(folder: Path) -> Iterator[FinishedCell]:
     All are verified, and made by the same code.
     """
     known: dict[str, tuple[str, Path]] = {}
-    for cell in read_cells(folder):
+    for cell in read_cells(path_of(folder, "a folder of cells")):
         for name, version in cell.made_with.items():
             other, first = known.setdefault(name, (version, cell.path.parent))
             if other != version:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
-from selfmodel.errors import counted
+from selfmodel.errors import InputError, counted
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import ENDS, robot_key
 from selfmodel.studies.rows import failure_of, label_of, methods_of, whole
@@ -188,6 +188,9 @@ def paired_differences(comparisons: pd.DataFrame) -> Figure:
     corrected. The labels have the number n of runs that both methods have. There is one comparison
     at least.
     """
+    if "difference" not in comparisons or not len(comparisons):
+        got = f"{counted(len(comparisons), 'row')} of {', '.join(map(str, comparisons)):.200}"
+        raise InputError(f"expected rows of selfmodel.load(folder).comparisons(), got {got}")
     tables = comparisons.sort_values("difference", kind="stable").groupby("table", sort=False)
     minus = "\N{MINUS SIGN}"
     longest = (comparisons["first"] + comparisons["second"]).str.len().max() + 3

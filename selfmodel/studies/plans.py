@@ -30,7 +30,7 @@ from selfmodel.faults.registry import kind_names
 from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
-from selfmodel.recovery.scores import Score
+from selfmodel.recovery.scores import TRACKING, Score
 from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
@@ -89,7 +89,7 @@ def ablation(
     comparators: str | Comparator | Iterable[str | Comparator] = tuple(COMPARATORS),
     gaps: float | Iterable[float] = 0.0,
     seeds: int | Iterable[int] = 1,
-    settings: Settings = Settings(),  # noqa: B008  # frozen
+    settings: Settings | None = None,
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     kinds: KindSource = "default",
     diagnostic_searches: str | Iterable[str] = STEPWISE,
@@ -120,7 +120,8 @@ def ablation(
         comparators: Comparators, their names, or ``package.module:object``.
         gaps: Levels of the reality gap.
         seeds: Seeds, one run each; a number is a count, as of ``--seeds``: 3 for 0, 1 and 2.
-        settings: Parameters of the search; ``trials`` is the number of trials of the damaged robot.
+        settings: Parameters of the search, None for the paper's; ``trials`` is the number of trials
+            of the damaged robot.
         damages: Further failures, in notation.
         kinds: Fault kinds to search, or their names as in ``--kinds``.
         diagnostic_searches: Searches of each comparator, of ``DIAGNOSTIC_SEARCHES``.
@@ -133,12 +134,11 @@ def ablation(
         repair_settings: Parameters of the repair, in runs as long; None for ``settings``.
         only: Share of the runs, such as ``(2, 8)`` or ``2/8``.
     """
-    robots = names_of(robots, ROBOT)
+    robots, next_trial = names_of(robots, ROBOT), plugins.name_of("next_trial", next_trial)
     cases = None if cases is None else whole_numbers("cases", cases, 1)
     comparators, kinds = plugins.comparator_names(comparators), plugins.kinds_named(kinds)
     gaps, seeds = real_numbers("gaps", gaps), _seeds_of(seeds)
     damages = names_of(damages, "failures in notation", Hypothesis)
-    next_trial = plugins.name_of("next_trial", next_trial)
     bank = None if bank is None else path_of(bank, "a folder of gaits")
     settings, (share, shares) = arguments.settings_of(settings), share_of(only)
     # The searches are an axis: a folder may get further ones.
@@ -157,6 +157,11 @@ def ablation(
         raise InputError(
             "with a bank and its next trials all gaits are given and nothing is evolved, got a "
             "repair or its settings: leave it or the bank out, or choose the next trial by repair"
+        )
+    if chosen["score"] == TRACKING and bank is None:
+        raise InputError(
+            f"the score {TRACKING} follows a gait, and a study without a bank evolves its gaits: "
+            f"give bank= (--bank), a folder with ROBOT-K.npz, or another score"
         )
     entries = {robot: robot_entry(robot) for robot in robots}
     models = {robot: recoveries.planned(robot, entry) for robot, entry in entries.items()}
@@ -219,7 +224,7 @@ def suite(
     bodies: str | Path | Iterable[str | Path] | None = None,
     cases: int | Iterable[int] | None = None,
     seeds: int | Iterable[int] = 1,
-    settings: Settings = Settings(),  # noqa: B008  # frozen
+    settings: Settings | None = None,
     comparator: str | Comparator = SEGMENT_PREDICTION.name,
     damages: str | Hypothesis | Iterable[str | Hypothesis] = (),
     controller: str | Path | plugins.MakeDesign = "network",
@@ -305,7 +310,7 @@ def paper(
     cases: int | Iterable[int] = tuple(TABLE_ONE),
     seeds: int | Iterable[int] = 1,
     comparators: str | Comparator | Iterable[str | Comparator] = PAPER_COMPARATORS,
-    settings: Settings = Settings(),  # noqa: B008  # frozen
+    settings: Settings | None = None,
 ) -> Study:
     """Returns the paper's experiment: its failures, repair and fault kinds, and no reality gap.
 

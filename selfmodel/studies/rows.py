@@ -364,6 +364,8 @@ def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
     Without the name of a table, they have the columns of the kind.
     """
     kind = KINDS[name]
+    if not folder.is_dir():
+        raise InputError(f"{folder}: expected the folder of a study, got none: run the study first")
     rows = rows_in(folder, table or kind.table)
     if table is None:
         rows = [{column: row.get(column) for column in kind.columns} for row in rows]

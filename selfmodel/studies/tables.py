@@ -240,7 +240,7 @@ def _ablation_legend(rows: Sequence[Row], shared: Mapping[str, Any]) -> str:
     """Returns what the columns are, and with which search and cost comparators are compared."""
     limit = shared.get("settings", {}).get("max_simulated_steps")
     searches = dict.fromkeys(str(row["diagnostic_search"]) for row in rows)
-    text = "With 95 % intervals; time as a multiple of forward-displacement's, if that is there."
+    text = "With 95 % intervals; time as a multiple of forward-displacement's; -: not measured."
     if limit is None:
         return text
     return (

@@ -1,4 +1,5 @@
 from .diagnosis import (
+    ContractError as ContractError,
     check_comparator as check_comparator,
     check_fault_kind as check_fault_kind,
     shown as shown,

@@ -36,11 +36,6 @@ from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial, TrialPlan
 
-DEPENDS_ON_BATCH = (
-    "must not depend on the other runs, to the last bit: numpy sums in memory order, so "
-    "np.ascontiguousarray is required before a sum or a mean"
-)
-
 CHECKED_STEPS = 60
 """Control steps of the trial on which a comparator is checked without one of its own."""
 
@@ -56,6 +51,17 @@ def require(holds: object, breach: str) -> None:
     """Raises ``ContractError`` unless a rule holds."""
     if not holds:
         raise ContractError(breach)
+
+
+def require_alone(what: str, alone: FloatArray, together: FloatArray) -> None:
+    """Raises ``ContractError`` unless a run has the same values alone and in a batch."""
+    if not np.array_equal(alone, together, equal_nan=True):
+        difference = np.nanmax(np.abs(alone - together), initial=0)
+        raise ContractError(
+            f"the {what} must not depend on the other runs, to the last bit: alone and in a batch "
+            f"they differ by up to {difference:.3g}. It may use a number of the batch, such as its "
+            f"mean or size, or sums in numpy's memory order: try np.ascontiguousarray before a sum"
+        )
 
 
 def check_comparator(
@@ -88,7 +94,7 @@ def check_comparator(
             request.
 
     Raises:
-        ValueError: The comparator violates its contract, or ``simulated`` does not have the
+        ContractError: The comparator violates its contract, or ``simulated`` does not have the
             requested shapes; the message names the violation.
         InputError: The name is unknown, the object is no comparator, it refuses the trial of the
             quadruped, or there are no simulations with the trial.
@@ -133,8 +139,7 @@ def check_comparator(
             require(same, f"the same trial and arguments must give the same {what}")
     for run in range(runs):
         for what, values in _parts(prepared, _only(requested, run)).items():
-            alone = np.array_equal(values, parts[what][run : run + 1], equal_nan=True)
-            require(alone, f"the {what} of run {run} {DEPENDS_ON_BATCH}")
+            require_alone(f"{what} of run {run}", values, parts[what][run : run + 1])
     require(before == _bits(requested.signals), "a comparator must not change its arguments")
     require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
 
@@ -327,7 +332,7 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
         robot: A robot that the kind applies to, its name, or the path of its MJCF or URDF file.
 
     Raises:
-        ValueError: The kind breaks its contract; the message names the broken rule.
+        ContractError: The kind breaks its contract; the message names the broken rule.
         InputError: The notation of the kind's own faults cannot be parsed, or an argument is no
             kind or robot.
     """
@@ -340,6 +345,8 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
             text and not set(text) & set(" ,:+="),
             f"a kind needs a {what} without spaces and without any of ,:+=, got {text!r}",
         )
+    parts = kind.parts(robot.anatomy)
+    require(isinstance(parts, tuple), f"the parts of {kind.name} must be a tuple, got {parts!r}")
     candidates = kind.candidates(robot.anatomy)
     require(candidates, f"{kind.name} has no part or no level: nothing can be proposed")
     for fault in candidates:

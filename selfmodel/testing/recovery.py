@@ -25,7 +25,7 @@ from selfmodel.recovery.scores import Score, check_measurable, checked
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.testing.diagnosis import CHECKED_STEPS, DEPENDS_ON_BATCH, require
+from selfmodel.testing.diagnosis import CHECKED_STEPS, require, require_alone
 from selfmodel.trials.trajectory import Trajectory
 
 RUNS = 3
@@ -50,7 +50,7 @@ def check_score(score: Score | str, robot: RobotSource = "quadruped") -> None:
         robot: A robot that has the score, its name, or the path of its MJCF or URDF file.
 
     Raises:
-        ValueError: The score breaks its contract; the message names the broken rule.
+        ContractError: The score breaks its contract; the message names the broken rule.
         InputError: The name is unknown, the object is no score or names unknown signals, it gives
             other than one number per rollout, or the robot cannot have it.
     """
@@ -82,10 +82,8 @@ def check_score(score: Score | str, robot: RobotSource = "quadruped") -> None:
         for run in range(RUNS):
             alone = {name: signal[run : run + 1] for name, signal in rollouts.signals.items()}
             batch = Trajectory(rollouts.names, rollouts.time, alone)
-            require(
-                np.array_equal(score.of(known, hypothesis, batch), values[[run]], equal_nan=True),
-                f"the score {score.name} of run {run} {DEPENDS_ON_BATCH}",
-            )
+            own = score.of(known, hypothesis, batch)
+            require_alone(f"score {score.name} of run {run}", own, values[[run]])
 
 
 def check_next_trial(choice: NextTrial | str) -> None:
@@ -99,7 +97,7 @@ def check_next_trial(choice: NextTrial | str) -> None:
         choice: The function to check, its name, or ``package.module:object``.
 
     Raises:
-        ValueError: The choice breaks its contract; the message names the broken rule.
+        ContractError: The choice breaks its contract; the message names the broken rule.
         InputError: The name is unknown, or the object is no function of a ``RecoveryLoop``.
     """
     choose, robot = plugins.next_trial(choice), entry_of("quadruped").robot()
@@ -160,7 +158,7 @@ def check_design(
         robot: The robot, its name, or the path of its MJCF or URDF file.
 
     Raises:
-        ValueError: The design breaks its contract; the message names the broken rule.
+        ContractError: The design breaks its contract; the message names the broken rule.
         InputError: The name is unknown, or the object is no design of the robot.
     """
     known = entry_of(robot).robot()
@@ -188,9 +186,7 @@ def check_design(
     )
     for row, controller in enumerate(controllers):
         alone = run([(INTACT, controller)]).trajectory["commands"]
-        require(
-            np.array_equal(alone[0], together[row]), f"the commands of run {row} {DEPENDS_ON_BATCH}"
-        )
+        require_alone(f"commands of run {row}", alone[0], together[row])
     try:
         read = parse_controller(controller_bytes(controllers[0]), made.name)
     except TypeError:  # a class without a format
@@ -214,7 +210,7 @@ def check_search(search: MakeSearch | str) -> None:
         search: The function that makes the search to check, its name, or ``package.module:object``.
 
     Raises:
-        ValueError: The search breaks its contract; the message names the broken rule.
+        ContractError: The search breaks its contract; the message names the broken rule.
         InputError: The name is unknown, or the object is no function.
     """
     make = plugins.search(search)

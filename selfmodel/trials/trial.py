@@ -37,14 +37,6 @@ MAX_SEED = 2**63 - 1
 """Largest seed of a trial: the largest integer of most other programs that read logs."""
 
 
-def stage_of(name: str) -> Stage:
-    """Returns the stage of that name, or raises ``InputError`` with the nearest names."""
-    for stage in STAGES:
-        if stage == name:
-            return stage
-    raise unknown_name("stage", name, STAGES)
-
-
 @dataclass(frozen=True)
 class TrialPlan:
     """The plan of a trial, known before it starts.
@@ -185,7 +177,6 @@ class Trial:
         }
         orders = {**dict.fromkeys(joints, joint_names), "commands": motor_names}
         trajectory = trajectory_of_arrays(robot, arrays, time, orders)
-        stage_of(stage)  # raises InputError
         try:
             played = played_back(trajectory.names.motors, trajectory["commands"])
         except ValueError as error:

@@ -16,6 +16,7 @@ from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.results import read_result, versions
 from selfmodel.recovery.recover import RecoveryLoop
 from selfmodel.robot.robot import Robot
+from selfmodel.studies.training import Training
 from tests.cli.conftest import SHORT
 from tests.helpers.command import (
     DIAGNOSIS,
@@ -203,6 +204,24 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(
     for name in ("00-before", "01-after"):
         log = read_log(tmp_path / "run" / "trials" / f"{name}.mcap")
         assert log.trial.trajectory.steps == 40
+
+
+def test_an_interrupted_training_says_that_the_same_command_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(Training, "run", lambda *_: signal.raise_signal(signal.SIGINT))
+    done = selfmodel("suite", "evolve", "suite-hopper-stand", "--out", "policy", cwd=tmp_path)
+
+    assert done.returncode == 130
+    assert "finished generations are kept in policy; the same command continues" in done.stderr
+
+
+def test_a_file_in_place_of_the_folder_of_an_export_is_refused_before_the_logs_are_read(
+    tmp_path: Path,
+):
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    said = "taken: expected a folder, got a file: choose another name"
+    refused("diagnose", "missing.mcap", "--export", "taken", said=said, cwd=tmp_path)
 
 
 def test_a_comparator_from_elsewhere_plugs_in(tmp_path: Path):

@@ -210,6 +210,13 @@ def test_an_existing_file_is_neither_overwritten_nor_run_for(
     assert (tmp_path / name).read_text() == "precious"
 
 
+def test_a_folder_in_place_of_a_file_is_said_to_be_one(biped: Robot, tmp_path: Path):
+    (tmp_path / "a.mcap").mkdir()
+    samples = stopping(biped, 0, AssertionError("the robot was run"), clock=False)
+    with pytest.raises(InputError, match=r"a\.mcap is a folder: give the name of a new file"):
+        write(tmp_path / "a.mcap", biped, samples)
+
+
 def test_a_file_that_is_created_meanwhile_is_not_overwritten(biped: Robot, tmp_path: Path):
     path = tmp_path / "a.mcap"
 
