@@ -1,11 +1,15 @@
 """The errors of selfmodel, the parts of their sentences, and checks of arguments."""
 
 import difflib
+import inspect
 import math
+import os
 from collections.abc import Callable, Iterable, Sequence, Set as AbstractSet
+from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
+from typing import Any, TypeVar, Union, cast, get_args, get_origin
 
 
 class InputError(ValueError):
@@ -49,6 +53,54 @@ def check_type(got: object, known: type | UnionType, expected: str) -> None:
         has_trial = "trials" in expected and hasattr(got, "trial")
         remedy = ": give its attribute trial" if has_trial else ""
         raise InputError(f"expected {expected}, got an object of type {type(got).__name__}{remedy}")
+
+
+_HAD_BY = {
+    "DataFrame": 'selfmodel.load("runs/ablation").comparisons()',
+    "Hypothesis": 'selfmodel.parse_hypothesis("intact", robot)',
+    "Robot": 'selfmodel.load_robot("quadruped")',
+    "Trial": 'selfmodel.read_log("walk.mcap").trial',
+}
+_WIDER = {float: Real, int: Real, tuple: tuple | list, Path: str | os.PathLike}
+Target = TypeVar("Target", bound=Callable[..., Any])
+
+
+def typed(target: Target) -> Target:
+    """Decorator: refuses, in a sentence, arguments of other classes than their annotations'.
+
+    The items of tuples and the like are not checked, and what is no class is not. A class has the
+    arguments of its constructor.
+    """
+    function: Callable[..., Any] = vars(target).get("__init__", target)
+    parameters = inspect.signature(function).parameters.items()
+    classes = {name: _classes(one.annotation) for name, one in parameters}
+    accepted = {name: tuple(_WIDER.get(one, one) for one in own) for name, own in classes.items()}
+
+    @wraps(function)
+    def checked(*given: object, **named: object) -> object:
+        for name, value in (*zip(classes, given, strict=False), *named.items()):
+            if not isinstance(scalar_of(value), accepted.get(name, object)):
+                names = [one.__name__.replace("NoneType", "None") for one in classes[name]]
+                remedy = _HAD_BY.get(names[0], f"what help({target.__qualname__}) says")
+                raise InputError(
+                    f"expected {name} of type {' or '.join(names)}, got "
+                    f"{' '.join(repr(value).split()):.80}: give {remedy}"
+                )
+        return function(*given, **named)
+
+    if not isinstance(target, type):
+        return cast("Target", checked)
+    target.__init__ = checked  # type: ignore[misc]  # that of this class
+    return target
+
+
+def _classes(annotation: Any) -> tuple[type, ...]:  # noqa: ANN401  # any annotation
+    """Returns the classes of an annotation; ``object`` for one that is none."""
+    origin = get_origin(annotation) or annotation
+    if origin in (Union, UnionType):
+        return tuple(one for part in get_args(annotation) for one in _classes(part))
+    is_class = isinstance(origin, type) and not getattr(origin, "_is_protocol", False)
+    return (origin if is_class and origin not in (Any, inspect.Parameter.empty) else object,)
 
 
 def check_function(name: str, given: object) -> None:

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.style import use as use_style
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.files import check_regular, path_of
 
 STYLE = Path(__file__).with_name("figures.mplstyle")
@@ -117,6 +117,7 @@ def read_style(style: str | Path | None) -> Mapping[str, Any]:
     return sized
 
 
+@typed
 @figure_style()
 def files_of(name: str, figure: Figure) -> dict[str, bytes]:
     """Returns a figure as PNG, PDF and SVG of a name, the same bytes in every call."""

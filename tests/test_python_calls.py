@@ -337,7 +337,7 @@ REFUSED: dict[str, tuple[Call, str]] = {
     ),
     "a repertoire": (
         lambda p: filled(p, robot="quadruped"),
-        "selfmodel.load_robot.*got .* str",
+        "robot of type Robot, got .quadruped.: give selfmodel.load_robot",
     ),
     "a batch": (lambda p: filled(p, batch=0), "of 1 or above as batch, got 0"),
     "a signal": (lambda p: driven(p, signals=["sensor"]), "unknown signal 'sensor': did you mean"),

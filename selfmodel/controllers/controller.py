@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.playback import Playback, PlaybackBatch
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, check_type, typed
 
 TARGET_RANGE = np.pi / 4
 """Half range of the paper's motor targets about 0, rad."""
@@ -140,6 +140,7 @@ class Design(ABC):
         """
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Controller:
     """A controller: a design with a genome; controllers with equal designs and genomes are equal.
@@ -149,7 +150,7 @@ class Controller:
         genome: ``(weights,)``, each value in [-1, 1].
 
     Raises:
-        ValueError: The genome has another length than the design's, or a value outside [-1, 1].
+        InputError: The genome has another length than the design's, or a value outside [-1, 1].
     """
 
     design: Design
@@ -157,12 +158,12 @@ class Controller:
 
     def __post_init__(self) -> None:
         if self.genome.shape != (self.design.weights,):
-            raise ValueError(
+            raise InputError(
                 f"{self.design.description} has {self.design.weights} weights, got a genome of "
-                f"shape {self.genome.shape}"
+                f"shape {self.genome.shape}: give as many in one row"
             )
         if not np.all(np.abs(self.genome) <= 1):
-            raise ValueError("every weight must lie in [-1, 1]")
+            raise InputError("every weight must lie in [-1, 1]: clip or scale the genome")
         object.__setattr__(self, "genome", frozen(self.genome))
 
     def __eq__(self, other: object) -> bool:
@@ -220,6 +221,8 @@ def make_batch(
         ValueError: The sources are not all playbacks or all controllers of one design.
         InputError: A silent hidden neuron does not exist in the design.
     """
+    for source in sources:
+        check_type(source, Controller | Playback, "a Controller or a Playback to drive a robot")
     controllers = [source for source in sources if isinstance(source, Controller)]
     playbacks = [source for source in sources if isinstance(source, Playback)]
     designs = Counter(controller.design for controller in controllers)

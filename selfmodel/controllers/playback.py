@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen, held
+from selfmodel.errors import typed
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Playback:
     """Recorded commands, repeated step by step independently of the sensors.

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from mujoco import MjModel, MjSpec
 
+from selfmodel.errors import typed
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import FaultKind
@@ -18,6 +19,7 @@ SpecEdit = Callable[[MjSpec], None]
 """Function that edits a specification, in place, before its compilation."""
 
 
+@typed
 def build(
     robot: Robot,
     hypothesis: Hypothesis,

@@ -3,10 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from selfmodel.errors import typed
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 
+@typed
 @dataclass(frozen=True, order=True)
 class Hypothesis:
     """A set of faults; the empty set is the nominal robot.

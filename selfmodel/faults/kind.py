@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Optional
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.errors import InputError, check_type
+from selfmodel.errors import InputError, check_type, real_number, typed, unknown_name
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.trajectory import Trajectory
 
@@ -26,6 +26,7 @@ ENVIRONMENT = ""
 """Part of the kinds that apply to the world or to the whole robot; notation omits it."""
 
 
+@typed
 @total_ordering
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FaultKind:
@@ -83,9 +84,13 @@ class FaultKind:
     base: Literal["any", "free", "fixed"] = "any"
 
     def __post_init__(self) -> None:
-        check_type(self.name, str, "the name of a fault kind as text")
         for name, numbers in (("levels", self.levels), ("bounds", self.bounds or ())):
-            check_type(numbers, tuple | list, f"{name} as a tuple of numbers")
+            for place, one in enumerate(numbers):
+                real_number(f"{name}[{place}]", one, 0.5, kind="real")
+        for to in (*self.degenerates_to.values(), *self.degenerates_alone_to.values()):
+            check_type(to, FaultKind | None, "a FaultKind, such as selfmodel.faults.JAMMED")
+        if self.base not in (bases := ("any", "free", "fixed")):
+            raise unknown_name("base of a fault kind", self.base, bases)
         if self.bounds is not None and not (
             len(self.bounds) == 2 and self.bounds[0] <= self.bounds[1]
         ):
@@ -128,7 +133,7 @@ class FaultKind:
 
         Faults are applied in the order of their kinds' names.
         """
-        raise NotImplementedError  # each kind has its own
+        raise NotImplementedError(f"give the class of the fault kind {self.name} a method apply")
 
     def edit_specification(self, spec: "MjSpec", fault: "Fault", seed: int) -> None:
         """Edits the robot's specification before it is compiled; by default, not at all.
@@ -191,6 +196,7 @@ class FaultKind:
         )
 
 
+@typed
 @dataclass(frozen=True, order=True)
 class Fault:
     """A fault: one difference of the robot or of the world from the nominal model.

@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
-from selfmodel.errors import TrialError
+from selfmodel.errors import TrialError, typed
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.joints import BROKEN
@@ -41,6 +41,7 @@ CONTACT_MEMORY = 4 * 2**20
 """Size of MuJoCo's arena for the contacts of a robot with its debris, bytes."""
 
 
+@typed
 def draw_gap(robot: Robot, level: float, rng: np.random.Generator) -> RealityGap:
     """Returns a random reality gap for a robot; see ``draw_gap_of``."""
     return draw_gap_of(robot.model, robot.anatomy, level, rng)
@@ -94,6 +95,7 @@ class NoisyMeasurement(Measurement):
         return np.asarray(values + self._level * scale * self._rng.standard_normal(values.shape))
 
 
+@typed
 class SimulatedRobot:
     """Simulated physical robot with a hidden fault.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.errors import InputError, WorkError, check_type, whole_number
+from selfmodel.errors import InputError, WorkError, typed, whole_number
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.repertoire import Origin, Repertoire, model_digest
@@ -63,6 +63,7 @@ class Filling:
     seconds: float
 
 
+@typed
 def make_repertoire(
     robot: Robot,
     design: Design,
@@ -96,8 +97,6 @@ def make_repertoire(
             argument is invalid.
         WorkError: No gait entered the repertoire.
     """
-    check_type(robot, Robot, 'a Robot, such as selfmodel.load_robot("quadruped")')
-    check_type(design, Design, "a Design, such as the one of a controller")
     seed = whole_number("seed", seed, 0, least=0)
     steps = whole_number("steps", steps, 1000, least=1)
     evaluations = whole_number("evaluations", evaluations, EVALUATIONS, least=1)
@@ -179,6 +178,7 @@ def feet_of(anatomy: Anatomy) -> list[int]:
     return feet
 
 
+@typed
 def simulated_evaluation(simulator: Simulator, hypothesis: Hypothesis, steps: int) -> Evaluate:
     """Returns the evaluation of gaits by their forward displacement in simulation, m.
 
@@ -207,6 +207,7 @@ def simulated_evaluation(simulator: Simulator, hypothesis: Hypothesis, steps: in
     return evaluate
 
 
+@typed
 def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, ...]:
     """Returns the gaits with a finite score in another evaluation, best first.
 

@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, held
-from selfmodel.errors import InputError, check_function, check_type
+from selfmodel.errors import InputError, typed
 from selfmodel.faults.build import build, detached_bodies
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.physical.interface import ObservedRobot, PhysicalRobot
@@ -52,6 +52,7 @@ LARGEST = 1e10
 """Magnitude above which MuJoCo takes a simulation as diverged."""
 
 
+@typed
 @dataclass(frozen=True)
 class Score:
     """A fitness function of rollouts, to be maximised.
@@ -82,10 +83,6 @@ class Score:
     needs_touch: bool = False
     optional: tuple[Signal, ...] = ()
     episode: int | None = None
-
-    def __post_init__(self) -> None:
-        check_type(self.name, str, "the name of a score as text")
-        check_function("of", self.of)
 
     def most(self, steps: int) -> int | None:
         """Returns the largest return of a trial of some control steps; None for other scores."""
@@ -235,6 +232,7 @@ SCORES: Mapping[str, Score] = MappingProxyType(
 """Scores by name."""
 
 
+@typed
 def upright_within(
     max_speed: float = math.inf,
     max_torque: float = math.inf,
@@ -256,12 +254,12 @@ def upright_within(
             deeper in each other.
 
     Raises:
-        ValueError: The limit of speed or torque is not above 0, or that of the depth is below 0.
+        InputError: The limit of speed or torque is not above 0, or that of the depth is below 0.
     """
     if not (max_speed > 0 and max_torque > 0 and max_self_collision >= 0):
-        raise ValueError(
+        raise InputError(
             f"expected limits above 0, and a depth of 0 or above, got {max_speed}, {max_torque} "
-            f"and {max_self_collision}"
+            f"and {max_self_collision}: leave out what has no limit"
         )
     compares_bodies = math.isfinite(max_self_collision)
 

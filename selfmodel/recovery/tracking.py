@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from selfmodel.arrays import FloatArray, mean_of_known
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.falls import falls_of
@@ -24,6 +24,7 @@ TURN_WEIGHT = 0.5
 """Weight of the turn beside that of the velocity forward and to the left: likewise."""
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Reference:
     """A joint trajectory to follow.
@@ -54,6 +55,7 @@ class Reference:
             raise InputError("the time of a reference trajectory must be strictly increasing")
 
 
+@typed
 def tracking(reference: Reference, robot: Robot) -> Score:
     """Returns the score of following a reference trajectory.
 

@@ -6,11 +6,12 @@ from types import MappingProxyType
 from selfmodel.controllers.controller import Design
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import HIDDEN_NEURONS, MAX_HIDDEN_NEURONS, Network
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
 
 
+@typed
 def network_for(robot: Robot, hidden: int | None = None) -> Network:
     """Returns the network that controls a robot.
 
@@ -28,6 +29,7 @@ def network_for(robot: Robot, hidden: int | None = None) -> Network:
     return Network(names.sensors, names.motors, neurons, ranges=command_ranges(robot.model))
 
 
+@typed
 def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
     """Returns the CPG that controls a robot.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from selfmodel.errors import InputError, listed
+from selfmodel.errors import InputError, listed, typed
 from selfmodel.robot import anatomy_reader
 from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS, motor_joints
 from selfmodel.robot.anatomy import (
@@ -31,6 +31,7 @@ MAX_ITERATIONS = 10_000
 depends on the contacts, so the first steps of a model do not bound it."""
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A healthy robot: its MJCF model and its control time step.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray, IndexArray
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.robot.anatomy import MAX_CONTROL_DELAY
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
@@ -29,6 +29,7 @@ MAX_CHAIN = 12.0
 """Length of a chain, at most, if all segments of a trial are simulated, s."""
 
 
+@typed
 @dataclass(frozen=True)
 class ClosedLoop:
     """A request for a rollout of the whole trial: its controller, from the initial pose.
@@ -40,6 +41,7 @@ class ClosedLoop:
     record: tuple[Signal, ...]
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Segments:
     """A request for short predictions, each from a logged state under the logged commands.
@@ -85,6 +87,7 @@ class Segments:
         )
 
 
+@typed
 @dataclass(frozen=True)
 class Ensemble:
     """A request for rollouts of the whole trial with several perturbed self-models.

@@ -11,7 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandSource
-from selfmodel.errors import whole_number
+from selfmodel.errors import check_type, typed, unknown_name, whole_number
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.actuators import ancestors
@@ -26,7 +26,7 @@ from selfmodel.simulation.reality_gap import perturbed_models
 from selfmodel.simulation.requests import Ensemble, Segments
 from selfmodel.simulation.rollout import Rollout, SimulationResult, SimulationStats, batch_bytes
 from selfmodel.trials.estimation import STATE, estimated_states, known_steps
-from selfmodel.trials.signals import Signal
+from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
 
 Run = tuple[Hypothesis, CommandSource]
@@ -42,6 +42,7 @@ def thread_count(requested: int) -> int:
     return whole_number("threads", requested, 0, least=0) or len(os.sched_getaffinity(0))
 
 
+@typed
 class Simulator:
     """Batch simulator of one robot; a run is bit-identical in every batch and thread count.
 
@@ -74,8 +75,13 @@ class Simulator:
         self._members = lru_cache(ensembles)(partial(perturbed_models, robot))
         self._contact_points = lru_cache(16)(partial(ground_contact_points, robot))
 
+    @typed
     def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
         """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``."""
+        if unknown := [str(signal) for signal in record if signal not in SIGNALS]:
+            raise unknown_name("signal", unknown[0], SIGNALS)
+        check_type(runs[0] if runs else None, tuple, "pairs (Hypothesis, Controller) as runs")
+        steps = whole_number("steps", steps, 1000, least=1)
         variants = [self._variant(hypothesis) for hypothesis, _ in runs]
         return self._run(variants, [driver for _, driver in runs], steps, record)
 

@@ -22,7 +22,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmodel.errors import InputError, WorkError
+from selfmodel.errors import InputError, WorkError, typed
 from selfmodel.files import path_of, read_file, sync_folder
 from selfmodel.logs.errors import is_full
 from selfmodel.logs.files import make_folder, not_written, replace_file
@@ -48,6 +48,7 @@ Answer = tuple[float, str | None]
 """Wall time of a cell, s, and the reason of its failure."""
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Cell:
     """One computation.

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from selfmodel.arrays import FloatArray
-from selfmodel.errors import InputError, counted
+from selfmodel.errors import InputError, counted, typed
 from selfmodel.robot.robot import Robot
 from selfmodel.studies.recoveries import ENDS, robot_key
 from selfmodel.studies.rows import failure_of, label_of, methods_of, whole
@@ -180,6 +180,7 @@ def of_comparisons(comparisons: pd.DataFrame) -> dict[str, bytes]:
     return files
 
 
+@typed
 @figure_style()
 def paired_differences(comparisons: pd.DataFrame) -> Figure:
     """Returns the mean paired difference of every pair of methods, a panel per table.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.studies.cells import REMEDY, Cell, changed, finished, read_cells, versions_of
@@ -43,6 +43,7 @@ def points_of(**axes: Iterable[Any]) -> dict[str, Point]:
     }
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Study:
     """A function at the points of a grid, in a folder from which it is continued.

@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.diagnosis.diagnosis import to_json
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
@@ -427,6 +427,7 @@ def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
     return {f"{table.name}.{suffix}": write(table) for table in tables if len(table.records)}
 
 
+@typed
 def write_files(folder: str | Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Writes files, by their path in a folder, which is made if missing; returns their paths."""
     folder = path_of(folder, "the folder of a study")

@@ -22,7 +22,7 @@ from selfmodel.controllers.controller import TASK_PREFIX, Controller
 from selfmodel.controllers.graph import layers
 from selfmodel.controllers.policy import Policy
 from selfmodel.controllers.trained import Trained, initial_layers
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, typed, unknown_name
 from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
@@ -52,6 +52,7 @@ POLICY, NETWORK, STATE, PROGRESS = "policy.toml", "policy.npz", "state.npz", "pr
 """Files of a training."""
 
 
+@typed
 @dataclass(frozen=True)
 class TrainingSettings:
     """What determines a training, besides its task.
@@ -321,6 +322,7 @@ def _policy_text(file: PolicyFile) -> str:
     return "\n\n".join(blocks).lstrip() + "\n"
 
 
+@typed
 def evolve_policy(
     robot: str,
     folder: Path,

@@ -21,7 +21,7 @@ from selfmodel.diagnosis.comparator import (
     piece_steps_of,
 )
 from selfmodel.diagnosis.losses import simulate
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -64,6 +64,7 @@ def require_alone(what: str, alone: FloatArray, together: FloatArray) -> None:
         )
 
 
+@typed
 def check_comparator(
     comparator: Comparator | str, trial: Trial | None = None, simulated: Trajectory | None = None
 ) -> None:
@@ -224,6 +225,7 @@ def _check_numbers(what: str, values: FloatArray, runs: int) -> None:
     )
 
 
+@typed
 def shown(request: Request, trial: Trial) -> Trajectory:
     """Returns a simulation that reproduces a trial to the bit.
 

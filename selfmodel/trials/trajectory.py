@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from selfmodel.arrays import BoolArray, FloatArray, frozen
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, typed, unknown_name
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 MAX_TIME_ERROR, MAX_LENGTH_ERROR = 0.5, 1e-3
@@ -49,6 +49,7 @@ class Sample:
     moment: StepTiming | None = None
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """The signals of one run or of a batch of runs.
@@ -192,6 +193,7 @@ def collect(names: Names, samples: Iterable[Sample]) -> Trajectory:
     return Trajectory(names, time, signals, np.array(late) if late else None)
 
 
+@typed
 def forward_displacement(trajectory: Trajectory) -> FloatArray:
     """Returns the forward displacement d(T) - d(1) along the world's x axis, m, of each run.
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, typed, unknown_name
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import (
     Described,
@@ -37,6 +37,7 @@ MAX_SEED = 2**63 - 1
 """Largest seed of a trial: the largest integer of most other programs that read logs."""
 
 
+@typed
 @dataclass(frozen=True)
 class TrialPlan:
     """The plan of a trial, known before it starts.
@@ -65,6 +66,7 @@ class TrialPlan:
             raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {self.seed}")
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A trial that ran to its end, or until it was interrupted.

@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 import mujoco
 
-from selfmodel.errors import InputError
+from selfmodel.errors import InputError, typed
 from selfmodel.files import encodable, read_file
 from selfmodel.isolation import Message, run_isolated
 from selfmodel.robot.mjcf import equipment, meshes, pose, structure, untrusted
@@ -37,6 +37,7 @@ MAX_SUBSTEPS = 1000
 _MODULE = "selfmodel.robot.mjcf.load"
 
 
+@typed
 def load_mjcf(path: Path | str, settings: MjcfSettings | None = None) -> Robot:
     """Returns the robot that an MJCF or URDF file describes; see docs/reference/mjcf.md.
 
