@@ -19,7 +19,6 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -41,9 +40,10 @@ of four layers of 512 neurons has three million."""
 Arrays = Mapping[str, NDArray[Any]]
 """Arrays of a file, by name."""
 
-KINDS: Mapping[str, tuple[Callable[..., Design], str, str]] = MappingProxyType(
-    {Network.name: (Network, "hidden", "i"), Cpg.name: (Cpg, "timestep", "f")}
-)
+KINDS: Mapping[str, tuple[Callable[..., Design], str, str]] = {
+    Network.name: (Network, "hidden", "i"),
+    Cpg.name: (Cpg, "timestep", "f"),
+}
 """Class of each kind of design, by its name, with the name and type code of its own number."""
 
 POLICY, LAYER = "policy", "compensation"

@@ -8,7 +8,6 @@ columns of bytes. A test compares definitions and bytes with those of rosbags, w
 
 import struct
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -54,9 +53,9 @@ _FIELDS = {
     ),
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
 }
-DEFINITIONS: Mapping[str, str] = MappingProxyType(
-    {kind: fields.replace(", ", "\n") + "\n" for kind, fields in _FIELDS.items()}
-)
+DEFINITIONS: Mapping[str, str] = {
+    kind: fields.replace(", ", "\n") + "\n" for kind, fields in _FIELDS.items()
+}
 """Lines of each message type in ROS; only those of ``selfmodel_msgs`` are selfmodel's own."""
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"
@@ -231,16 +230,14 @@ TRANSFORMS = "/tf"
 COMMANDS = "/joint_commands"
 IMU = "/imu"
 
-CHANNELS: Mapping[str, Mapping[str, str]] = MappingProxyType(
-    {
-        DESCRIPTION: {
-            "offered_qos_profiles": "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
-            "  deadline: {sec: 0, nsec: 0}\n  lifespan: {sec: 0, nsec: 0}\n  liveliness: 1\n"
-            "  liveliness_lease_duration: {sec: 0, nsec: 0}\n"
-            "  avoid_ros_namespace_conventions: false"
-        }
+CHANNELS: Mapping[str, Mapping[str, str]] = {
+    DESCRIPTION: {
+        "offered_qos_profiles": "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
+        "  deadline: {sec: 0, nsec: 0}\n  lifespan: {sec: 0, nsec: 0}\n  liveliness: 1\n"
+        "  liveliness_lease_duration: {sec: 0, nsec: 0}\n"
+        "  avoid_ros_namespace_conventions: false"
     }
-)
+}
 """Metadata of channels by topic. A player of ROS 2 keeps the description for who subscribes later:
 the last one (history 1, depth 1), reliable (1) and transient local (durability 1)."""
 

@@ -18,7 +18,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
 import msgspec
@@ -110,30 +109,26 @@ def _terms(*terms: str, **scales: Numbers) -> tuple[Observed, ...]:
     return tuple(Observed(term, scales.get(term, 1.0)) for term in terms)
 
 
-_LEGGED_GYM: Mapping[str, Numbers] = MappingProxyType(
-    {
-        "linear_velocity": 2.0,
-        "angular_velocity": 0.25,
-        "velocity": (2.0, 2.0, 0.25),
-        "joint_velocities": 0.05,
-    }
-)
+_LEGGED_GYM: Mapping[str, Numbers] = {
+    "linear_velocity": 2.0,
+    "angular_velocity": 0.25,
+    "velocity": (2.0, 2.0, 0.25),
+    "joint_velocities": 0.05,
+}
 
 _BODY = ("linear_velocity", "angular_velocity", "gravity")
 _JOINTS = ("joint_positions", "joint_velocities", "last_action")
 
-PRESETS: Mapping[str, tuple[tuple[Observed, ...], float, float]] = MappingProxyType(
-    {
-        "mujoco_playground": (_terms(*_BODY, *_JOINTS, "velocity"), 0.5, 1.0),
-        "isaac_lab": (_terms(*_BODY, "velocity", *_JOINTS), 0.5, 1.0),
-        "legged_gym": (_terms(*_BODY, "velocity", *_JOINTS, **_LEGGED_GYM), 0.25, 1.0),
-        "unitree_rl_gym": (
-            _terms(*_BODY[1:], "velocity", *_JOINTS, "phase", **_LEGGED_GYM),
-            0.25,
-            0.8,
-        ),
-    }
-)
+PRESETS: Mapping[str, tuple[tuple[Observed, ...], float, float]] = {
+    "mujoco_playground": (_terms(*_BODY, *_JOINTS, "velocity"), 0.5, 1.0),
+    "isaac_lab": (_terms(*_BODY, "velocity", *_JOINTS), 0.5, 1.0),
+    "legged_gym": (_terms(*_BODY, "velocity", *_JOINTS, **_LEGGED_GYM), 0.25, 1.0),
+    "unitree_rl_gym": (
+        _terms(*_BODY[1:], "velocity", *_JOINTS, "phase", **_LEGGED_GYM),
+        0.25,
+        0.8,
+    ),
+}
 """Terms of the observation, scale of the action, and period of the clock, s, by the framework that
 trains the policy."""
 

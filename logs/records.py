@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -43,13 +42,11 @@ SETTINGS_FILE, MAPPING_FILE = "settings.json", "mapping.toml"
 OWN_FILES = (MODEL_FILE, CONTROLLER_FILE, SETTINGS_FILE, MAPPING_FILE)
 """Attachments of selfmodel; all others are files that the model may name."""
 
-MEDIA_TYPES: Mapping[str, str] = MappingProxyType(
-    {
-        MODEL_FILE: "application/xml",
-        SETTINGS_FILE: "application/json",
-        MAPPING_FILE: "application/toml",
-    }
-)
+MEDIA_TYPES: Mapping[str, str] = {
+    MODEL_FILE: "application/xml",
+    SETTINGS_FILE: "application/json",
+    MAPPING_FILE: "application/toml",
+}
 """Media types by attachment; other attachments are ``application/octet-stream``."""
 
 TRUTH, GAP = "truth", "gap"

@@ -19,7 +19,6 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path, PurePath
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import mcap.records
@@ -308,15 +307,11 @@ def _ros1(file: Path, found: _Found) -> Iterator[_Stored]:
             raise ValueError(f"its chunks have {claimed} messages, its index {number}")
 
 
-_FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[_Stored]], str]] = (
-    MappingProxyType(
-        {
-            _MCAP_MAGIC: (_mcap, "mcap recover"),
-            b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
-            b"#ROSBAG V": (_ros1, "rosbag reindex"),
-        }
-    )
-)
+_FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[_Stored]], str]] = {
+    _MCAP_MAGIC: (_mcap, "mcap recover"),
+    b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
+    b"#ROSBAG V": (_ros1, "rosbag reindex"),
+}
 """Readers by the first bytes of a file, and tools that recover its intact part."""
 
 

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -23,28 +22,32 @@ UNKNOWN = "?"
 NONE = "none"
 """Name of a hinge that has no encoder in the recording."""
 
-UNITS: Mapping[str, float] = MappingProxyType(
-    {"rad": 1.0, "deg": math.pi / 180, "raw": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1e3}
-)
+UNITS: Mapping[str, float] = {
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "raw": 1.0,
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "km": 1e3,
+}
 """Units of angles, rad, and of lengths, m; ``raw`` is that of a motor, such as N m."""
 
-TIMES: Mapping[str, int] = MappingProxyType({"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1})
+TIMES: Mapping[str, int] = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 """Units of a time column, ns."""
 
 Keys = tuple[str, ...]
 """Path of an entry: names of its tables, then its key."""
 
-VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = MappingProxyType(
-    {
-        "base": {
-            "position": (0, 3),
-            "orientation": (3, 7),
-            "linear_velocity": (7, 10),
-            "angular_velocity": (10, 13),
-        },
-        "imu": {"orientation": (0, 4), "angular_velocity": (4, 7), "linear_acceleration": (7, 10)},
-    }
-)
+VECTORS: Mapping[str, Mapping[str, tuple[int, int]]] = {
+    "base": {
+        "position": (0, 3),
+        "orientation": (3, 7),
+        "linear_velocity": (7, 10),
+        "angular_velocity": (10, 13),
+    },
+    "imu": {"orientation": (0, 4), "angular_velocity": (4, 7), "linear_acceleration": (7, 10)},
+}
 """Numbers of each quantity of a body in the rows of ``messages.DECODERS``."""
 
 

@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,15 +26,13 @@ IMU = "sensor_msgs/msg/Imu"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 NUMBERS = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Bool")
 
-TYPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "joints": (JOINT_STATE,),
-        "commands": (JOINT_STATE, ARRAY, TRAJECTORY),
-        "base": (ODOMETRY, POSE),
-        "imu": (IMU,),
-        "touch": (WRENCH, *NUMBERS, ARRAY),
-    }
-)
+TYPES: Mapping[str, tuple[str, ...]] = {
+    "joints": (JOINT_STATE,),
+    "commands": (JOINT_STATE, ARRAY, TRAJECTORY),
+    "base": (ODOMETRY, POSE),
+    "imu": (IMU,),
+    "touch": (WRENCH, *NUMBERS, ARRAY),
+}
 """Message types that can play each role; every other type is a table of the fields that it has."""
 
 MAX_ELEMENTS = 100
@@ -235,18 +232,16 @@ def _wxyz(quaternion: Any) -> list[float]:  # noqa: ANN401
     return [quaternion.w, *_xyz(quaternion)]
 
 
-DECODERS: Mapping[str, Callable[[Any], Rows]] = MappingProxyType(
-    {
-        JOINT_STATE: lambda m: _named(m.name, m.position, m.velocity, m.effort),
-        TRAJECTORY: _trajectory,
-        ARRAY: _array,
-        ODOMETRY: _odometry,
-        POSE: lambda m: _one(*_pose(m.pose), *[np.nan] * 6),
-        IMU: _imu,
-        WRENCH: lambda m: _one(math.hypot(*_xyz(m.wrench.force))),
-        **dict.fromkeys(NUMBERS, lambda m: _one(m.data)),
-    }
-)
+DECODERS: Mapping[str, Callable[[Any], Rows]] = {
+    JOINT_STATE: lambda m: _named(m.name, m.position, m.velocity, m.effort),
+    TRAJECTORY: _trajectory,
+    ARRAY: _array,
+    ODOMETRY: _odometry,
+    POSE: lambda m: _one(*_pose(m.pose), *[np.nan] * 6),
+    IMU: _imu,
+    WRENCH: lambda m: _one(math.hypot(*_xyz(m.wrench.force))),
+    **dict.fromkeys(NUMBERS, lambda m: _one(m.data)),
+}
 """Decoders of the supported message types into names and rows of numbers.
 
 Widths: JointState 3 (position, velocity, effort), those of commands 1, Odometry and PoseStamped 13
@@ -284,10 +279,8 @@ def _defined(name: str, *nested: str) -> str:
     return f"{'=' * 80}\n".join(text.replace(", ", "\n") + "\n" for text in texts)
 
 
-DEFINITIONS: Mapping[str, str] = MappingProxyType(
-    {
-        "unitree_go/msg/LowState": _defined("LowState", "IMUState", "MotorState", "BmsState"),
-        "unitree_go/msg/LowCmd": _defined("LowCmd", "MotorCmd", "BmsCmd"),
-    }
-)
+DEFINITIONS: Mapping[str, str] = {
+    "unitree_go/msg/LowState": _defined("LowState", "IMUState", "MotorState", "BmsState"),
+    "unitree_go/msg/LowCmd": _defined("LowCmd", "MotorCmd", "BmsCmd"),
+}
 """Definitions of types in bags that have none: those in SQLite of ROS 2 before Iron."""

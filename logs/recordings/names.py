@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
-from types import MappingProxyType
 
 from selfmodel.logs.recordings.mapping import VECTORS
 
@@ -20,30 +19,28 @@ CERTAIN_LEAD = 0.1
 LONGEST = 200
 """Length of the longest name that is compared, characters."""
 
-_WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        word: tuple(meaning.split())
-        for words, meaning in {
-            "fl lf": "front left",
-            "fr rf": "front right",
-            "ml lm": "middle left",
-            "mr rm": "middle right",
-            "bl lb hl lh rl": "back left",
-            "br rb hr rh rr": "back right",
-            "rear hind": "back",
-            "fore": "front",
-            "mid": "middle",
-            "l": "left",
-            "r": "right",
-            "hfe thigh femur upper": "shoulder",
-            "kfe calf shank tibia lower": "knee",
-            "haa": "hip",
-            "foot ft contact force wrench sole": "touch",
-            "joint motor servo actuator link position": "",  # which identify no joint
-        }.items()
-        for word in words.split()
-    }
-)
+_WORDS: Mapping[str, tuple[str, ...]] = {
+    word: tuple(meaning.split())
+    for words, meaning in {
+        "fl lf": "front left",
+        "fr rf": "front right",
+        "ml lm": "middle left",
+        "mr rm": "middle right",
+        "bl lb hl lh rl": "back left",
+        "br rb hr rh rr": "back right",
+        "rear hind": "back",
+        "fore": "front",
+        "mid": "middle",
+        "l": "left",
+        "r": "right",
+        "hfe thigh femur upper": "shoulder",
+        "kfe calf shank tibia lower": "knee",
+        "haa": "hip",
+        "foot ft contact force wrench sole": "touch",
+        "joint motor servo actuator link position": "",  # which identify no joint
+    }.items()
+    for word in words.split()
+}
 
 _SIDES = (frozenset({"front", "middle", "back"}), frozenset({"left", "right"}))
 """Sets of exclusive words: names with two words of one set never match."""
@@ -109,7 +106,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _sets(words: Mapping[str, str]) -> Mapping[str, frozenset[str]]:
-    return MappingProxyType({name: frozenset(text.split()) for name, text in words.items()})
+    return {name: frozenset(text.split()) for name, text in words.items()}
 
 
 _QUANTITIES = _sets(

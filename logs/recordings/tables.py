@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -357,16 +356,14 @@ class Format(NamedTuple):
     write: Callable[[IO[bytes], Columns], None] | None
 
 
-FORMATS: Mapping[str, Format] = MappingProxyType(
-    {
-        ".csv": Format("CSV", _read_csv, "save it as text in UTF-8", _write_csv),
-        ".tsv": Format("CSV", _read_csv, "save it as text in UTF-8", None),
-        ".npz": Format("NPZ", _read_npz, "write it again with numpy.savez", _write_npz),
-        ".parquet": Format(
-            "Parquet", _read_parquet, "write it again with DataFrame.to_parquet", _write_parquet
-        ),
-    }
-)
+FORMATS: Mapping[str, Format] = {
+    ".csv": Format("CSV", _read_csv, "save it as text in UTF-8", _write_csv),
+    ".tsv": Format("CSV", _read_csv, "save it as text in UTF-8", None),
+    ".npz": Format("NPZ", _read_npz, "write it again with numpy.savez", _write_npz),
+    ".parquet": Format(
+        "Parquet", _read_parquet, "write it again with DataFrame.to_parquet", _write_parquet
+    ),
+}
 """Formats of tables by the suffix of the file."""
 
 

@@ -7,7 +7,6 @@ attributes, and raises ``ValueError`` for those that it does not support.
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -246,49 +245,47 @@ def _of_two(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operato
     return apply
 
 
-OPERATORS: Mapping[str, Operator] = MappingProxyType(
-    {
-        "Gemm": _gemm,
-        "MatMul": _product,
-        "Elu": _elu,
-        "LeakyRelu": _leaky,
-        "Clip": _clip,
-        "LayerNormalization": _normalised,
-        "Concat": _concatenated,
-        "Split": _split,
-        "Slice": _slice,
-        "Flatten": _flat,
-        "Reshape": _flat,
-        "Softmax": _softmax,
-        "Squeeze": _squeezed,
-        "Unsqueeze": _unsqueezed,
-        "LSTM": _lstm,
-        "GRU": _gru,
-        "Add": _of_two(np.add),
-        "Sub": _of_two(np.subtract),
-        "Mul": _of_two(np.multiply),
-        "Div": _of_two(np.divide),
-        "Max": _reduced(np.maximum),
-        "Min": _reduced(np.minimum),
-        "Neg": _of_one(np.negative),
-        "Abs": _of_one(np.abs),
-        "Exp": _of_one(np.exp),
-        "Sqrt": _of_one(np.sqrt),
-        "Sin": _of_one(np.sin),
-        "Cos": _of_one(np.cos),
-        "Tanh": _of_one(np.tanh),
-        "Sigmoid": _of_one(_sigmoid),
-        "Relu": _of_one(lambda x: np.maximum(x, 0.0)),
-        "Softplus": _of_one(lambda x: np.logaddexp(x, 0.0)),
-        "Softsign": _of_one(lambda x: x / (1 + np.abs(x))),
-        "Identity": _of_one(lambda x: x),
-        "Cast": _cast,
-    }
-)
+OPERATORS: Mapping[str, Operator] = {
+    "Gemm": _gemm,
+    "MatMul": _product,
+    "Elu": _elu,
+    "LeakyRelu": _leaky,
+    "Clip": _clip,
+    "LayerNormalization": _normalised,
+    "Concat": _concatenated,
+    "Split": _split,
+    "Slice": _slice,
+    "Flatten": _flat,
+    "Reshape": _flat,
+    "Softmax": _softmax,
+    "Squeeze": _squeezed,
+    "Unsqueeze": _unsqueezed,
+    "LSTM": _lstm,
+    "GRU": _gru,
+    "Add": _of_two(np.add),
+    "Sub": _of_two(np.subtract),
+    "Mul": _of_two(np.multiply),
+    "Div": _of_two(np.divide),
+    "Max": _reduced(np.maximum),
+    "Min": _reduced(np.minimum),
+    "Neg": _of_one(np.negative),
+    "Abs": _of_one(np.abs),
+    "Exp": _of_one(np.exp),
+    "Sqrt": _of_one(np.sqrt),
+    "Sin": _of_one(np.sin),
+    "Cos": _of_one(np.cos),
+    "Tanh": _of_one(np.tanh),
+    "Sigmoid": _of_one(_sigmoid),
+    "Relu": _of_one(lambda x: np.maximum(x, 0.0)),
+    "Softplus": _of_one(lambda x: np.logaddexp(x, 0.0)),
+    "Softsign": _of_one(lambda x: x / (1 + np.abs(x))),
+    "Identity": _of_one(lambda x: x),
+    "Cast": _cast,
+}
 """Supported operators, by their name in ONNX. ``Reshape`` makes one row of the
 numbers of each robot; ``Cast`` is of numbers to numbers."""
 
-TENSOR_FACTORS: Mapping[str, int] = MappingProxyType({"Gemm": 1, "MatMul": 1, "GRU": 3, "LSTM": 3})
+TENSOR_FACTORS: Mapping[str, int] = {"Gemm": 1, "MatMul": 1, "GRU": 3, "LSTM": 3}
 """Number of inputs, after the first, that must be tensors."""
 
 BY_SHAPE = (

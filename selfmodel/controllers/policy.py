@@ -9,7 +9,6 @@ empty. ``compensation.Compensated`` is a layer around it that is.
 import math
 from collections.abc import Callable, Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -39,18 +38,16 @@ def body_velocity(observed: Rows) -> FloatArray:
     return rotated(observed["base_linear_velocity"], inverse)
 
 
-MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[[Rows], FloatArray]]] = MappingProxyType(
-    {
-        "linear_velocity": (("base_linear_velocity", "base_orientation"), body_velocity),
-        "angular_velocity": (
-            ("base_angular_velocity",),
-            lambda observed: observed["base_angular_velocity"],
-        ),
-        "gravity": (("base_orientation",), gravity),
-        "joint_positions": (("joint_positions",), lambda observed: observed["joint_positions"]),
-        "joint_velocities": (("joint_velocities",), lambda observed: observed["joint_velocities"]),
-    }
-)
+MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[[Rows], FloatArray]]] = {
+    "linear_velocity": (("base_linear_velocity", "base_orientation"), body_velocity),
+    "angular_velocity": (
+        ("base_angular_velocity",),
+        lambda observed: observed["base_angular_velocity"],
+    ),
+    "gravity": (("base_orientation",), gravity),
+    "joint_positions": (("joint_positions",), lambda observed: observed["joint_positions"]),
+    "joint_velocities": (("joint_velocities",), lambda observed: observed["joint_velocities"]),
+}
 """Terms that a robot measures: the signals they need, and their values from these."""
 
 MAX_HISTORY, MIN_PERIOD = 1000, 1e-3

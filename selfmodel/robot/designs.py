@@ -1,7 +1,6 @@
 """Controller designs for a robot, by name; ``controllers/controller.py`` says how to add one."""
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from selfmodel.controllers.controller import Design
 from selfmodel.controllers.cpg import Cpg
@@ -49,7 +48,8 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
     return Cpg(names.sensors, names.motors, robot.control_timestep, ranges=ranges)
 
 
-DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = MappingProxyType(
-    {Network.name: network_for, Cpg.name: cpg_for}
-)
+DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = {
+    Network.name: network_for,
+    Cpg.name: cpg_for,
+}
 """Function from a robot and a number of hidden neurons (None: the default) to a design, by name."""

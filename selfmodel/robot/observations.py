@@ -5,7 +5,6 @@ together. It needs no dm_control: a log is replayed by the names of the parts in
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -132,17 +131,15 @@ def to_target(own: Fields) -> FloatArray:
     return own.seen_from(own.geom("geom_xpos", "target"), *mouth)
 
 
-OBSERVATIONS: Mapping[str, Callable[[Fields], Sequence[FloatArray]]] = MappingProxyType(
-    {
-        "walker": _walker,
-        "cheetah": _planar,
-        "hopper": _hopper,
-        "quadruped": _quadruped,
-        "humanoid": _humanoid,
-        "fish-swim": lambda own: _fish(own, swims=True),
-        "fish-upright": lambda own: _fish(own, swims=False),
-    }
-)
+OBSERVATIONS: Mapping[str, Callable[[Fields], Sequence[FloatArray]]] = {
+    "walker": _walker,
+    "cheetah": _planar,
+    "hopper": _hopper,
+    "quadruped": _quadruped,
+    "humanoid": _humanoid,
+    "fish-swim": lambda own: _fish(own, swims=True),
+    "fish-upright": lambda own: _fish(own, swims=False),
+}
 """Parts of an observation by the domain of the suite, or by domain and task where its tasks have
 different ones."""
 
