@@ -19,8 +19,7 @@ from typing import TypeVar
 import msgspec
 import zstandard
 from mcap import exceptions, records as mcap
-from mcap.opcode import Opcode
-from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
 from selfmodel.errors import InputError
@@ -241,7 +240,9 @@ def verified_records(data: bytes) -> Iterator[mcap.McapRecord]:
     for record in reader.records:
         counts[type(record)] += 1
         if isinstance(record, mcap.Chunk):
-            for part in _chunk_records(record):
+            if record.uncompressed_size and not record.uncompressed_crc:
+                raise UncheckedError("a chunk has no checksum")
+            for part in breakup_chunk(record, validate_crc=True):
                 counts[type(part)] += 1
                 yield part
         else:
@@ -285,30 +286,6 @@ def _check_sum(data: bytes, start: int, end: int, what: str) -> None:
     stored = int.from_bytes(data[end - 4 : end], "little")
     if zlib.crc32(memoryview(data)[start : end - 4]) != stored:
         raise ValueError(f"the checksum of its {what} is wrong")
-
-
-def _chunk_records(chunk: mcap.Chunk) -> Iterator[mcap.McapRecord]:
-    """Does what mcap's ``breakup_chunk`` does, in a third of the time for messages."""
-    if chunk.uncompressed_size and not chunk.uncompressed_crc:
-        raise UncheckedError("a chunk has no checksum")
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data, offset = stream.read(size), 0
-    while offset < size:
-        opcode, length = _FRAME.unpack_from(data, offset)
-        start, end = offset + _FRAME.size, offset + _FRAME.size + length
-        if end > size:
-            raise exceptions.EndOfFile
-        if opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
-            payload = data[start + _MESSAGE.size : end]
-            yield mcap.Message(channel, log_time, payload, publish_time, sequence)
-        else:
-            yield from breakup_chunk(mcap.Chunk("", data[offset:end], 0, 0, 0, end - offset))
-        offset = end
-
-
-_FRAME = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<HIQQ")
 
 
 def _gather(data: bytes, contents: Contents, unread: Collection[str]) -> None:
