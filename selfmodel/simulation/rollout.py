@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TypeVar
 
 import mujoco
 import numpy as np
@@ -21,10 +22,12 @@ from selfmodel.robot.anatomy import added_steps, split_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.state import Bind, Reader, SensorReader, observed_fields
+from selfmodel.robot.state import Bind, Reader, SensorReader, SignalSource, observed_fields
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
+
+Name = TypeVar("Name", bound=str)
 
 Disturb = Callable[[FloatArray, Mapping[str, FloatArray]], None]
 """Changes the readings, ``(n, sensors)``, and the other observed signals of a step in place."""
@@ -153,27 +156,16 @@ class RobotBatch:
 
 
 def live_signals(
-    robot: Robot, bind: Bind, variants: Sequence[ModelVariant], record: Sequence[Signal]
-) -> dict[Signal, Reader]:
-    """Returns functions that read recorded signals of the state from fields of a batch."""
-    state = observed_fields(robot, variants)
-    return {
-        signal: state[signal](bind) for signal in record if signal not in ("sensors", "commands")
-    }
+    robot: Robot, bind: Bind, variants: Sequence[ModelVariant], record: Iterable[Name]
+) -> dict[Name, Reader]:
+    """Returns functions that read recorded signals, and observations of tasks, from a batch."""
+    state = dict[str, SignalSource](observed_fields(robot, variants).items())
+    if tasks := [name for name in record if name.startswith(TASK_PREFIX)]:
+        from selfmodel.robot.observations import observation_source  # noqa: PLC0415  # few have one
 
-
-def task_signals(
-    robot: Robot, bind: Bind, observed: Iterable[str]
-) -> dict[str, Callable[[], FloatArray]]:
-    """Returns functions that read the observations of tasks among the signals of a controller."""
-    keys = [signal for signal in observed if signal.startswith(TASK_PREFIX)]
-    if not keys:
-        return {}
-    from selfmodel.robot.observations import observation_source  # noqa: PLC0415  # few have one
-
-    return {
-        key: observation_source(key.removeprefix(TASK_PREFIX), robot.model)(bind) for key in keys
-    }
+        for name in tasks:
+            state[name] = observation_source(name.removeprefix(TASK_PREFIX), robot.model)
+    return {name: state[name](bind) for name in record if name not in ("sensors", "commands")}
 
 
 class Rollout:
@@ -223,13 +215,10 @@ class Rollout:
         self._reader = SensorReader(model, robot.anatomy, variants)
         silent = [variant.silent_neurons for variant in variants]
         self._controllers = make_batch(drivers, silent, sensors)
-        observed = self._controllers.observed
-        observes = [signal for signal in SIGNALS if signal in observed]
-        self._observe = live_signals(robot, batch.bind, variants, observes)
-        self._tasks = task_signals(robot, batch.bind, observed)
+        self._observe = live_signals(robot, batch.bind, variants, self._controllers.observed)
         # An observation of a task is of the state after a step, as dm_control's are.
-        stages = mujoco.mjtStage
-        self._stage = stages.mjSTAGE_VEL if self._tasks else stages.mjSTAGE_NONE
+        stages, tasks = mujoco.mjtStage, {*self._observe} - {*SIGNALS}
+        self._stage = stages.mjSTAGE_VEL if tasks else stages.mjSTAGE_NONE
         self._sensordata, self._qpos = batch.bind("sensordata"), batch.bind("qpos")
         whole, self._part = split_delay(robot.control_delay, robot.substeps)
         added = [
@@ -241,7 +230,7 @@ class Rollout:
         line = (int(self._delays.max()) + 1, *self._motors.shape)
         self._sent = np.broadcast_to(holding_commands(robot.model), line).copy()
         self._commands = np.zeros(self._motors.shape)
-        self.live: dict[Signal, Callable[[], FloatArray]] = {
+        self.live: dict[Signal, Reader] = {
             **live_signals(robot, batch.bind, variants, record),
             "sensors": lambda: self._controllers.readings,
             # Those of the controllers, before the control delay.
@@ -268,8 +257,6 @@ class Rollout:
             self._reader.read(self._sensordata, self._qpos, self._controllers.readings)
             for signal, value in self._observe.items():
                 self._controllers.observed[signal][:] = value()
-            for key, value in self._tasks.items():
-                self._controllers.observed[key][:] = value()
             self._disturb(self._controllers.readings, self._controllers.observed)
             self._controllers.step(self._commands)
             self._sent[k % len(self._sent)] = self._commands
