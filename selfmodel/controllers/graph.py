@@ -98,20 +98,16 @@ class Graph:
                 raise ValueError(f"expected 1 to {MAX_NUMBERS} {what}, got {width}")
         for rows in (1, 2):  # a tensor of two rows fits two robots alone
             given = (rows, self.inputs)
-            found = self(np.zeros(given)).shape  # raises ValueError
-            if not self.outputs and len(found) == len(given):
-                object.__setattr__(self, "outputs", found[1])
-            expected = (rows, self.outputs)
-            if found != expected:
-                raise ValueError(
-                    f"its output for inputs of {given} has the shape {found}, expected {expected}"
-                )
-        self._check_states()
-
-    def _check_states(self) -> None:
-        for rows in (1, 2):
             first = self.initial(rows)
-            _, later = self.step(np.zeros((rows, self.inputs)), first)  # raises ValueError
+            output, later = self.step(np.zeros(given), first)  # raises ValueError
+            if not self.outputs and output.ndim == len(given):
+                object.__setattr__(self, "outputs", output.shape[1])
+            expected = (rows, self.outputs)
+            if output.shape != expected:
+                raise ValueError(
+                    f"its output for inputs of {given} has the shape {output.shape}, expected "
+                    f"{expected}"
+                )
             for state, before, after in zip(self.states, first, later, strict=True):
                 if before.shape != after.shape:
                     raise ValueError(

@@ -229,18 +229,11 @@ def _reduced(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operat
     return lambda arguments, _attributes: [functools.reduce(function, arguments)]
 
 
-def _of_one(function: Callable[[FloatArray], FloatArray]) -> Operator:
+def _of(count: int, function: Callable[..., FloatArray]) -> Operator:
     def apply(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
-        (x,) = arguments
-        return [function(x)]
-
-    return apply
-
-
-def _of_two(function: Callable[[FloatArray, FloatArray], FloatArray]) -> Operator:
-    def apply(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
-        first, second = arguments
-        return [function(first, second)]
+        if len(arguments) != count:
+            raise ValueError(f"expected {count} inputs")
+        return [function(*arguments)]
 
     return apply
 
@@ -262,24 +255,24 @@ OPERATORS: Mapping[str, Operator] = {
     "Unsqueeze": _unsqueezed,
     "LSTM": _lstm,
     "GRU": _gru,
-    "Add": _of_two(np.add),
-    "Sub": _of_two(np.subtract),
-    "Mul": _of_two(np.multiply),
-    "Div": _of_two(np.divide),
+    "Add": _of(2, np.add),
+    "Sub": _of(2, np.subtract),
+    "Mul": _of(2, np.multiply),
+    "Div": _of(2, np.divide),
     "Max": _reduced(np.maximum),
     "Min": _reduced(np.minimum),
-    "Neg": _of_one(np.negative),
-    "Abs": _of_one(np.abs),
-    "Exp": _of_one(np.exp),
-    "Sqrt": _of_one(np.sqrt),
-    "Sin": _of_one(np.sin),
-    "Cos": _of_one(np.cos),
-    "Tanh": _of_one(np.tanh),
-    "Sigmoid": _of_one(_sigmoid),
-    "Relu": _of_one(lambda x: np.maximum(x, 0.0)),
-    "Softplus": _of_one(lambda x: np.logaddexp(x, 0.0)),
-    "Softsign": _of_one(lambda x: x / (1 + np.abs(x))),
-    "Identity": _of_one(lambda x: x),
+    "Neg": _of(1, np.negative),
+    "Abs": _of(1, np.abs),
+    "Exp": _of(1, np.exp),
+    "Sqrt": _of(1, np.sqrt),
+    "Sin": _of(1, np.sin),
+    "Cos": _of(1, np.cos),
+    "Tanh": _of(1, np.tanh),
+    "Sigmoid": _of(1, _sigmoid),
+    "Relu": _of(1, lambda x: np.maximum(x, 0.0)),
+    "Softplus": _of(1, lambda x: np.logaddexp(x, 0.0)),
+    "Softsign": _of(1, lambda x: x / (1 + np.abs(x))),
+    "Identity": _of(1, lambda x: x),
     "Cast": _cast,
 }
 """Supported operators, by their name in ONNX. ``Reshape`` makes one row of the

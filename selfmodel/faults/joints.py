@@ -155,10 +155,11 @@ class MotorOff(MotorFault):
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Zeroes the forces of the motors, and scales the resistance of the hinges."""
-        joint = anatomy.joint(fault.part)
+        joint, model = anatomy.joint(fault.part), variant.model
         variant.weaken_motors([anatomy.motors.index(motor) for motor in joint.motors], 0.0)
-        for hinge in joint.hinges:
-            variant.scale_resistance(hinge, fault.severity)
+        dofs = [int(model.joint(hinge).dofadr[0]) for hinge in joint.hinges]
+        for resistance in (model.dof_damping, model.dof_dampingpoly, model.dof_frictionloss):
+            resistance[dofs] *= fault.severity
 
     def absorbs(self, fault: Fault, other: Fault, _anatomy: Anatomy) -> bool:
         """Returns whether the other fault is of the torque of the same motors."""
@@ -224,7 +225,8 @@ class EncoderOffset(JointFault):
             variant.encoder_offset[anatomy.hinges.index(hinge)] += fault.severity
         for column, sensor in enumerate(anatomy.sensors):
             if sensor.hinge in hinges:
-                variant.shift_reading(column, fault.severity / sensor.half_range)
+                shift = fault.severity / sensor.half_range
+                variant.offset[column] += variant.gain[column] * shift
 
 
 class EncoderSlip(EncoderOffset):

@@ -49,7 +49,9 @@ class SensorGain(SensorFault):
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Scales the reading."""
-        variant.scale_reading(_column(anatomy, fault), fault.severity)
+        column = _column(anatomy, fault)
+        variant.gain[column] *= fault.severity
+        variant.offset[column] *= fault.severity
 
     def contradicted(self, fault: Fault, trajectory: Trajectory) -> BoolArray:
         """Returns a mask of the steps in which a binary sensor reads 1, ``(steps,)``.

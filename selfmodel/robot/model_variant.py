@@ -191,13 +191,6 @@ class ModelVariant:
         else:
             model.dof_damping[dof] = max(factor - 1, 0.0) * model.dof_M0[dof]
 
-    def scale_resistance(self, hinge: str, factor: float) -> None:
-        """Scales the viscous damping and the dry friction that a hinge has."""
-        model, dof = self.model, int(self.model.joint(hinge).dofadr[0])
-        model.dof_damping[dof] *= factor
-        model.dof_dampingpoly[dof] *= factor
-        model.dof_frictionloss[dof] *= factor
-
     def add_dry_friction(self, hinge: str, fraction: float) -> None:
         """Adds dry friction to a hinge: a fraction of the largest torque of its motors."""
         joint = self.model.joint(hinge)
@@ -272,15 +265,6 @@ class ModelVariant:
             if joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
                 pose = model.qpos0[model.jnt_qposadr[joint] :]
                 pose[:3], pose[3:7] = model.body_pos[body], model.body_quat[body]
-
-    def scale_reading(self, sensor: int, factor: float) -> None:
-        """Scales the reading of a sensor, given by its column."""
-        self.gain[sensor] *= factor
-        self.offset[sensor] *= factor
-
-    def shift_reading(self, sensor: int, shift: float) -> None:
-        """Adds a constant to what a sensor measures; its gain applies to the constant too."""
-        self.offset[sensor] += self.gain[sensor] * shift
 
     def fix_reading(self, sensor: int, value: float) -> None:
         """Sets the reading of a sensor, given by its column, to a constant."""

@@ -204,7 +204,7 @@ def node(operator: str, *inputs: str, out: str = "y", **attributes: float) -> No
             "one row of numbers",
         ),
         ([node("Slice", out="a"), GEMM], {}, "export with 10 or a later one"),
-        ([node("Add", "x", "x", out="a"), GEMM], {}, "too many values"),
+        ([node("Add", "x", "x", out="a"), GEMM], {}, "expected 2 inputs"),
         ([GEMM, Node("Gemm", ("y", "m"), ("y",))], {"m": np.ones((3, 2))}, "of other sizes"),
         ([node("Unsqueeze", "s", out="a"), GEMM], {"s": np.array([1.0])}, "expected axis 0 of ro"),
         (
