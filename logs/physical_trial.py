@@ -76,9 +76,11 @@ class TrialRunner:
         """
         path, driver = self.folder / f"{checked_name(plan.name)}.mcap", plan.controller
         if isinstance(driver, Controller) and driver.design.name == LAYER and driver.genome.any():
-            from selfmodel.logs.layers import layer_text  # noqa: PLC0415  # few trials have one
+            from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few have one
 
-            replace_file(path.with_suffix(".toml"), layer_text(driver).encode())
+            if isinstance(driver.design, Compensated):
+                numbers = driver.design.layer_file(driver.genome)
+                replace_file(path.with_suffix(".toml"), numbers.encode())
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
         try:
             return run_trial(physical, plan, path, self.robot, header)

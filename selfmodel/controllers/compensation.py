@@ -6,6 +6,7 @@ tilt and turning. A genome of zeros changes nothing, so the first candidate of a
 as it is.
 """
 
+import json
 from collections.abc import Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -34,6 +35,20 @@ FEEDBACK = ("base_orientation", "base_angular_velocity")
 
 RESPONSES = 5
 """Numbers of the feedback."""
+
+HEADER = """\
+# A compensating layer, as selfmodel evolved it around
+# {within}.
+#
+#   command = clip(own + (own - neutral) * (gain - 1) + offset + response . felt, low, high)
+#
+# own: the command of the controller within for this motor, in the unit of the motor.
+# felt: the direction of gravity in the frame of the base, its x (forward) and y (to the left),
+#   0 if upright; and the angular velocity of the base about x, y and z of that frame, rad/s.
+# velocity_shift is added to the velocity that the controller within is commanded: m/s forward and
+#   to the left, and rad/s to the left.
+"""
+"""Head of a layer file."""
 
 _SHARED = ("sensors", "motors", "ranges")
 """What a layer has of the controller within."""
@@ -152,6 +167,24 @@ class Compensated(Design):
             * scale
             * response.reshape(len(genomes), felt, RESPONSES),
         )
+
+    def layer_file(self, genome: FloatArray) -> str:
+        """Returns the numbers of a genome by name as TOML, to the last bit, for other software."""
+        layer, within = self.decode(genome[np.newaxis]), self.base
+        text = HEADER.format(within=" ".join(within.design.summary(within.genome).split()))
+        text += f"\nvelocity_shift = {layer.shift[0].tolist()}\n\n[motors]\n"
+        for k, (motor, (centre, half)) in enumerate(zip(self.motors, self.ranges, strict=True)):
+            numbers = {
+                "gain": layer.gain[0, k].tolist(),
+                "offset": layer.offset[0, k].tolist(),
+                "neutral": float(self.neutral[k]),
+                "low": float(centre - half),
+                "high": float(centre + half),
+                **({"response": layer.response[0, k].tolist()} if self.feedback else {}),
+            }
+            values = ", ".join(f"{key} = {value!r}" for key, value in numbers.items())
+            text += f"{json.dumps(motor)} = {{ {values} }}\n"
+        return text
 
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]]) -> "CompensatedBatch":
         """Returns the batch of the layers of some genomes; see ``Design.batch``."""
