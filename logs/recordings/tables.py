@@ -4,7 +4,6 @@ A child process reads a file, whose content may be hostile.
 """
 
 import csv
-import io
 import re
 import warnings
 from collections import Counter
@@ -17,7 +16,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.errors import InputError
 from selfmodel.files import check_regular, file_digest
 from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
@@ -244,17 +243,8 @@ def _array(values: list[float]) -> NDArray[Any]:
 
 
 def _write_csv(file: IO[bytes], columns: Columns) -> None:
-    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-    rows = csv.writer(text)
-    rows.writerow(columns)
     # The shortest text of each number that is read as the same number.
-    lists = [values.tolist() for values in columns.values()]
-    rows.writerows(
-        ["" if number != number else repr(number) for number in row]  # noqa: PLR0124  # NaN
-        for row in zip(*lists, strict=True)
-    )
-    text.flush()
-    text.detach()
+    data_frame(columns).to_csv(file, mode="wb", index=False, lineterminator="\r\n")
 
 
 # ---------------------------------------------------------------- NPZ
@@ -337,11 +327,7 @@ def _read_parquet(path: Path, wanted: Collection[str], _time: str) -> Content:
 
 
 def _write_parquet(file: IO[bytes], columns: Columns) -> None:
-    import pyarrow as pa  # noqa: PLC0415  # an extra
-    import pyarrow.parquet as pq  # noqa: PLC0415
-
-    table = pa.table({name: np.array(values) for name, values in columns.items()})
-    pq.write_table(table, file, write_page_checksum=True)
+    data_frame(columns).to_parquet(file, index=False, write_page_checksum=True)
 
 
 # ---------------------------------------------------------------- formats
