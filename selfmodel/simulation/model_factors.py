@@ -163,8 +163,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
 def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     """Returns a robot whose MJCF has the parameters of an edited model, and a control delay."""
     spec = robot.specification()
-    spec.compile()  # assigns the ids of the parts
-    compiler = spec.compiler
+    own, compiler = spec.compile(), spec.compiler
     # Settings with which the compiler would change the explicit masses.
     compiler.settotalmass = -1.0
     compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
@@ -172,22 +171,10 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     for body in spec.bodies[1:]:
         body.explicitinertial = True
         body.fullinertia = np.full(6, np.nan)
-        body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
-        body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]
-    for geom in spec.geoms:
-        geom.friction, geom.solref = model.geom_friction[geom.id], model.geom_solref[geom.id]
-    for pair in spec.pairs:
-        pair.friction, pair.solref = model.pair_friction[pair.id], model.pair_solref[pair.id]
-    for joint in spec.joints:
-        dof = model.jnt_dofadr[joint.id]
-        joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
-        joint.armature = model.dof_armature[dof]
-        joint.frictionloss = model.dof_frictionloss[dof]
-        joint.actfrcrange = model.jnt_actfrcrange[joint.id]
-    for motor in spec.actuators:
-        motor.forcerange = model.actuator_forcerange[motor.id]
-        motor.gainprm = model.actuator_gainprm[motor.id]
-        motor.biasprm = model.actuator_biasprm[motor.id]
+        body.mass, body.inertia = own.body_mass[body.id], own.body_inertia[body.id]
+        body.ipos, body.iquat = own.body_ipos[body.id], own.body_iquat[body.id]
+    spec.compile()
+    spec.copy_back(model)
     write_control_delay(spec, delay)
     return dataclasses.replace(robot, mjcf=spec.to_xml())
 

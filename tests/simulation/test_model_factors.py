@@ -32,7 +32,7 @@ from tests.helpers.robots.arms import arm, arm_mjcf, robot_of
 FIELDS = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass"),
     *("geom_friction", "pair_friction", "geom_solref", "pair_solref"),
-    *("dof_damping", "dof_dampingpoly", "dof_invweight0"),
+    *("dof_damping", "dof_dampingpoly", "dof_invweight0", "jnt_stiffness"),
     *("actuator_gainprm", "actuator_biasprm", "actuator_forcerange", "actuator_gear"),
 )
 
@@ -81,6 +81,7 @@ WAYS = {
     "with a least mass": {"compiler": 'boundmass="1" boundinertia="0.1"'},
     "of bodies that are fused": {"compiler": 'fusestatic="true"'},
     "with damping that grows with speed": {"damping": "0.7 0.2 0.1"},
+    "with a spring of a time constant": {"damping": '0.7" springdamper="0.2 1'},
 }
 
 
