@@ -137,7 +137,6 @@ _GRAPH = ("input", "output", "inputs", "outputs", "nodes")
 
 
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
-    """Returns the arrays that only controllers of a design have."""
     if design.name in KINDS:
         number = KINDS[design.name][1]
         return {number: np.array(getattr(design, number))}
@@ -187,7 +186,6 @@ def _design(
     arrays: Arrays,
     source: str,
 ) -> Design:
-    """Returns the design of a controller from its sensors, motors, ranges and own arrays."""
     if kind in KINDS:
         design, number, _ = KINDS[kind]
         return design(*ends, arrays[number].item(), ranges=ranges)

@@ -127,7 +127,6 @@ def read_diagnoses(folder: Path, space: HypothesisSpace) -> tuple[Diagnosis, ...
 
 
 def _values_of(folder: Path) -> list[Any]:
-    """Returns the diagnoses in the folder of a run as JSON."""
     path = folder / DIAGNOSES
     if not path.exists():
         return []

@@ -282,7 +282,6 @@ def _check(
 
 
 def _check_sum(data: bytes, start: int, end: int, what: str) -> None:
-    """Checks the checksum in the last four bytes of a part of a file."""
     stored = int.from_bytes(data[end - 4 : end], "little")
     if zlib.crc32(memoryview(data)[start : end - 4]) != stored:
         raise ValueError(f"the checksum of its {what} is wrong")

@@ -224,7 +224,6 @@ def _result(contents: Contents, record: records.TrialRecord) -> records.ResultRe
 
 
 def _attachment(contents: Contents, name: str, expected: str = "") -> bytes:
-    """Attachment of a log, whose SHA-256 is checked if it is known."""
     data = contents.attachments.get(name)
     if data is None:
         raise contents.error(f"it has no attachment {name}")

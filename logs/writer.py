@@ -198,7 +198,6 @@ class TrialWriter:
             )
 
     def _flush(self) -> None:
-        """Writes the buffered steps, and flushes them to the operating system."""
         count = self.steps - self._written
         if not count:
             return

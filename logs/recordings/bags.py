@@ -115,7 +115,6 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sort key that orders ``bag_2`` before ``bag_10``."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 
@@ -223,7 +222,6 @@ def _mcap(file: Path, found: _Found) -> Iterator[_Stored]:
 
 
 def _is_closed(file: Path) -> bool:
-    """Whether a file of MCAP ends as it begins."""
     with file.open("rb") as opened:
         opened.seek(-len(_MCAP_MAGIC), io.SEEK_END)
         return opened.read() == _MCAP_MAGIC

@@ -165,7 +165,6 @@ def write_recording(
 
 
 def _read(path: Path, mapping: RecordingMapping) -> Recording:
-    """The topics or the columns of a mapping."""
     time, places = mapping.trial.time, mapping.places.values()
     if time is None:
         if is_table(path):
@@ -208,7 +207,6 @@ def _clocks(mapping: RecordingMapping, recording: Recording, clock: str) -> dict
 def _tracks(
     mapping: RecordingMapping, recording: Recording, clocks: Mapping[str, Clocked]
 ) -> Tracks:
-    """Tracks of a recording, whose topics have the times of the clocks."""
     tracks: Tracks = {}
     for key, place in mapping.places.items():
         columns = recording.series[place.topic].columns

@@ -108,7 +108,6 @@ def _check_keys(mapping: RecordingMapping, tables: Mapping[str, Any]) -> None:
 
 
 def _check_names(mapping: RecordingMapping, role: str, angles: Angles) -> None:
-    """Checks that each name in the recording is filled in, and used once."""
     path = (role, "names")
     order = Counter[str](getattr(angles, "order", ()))
     if twice := [column for column, count in order.items() if count > 1]:
@@ -200,7 +199,6 @@ def check_recording(mapping: RecordingMapping, recording: Recording) -> None:
 
 
 def _check_topic(mapping: RecordingMapping, recording: Recording, place: Place) -> None:
-    """Checks that a topic exists, has a suitable type, and has messages."""
     role, topic = place.role, place.topic
     series = recording.series.get(topic)
     if topic == TABLE:

@@ -198,7 +198,6 @@ def _array(message: Any) -> Rows:  # noqa: ANN401
 
 
 def _one(*numbers: float) -> Rows:
-    """One row, whose column has no name."""
     return ("",), np.array([numbers], dtype=np.float64)
 
 

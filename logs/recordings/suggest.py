@@ -124,7 +124,6 @@ def _text(lines: Sequence[str]) -> str:
 
 
 def _all_parts(offer: _Offer, role: str, quantity: str, parts: Sequence[str]) -> Iterator[str]:
-    """Table of all hinges or motors."""
     yield f"[{role}.names]  # each may also be {{ name = ..., sign = -1, offset = 0.1 }}"
     offered = offer.names.get(quantity, {})
     matches = _matched(parts, offered)
@@ -278,7 +277,6 @@ def _lists(
 
 
 def _fit(series: Series, parts: Sequence[str]) -> int:
-    """Number of parts of the robot with a matching name on a topic."""
     if series.type == ARRAY:
         return len(parts) if len(series.names) == len(parts) else 0
     return len(matched(parts, series.names))

@@ -303,7 +303,6 @@ def _check_parquet(path: Path) -> None:
 
 
 def _read_parquet(path: Path, wanted: Collection[str], _time: str) -> Content:
-    """Reads columns of numbers, booleans and times; a missing value is NaN."""
     import pyarrow as pa  # noqa: PLC0415  # an extra
     import pyarrow.parquet as pq  # noqa: PLC0415
 

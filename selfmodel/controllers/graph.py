@@ -231,7 +231,6 @@ _FAILURES = (
 
 
 def _results(node: Node, arguments: Arguments, left: int) -> Sequence[FloatArray]:
-    """Returns the outputs of an operator, of ``left`` numbers at most."""
     attributes = {**dict(node.attributes), "num_outputs": len(node.outputs)}
     # Before any is computed: two small values may make a large one.
     sizes = [np.shape(one) for one in arguments if one is not None]

@@ -186,7 +186,6 @@ class HypothesisSpace:
     def _others(
         self, hypothesis: Hypothesis, changed: Iterable[Sequence[Fault]]
     ) -> list[Hypothesis]:
-        """Returns the distinct canonical forms, without the hypothesis itself."""
         distinct = dict.fromkeys(self.canonical(faults) for faults in changed)
         return [other for other in distinct if other != hypothesis]
 

@@ -189,7 +189,6 @@ def unit_heights(seed: int) -> FloatArray:
 
 
 def _interpolate(drawn: FloatArray, count: int) -> FloatArray:
-    """Returns ``count`` rows, interpolated between the drawn rows."""
     whole, part = np.divmod(np.arange(count), CELLS_PER_BUMP)
     weight = (part / CELLS_PER_BUMP)[:, np.newaxis]
     rows: FloatArray = drawn[whole] * (1 - weight) + drawn[whole + 1] * weight

@@ -346,7 +346,6 @@ class EnvironmentRobot:
             raise TrialError(f"no reading of {lacking} for more than {patience} steps, at step {k}")
 
     def _check(self, k: int, values: Mapping[Signal, FloatArray], *, missing: bool) -> None:
-        """Raises ``TrialError`` if a number is invalid, or a limit is exceeded."""
         for signal, row in values.items():
             if np.any(np.isinf(row)):
                 raise TrialError(f"{signal} is infinite at step {k}")

@@ -226,7 +226,6 @@ def add_debris(spec: mujoco.MjSpec, limbs: tuple[str, ...]) -> None:
 
 
 def _add_limb(spec: mujoco.MjSpec, bare: mujoco.MjSpec, limb: str, number: int) -> None:
-    """Adds a free copy of a limb, taken from a robot without motors and sensors."""
     # Every attachment has copies of its materials and meshes: a prefix per limb keeps them apart.
     prefix = f"{DEBRIS_PREFIX}{number}_"
     spec.worldbody.add_frame().attach_body(bare.copy().body(limb), prefix, "")

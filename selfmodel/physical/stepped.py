@@ -153,5 +153,4 @@ def _same_body(model: mujoco.MjModel, own: mujoco.MjModel) -> bool:
 
 
 def _layout(model: mujoco.MjModel) -> tuple[list[str], int]:
-    """Returns the names of the joints, in order, and the number of motors."""
     return [model.joint(joint).name for joint in range(model.njnt)], model.nu

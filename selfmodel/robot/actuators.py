@@ -139,7 +139,6 @@ def _path(model: mujoco.MjModel, tendon: int) -> slice:
 
 
 def _wrapped(model: mujoco.MjModel, tendon: int, kinds: tuple[int, ...]) -> np.ndarray:
-    """Returns the ids of the objects of some ``mjtWrap`` types on the path of a tendon."""
     path = _path(model, tendon)
     return np.asarray(model.wrap_objid[path][np.isin(model.wrap_type[path], kinds)])
 

@@ -84,7 +84,6 @@ def _joint(
     names: dict[int, str],
     sensors: tuple[Sensor, ...],
 ) -> Joint:
-    """Returns the joint of a body, given the hinges and the joint name of each body."""
     group = groups[body]
     subtree = frozenset(b for b in range(body, model.nbody) if body in ancestors(model, b))
     bodies = frozenset(model.body(b).name for b in subtree)

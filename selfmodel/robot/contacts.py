@@ -189,7 +189,6 @@ def _collision_model(robot: Robot) -> mujoco.MjModel:
 
 
 def _solid_geoms(robot: Robot) -> BoolArray:
-    """Returns whether each geom is of the shape of the robot, ``(ngeom,)``."""
     model = robot.model
     root = int(model.body(robot.root).id)
     bodies = [body for body in range(model.nbody) if root in ancestors(model, body)]

@@ -321,7 +321,6 @@ def _turn_about_origin(position: FloatArray, orientation: FloatArray, turn: Floa
 
 
 def _matrix(quaternion: FloatArray) -> FloatArray:
-    """Returns the rotation matrix of a quaternion w x y z, ``(3, 3)``."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
@@ -396,7 +395,6 @@ def _rebase_equality(model: mujoco.MjModel, joint: int, shift: float) -> None:
 
 
 def _slacken(model: mujoco.MjModel, tendon: int) -> None:
-    """Removes the limits and the passive forces of a tendon."""
     model.tendon_limited[tendon] = 0
     for force in (
         *(model.tendon_stiffness, model.tendon_stiffnesspoly, model.tendon_frictionloss),

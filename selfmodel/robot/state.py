@@ -47,8 +47,6 @@ Columns = slice | list[int]
 
 
 def _field(name: str, chosen: Columns, shift: FloatArray | None = None) -> SignalSource:
-    """Returns the source of a signal in columns of a field, plus ``shift``, ``(n, width)``."""
-
     def bound(bind: Bind) -> Reader:
         values = bind(name)
         if shift is None:
@@ -304,7 +302,6 @@ def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWrit
 
 
 def _joint_columns(robot: Robot, model: mujoco.MjModel) -> tuple[Columns, Columns]:
-    """Returns the columns of a robot's hinges in ``qpos`` and in ``qvel``."""
     hinges = [model.joint(name) for name in robot.anatomy.hinges]
     positions = columns([int(hinge.qposadr[0]) for hinge in hinges])
     return positions, columns([int(hinge.dofadr[0]) for hinge in hinges])

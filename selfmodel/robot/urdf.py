@@ -174,7 +174,6 @@ def _check_tree(root: ET.Element) -> str:
 
 
 def _parents(root: ET.Element, links: Collection[str]) -> dict[str, str]:
-    """Returns the parent of each link that a joint carries."""
     parents: dict[str, str] = {}
     for joint in root.findall("joint"):
         name = quoted(joint.get("name"))
@@ -228,7 +227,6 @@ def _kept(element: ET.Element) -> ET.Element:
 
 
 def _check_numbers(tag: str, name: str, text: str) -> None:
-    """Checks that an attribute has its numbers, and that a mass is not negative."""
     words, count = text.split(), _COUNTS.get(name, 1)
     try:
         valid = len(words) == count and all(abs(float(word)) <= MAX_NUMBER for word in words)
@@ -255,7 +253,6 @@ def _drop_floating_joint(urdf: ET.Element, main: str, work: Work) -> None:
 
 
 def _check_range(joint: ET.Element, work: Work) -> None:
-    """Checks the range of a revolute joint; a joint with a range of zero width is fixed."""
     limit = joint.find("limit")
     low, high = (1.0, 0.0) if limit is None else (_number(limit, e) for e in ("lower", "upper"))
     if low > high:
@@ -275,7 +272,6 @@ def _number(element: ET.Element, attribute: str, default: float = 0.0) -> float:
 
 
 def _free_base(work: Work) -> None:
-    """Adds a free joint to the root link, and a ground plane."""
     if not any(geom.get("contype") != "0" for geom in work.root.iter("geom")):
         raise InputError(
             "no link has a <collision>, so the robot would fall through the ground: give the "
@@ -295,7 +291,6 @@ def _free_base(work: Work) -> None:
 
 
 def _add_couplings(work: Work, hinges: list[ET.Element]) -> None:
-    """Adds an equality constraint for each joint that mimics another joint."""
     known = {joint.get("name") for joint in hinges}
     for joint in hinges:
         mimic, name = joint.find("mimic"), joint.get("name", "")

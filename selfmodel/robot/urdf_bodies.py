@@ -126,7 +126,6 @@ def _place(frame: Frame) -> dict[str, str]:
 
 
 def _inertial(body: mujoco.MjsBody) -> dict[str, str]:
-    """Returns the attributes of an ``<inertial>``."""
     place = np.array(body.ipos), np.array(body.iquat)
     mass = {"mass": repr(float(body.mass))}
     moments = _moments(body)

@@ -56,7 +56,6 @@ def read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
 
 
 def _is_empty(shape: ET.Element | None) -> bool:
-    """Returns whether a shape is missing, or has a size of 0."""
     if shape is None:
         return True
     sizes = (shape.get(name, "").split() for name in ("size", "radius", "length"))

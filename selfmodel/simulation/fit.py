@@ -285,7 +285,6 @@ class _Fitter:
 
     @cached_property
     def _widths(self) -> FloatArray:
-        """Steps of the finite differences, ``(coordinates,)``."""
         prior, method = self.basis.prior, self.method
         return np.asarray(method.step * (np.ones_like(prior) if method.is_central else prior))
 

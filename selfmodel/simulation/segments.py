@@ -236,7 +236,6 @@ def _known(states: Mapping[Signal, FloatArray]) -> BoolArray:
 
 
 def _complete(values: FloatArray) -> BoolArray:
-    """Returns a mask of the rows without an unknown number, ``(steps,)``."""
     return np.asarray(np.isfinite(values).all(axis=1))
 
 

@@ -150,7 +150,6 @@ def add_servos(work: Work) -> None:
 
 
 def _travel(model: mujoco.MjModel, joint: int, reach: float | None) -> np.ndarray:
-    """Returns the lowest and highest command of the servo of a hinge, rad."""
     if model.jnt_limited[joint]:
         return np.array(model.jnt_range[joint])
     if reach is None:
@@ -297,7 +296,6 @@ def _chosen(
     known: list[str],
     has: Collection[str | None],
 ) -> list[str]:
-    """Returns the wanted names, or the default names, except names of parts with a sensor."""
     names = default if wanted is None else wanted
     for name in names:
         if name not in known:

@@ -47,7 +47,6 @@ def drop_textures(work: Work) -> None:
 
 
 def _drop_image_textures(work: Work) -> None:
-    """Removes textures with files, and the references of materials to them."""
     removed = set()
     for asset in work.root.findall("asset"):
         for texture in asset.findall("texture"):
@@ -63,7 +62,6 @@ def _drop_image_textures(work: Work) -> None:
 
 
 def _asset_bytes(work: Work) -> int:
-    """Returns the size of the files that the elements name."""
     attributes = (item for element in work.root.iter() for item in element.attrib.items())
     named = {name for attribute, name in attributes if attribute.startswith("file")}
     return sum(len(work.assets[name]) for name in named if name)

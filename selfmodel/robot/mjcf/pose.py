@@ -105,7 +105,6 @@ def bake_keyframe(work: Work) -> None:
 
 
 def _keyframe(model: mujoco.MjModel, wanted: str) -> int | None:
-    """Returns the number of the keyframe, or None for the reference pose."""
     names = [model.key(k).name for k in range(model.nkey)]
     if wanted == NO_KEYFRAME or not (wanted or names):
         return None
@@ -140,7 +139,6 @@ def _place_at(work: Work, model: mujoco.MjModel, qpos: np.ndarray) -> None:
 
 
 def _check_equalities(model: mujoco.MjModel, qpos: np.ndarray) -> None:
-    """Checks that a new reference pose does not change the equality constraints."""
     with loading_a_model():
         data = mujoco.MjData(model)
         data.qpos = qpos

@@ -100,7 +100,6 @@ _POSES = ("body_pos", "body_quat", "geom_pos", "geom_quat", "site_pos", "jnt_pos
 
 
 def _dissolve_frames(work: Work) -> None:
-    """Replaces each frame by its children, in the place that they have in the model."""
     model = work.model
     moved: set[ET.Element] = set()
     for world in work.root.findall("worldbody"):
@@ -273,7 +272,6 @@ def _default_name(
 
 
 def _replace_special_characters(work: Work, kind: str, elements: list[ET.Element]) -> None:
-    """Renames parts of one kind, and the references to them."""
     given = [name for element in elements if (name := element.get("name"))]
     names = UniqueNames(given)
     new = {
