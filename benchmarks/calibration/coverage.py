@@ -22,9 +22,13 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.scaling import scale_contacts
 from selfmodel.simulation.calibration import calibrate, prediction_error
-from selfmodel.simulation.model_factors import factor_names, nominal, with_parameters
+from selfmodel.simulation.model_factors import (
+    factor_names,
+    nominal,
+    scale_contacts,
+    with_parameters,
+)
 from selfmodel.studies.recoveries import bank_gait
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import collect

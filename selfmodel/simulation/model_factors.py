@@ -5,6 +5,7 @@ Calibration fits nested sets of them (``bases``) with a Gaussian prior on their 
 robust repair draws them, and a calibrated MJCF contains them.
 """
 
+import copy
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,6 @@ from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.actuators import motor_joints
 from selfmodel.robot.anatomy import FITTED_CONTACTS, write_control_delay
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.scaling import scale_contacts, scale_model
 
 SHARED = ("root_mass", "limb_mass", "friction", "damping")
 """Quantities with one factor for the whole robot."""
@@ -95,6 +95,74 @@ def factor_names(robot: Robot) -> tuple[str, ...]:
 def nominal(robot: Robot) -> Parameters:
     """Returns the parameters of a robot's own model: factors of 1, and its control delay."""
     return Parameters(motor_gains=(1.0,) * robot.model.nu, delay=robot.control_delay)
+
+
+def scale_model(
+    model: mujoco.MjModel,
+    *,
+    mass: FloatArray,
+    inertia: FloatArray,
+    friction: float,
+    damping: float,
+    motor_gains: FloatArray,
+) -> mujoco.MjModel:
+    """Returns a copy of a model with scaled parameters; its layout is the same.
+
+    Args:
+        model: A compiled model; it is not changed.
+        mass: Factor of each body's mass, ``(bodies,)``.
+        inertia: Factor of each body's principal moments of inertia, ``(bodies,)``.
+        friction: Factor of the sliding friction of every geom and contact pair.
+        damping: Factor of the damping of every joint.
+        motor_gains: Factor of each actuator's force before its limits, ``(motors,)``.
+    """
+    model = copy.copy(model)
+    model.body_mass *= mass
+    model.body_inertia *= inertia[:, np.newaxis]
+    model.geom_friction[:, 0] *= friction
+    model.pair_friction[:, :2] *= friction
+    model.dof_damping *= damping
+    model.dof_dampingpoly *= damping
+    # Both contain the stiffness of a position servo: one factor scales the torque at each target.
+    model.actuator_gainprm *= motor_gains[:, np.newaxis]
+    model.actuator_biasprm *= motor_gains[:, np.newaxis]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def scale_contacts(model: mujoco.MjModel, stiffness: float, damping: float) -> None:
+    """Scales the stiffness and the damping of the contacts of a compiled model, in place.
+
+    Both are per unit of mass. Neither is raised above the largest that a physics step of length h
+    integrates: the stiffness above 1 / h^2, a stated damping above 1 / h, and that of a time
+    constant above 1 / h, as MuJoCo limits it. Contacts whose two parameters have different signs,
+    which MuJoCo replaces, and factors of 1 change nothing, to the bit.
+
+    Source: MuJoCo's documentation, Modeling, Solver parameters, ``solref``.
+
+    Args:
+        model: The model.
+        stiffness: Factor of the stiffness.
+        damping: Factor of the damping.
+    """
+    if (stiffness, damping) == (1.0, 1.0):
+        return
+    step = model.opt.timestep
+    limited = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE
+    least = 2 * step if limited else 0.0
+    for solref in (model.geom_solref, model.pair_solref):
+        constants, stated = (solref > 0).all(axis=1), (solref < 0).all(axis=1)
+        # With the time constant t that MuJoCo uses, and the ratio r, the stiffness is 1 / (t r)^2,
+        # and the damping 2 / t.
+        constant = np.maximum(solref[constants, 0], least)
+        product = constant * solref[constants, 1]
+        scaled = np.maximum(constant / damping, least)
+        products = np.maximum(product / np.sqrt(stiffness), np.minimum(product, step))
+        solref[constants] = np.column_stack([scaled, products / scaled])
+        # Stated numbers have the opposite sign.
+        own = -solref[stated]
+        limits = np.maximum(own, (1 / step**2, 1 / step))
+        solref[stated] = -np.minimum(own * (stiffness, damping), limits)
 
 
 def model_with_parameters(

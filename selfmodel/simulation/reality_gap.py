@@ -14,7 +14,7 @@ from selfmodel.faults.build import compile_model
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.robot.scaling import scale_model
+from selfmodel.simulation.model_factors import scale_model
 
 MAX_GAP_LEVEL = 0.5
 """Largest level: above it, a third of the factors would be at their minimum or implausible."""

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from selfmodel.robot.scaling import scale_contacts
+from selfmodel.simulation.model_factors import scale_contacts
 
 TIMESTEP = 0.005
 BALL = """<mujoco><option timestep="{timestep}"/><worldbody>
@@ -44,22 +44,22 @@ def test_a_time_constant_that_mujoco_limits_has_the_scaled_stiffness_and_damping
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_contacts_that_mujoco_replaces_remain_as_they_are():
-    for solref in ("0.02 -1", "-5000 300", "0 1"):
-        model = ball(solref)
+@pytest.mark.parametrize(
+    ("factors", "solrefs"),
+    [
+        ((2.0, 0.5), ("0.02 -1", "-5000 300", "0 1")),
+        ((1.0, 1.0), ("-90000 -500", "0.0123456789 0.7", "-5000 -300")),
+    ],
+    ids=["mujoco replaces them", "factors of 1"],
+)
+def test_contacts_that_remain_as_they_are_to_the_bit(
+    factors: tuple[float, float], solrefs: tuple[str, ...]
+):
+    for model in map(ball, solrefs):
         before = model.geom("ball").solref.copy()
-        scale_contacts(model, 2.0, 0.5)
+        scale_contacts(model, *factors)
 
         assert model.geom("ball").solref.tobytes() == before.tobytes()
-
-
-def test_factors_of_one_change_nothing_to_the_bit():
-    for solref in ("-90000 -500", "0.0123456789 0.7", "-5000 -300"):
-        model = ball(solref)
-        before = model.geom_solref.copy()
-        scale_contacts(model, 1.0, 1.0)
-
-        assert model.geom_solref.tobytes() == before.tobytes()
 
 
 def test_contact_pairs_are_scaled_too():
