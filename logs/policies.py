@@ -208,16 +208,13 @@ def policy_of(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy
     terms, scale, period = PRESETS.get(file.preset, ((), 1.0, 1.0))
     action = file.action
     motors, joints = action.motors or names.motors, file.joints or names.hinges
-    for what, chosen, known in (("motor", motors, names.motors), ("joint", joints, names.hinges)):
-        for name in chosen:
-            if name not in known:
-                raise unknown_name(what, name, known)
     if isinstance(graph, Function):
         graph = replace(graph, outputs=len(motors))
+    # A name that is unknown is refused by the policy.
     holding = dict(zip(names.motors, holding_commands(model).tolist(), strict=True))
-    initial = [float(model.qpos0[model.joint(name).qposadr[0]]) for name in joints]
+    initial = {name: float(model.qpos0[model.joint(name).qposadr[0]]) for name in names.hinges}
     given = scale if action.scale is None else action.scale
-    offset = [holding[name] for name in motors] if action.offset is None else action.offset
+    offset = [holding.get(name, 0.0) for name in motors] if action.offset is None else action.offset
     return Policy(
         *(names.sensors, names.motors),
         ranges=command_ranges(model),
@@ -235,7 +232,7 @@ def policy_of(file: PolicyFile, graph: Graph | Function, robot: Robot) -> Policy
             ),
             hinges=names.hinges,
             joints=joints,
-            pose=file.pose or tuple(initial),
+            pose=file.pose or tuple(initial.get(name, 0.0) for name in joints),
             holding=tuple(holding.values()),
             timestep=robot.control_timestep,
             velocity=file.velocity,

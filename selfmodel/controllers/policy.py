@@ -17,6 +17,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import TASK_PREFIX, Design
 from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
+from selfmodel.errors import unknown_name
 from selfmodel.rotation import directions, rotated
 
 Rows = Mapping[str, FloatArray]
@@ -172,7 +173,7 @@ class Policy(Design):
         names = (("joint", own.joints, own.hinges), ("motor", action.motors, self.motors))
         for what, chosen, known in names:
             if unknown := [name for name in chosen if name not in known]:
-                raise ValueError(f"the robot has no {what} {unknown[0]}: it has {', '.join(known)}")
+                raise unknown_name(what, unknown[0], known)
             if len(set(chosen)) < len(chosen):
                 raise ValueError(f"it names a {what} twice")
         if not (1 <= own.history <= MAX_HISTORY and own.decimation >= 1):
