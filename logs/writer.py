@@ -180,7 +180,10 @@ class TrialWriter:
                 isinstance(error, TrialError) or (error is not None and self._header.timed)
             ):
                 if self.steps:
-                    self._finish(records.STOPPED, _stop_reason(error))
+                    text = " ".join(f"{type(error).__name__}: {describe(error)}".split())
+                    # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
+                    reason = text.removesuffix(":").encode("utf-8", "backslashreplace").decode()
+                    self._finish(records.STOPPED, reason)
                 else:
                     self._log.abandon()
         except (OSError, InputError) as failure:
@@ -257,12 +260,6 @@ def _unknown(*values: FloatArray) -> FloatArray:
     """Returns -1 for each step with a number that is not known, and else 0, ``(steps, 1)``."""
     known = np.isfinite(np.concatenate(values, axis=1)).all(axis=1, keepdims=True)
     return np.where(known, 0.0, -1.0)
-
-
-def _stop_reason(error: BaseException) -> str:
-    text = " ".join(f"{type(error).__name__}: {describe(error)}".split()).removesuffix(":")
-    # A file name that is not UTF-8 contains surrogates, which a log cannot contain.
-    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _write_preamble(log: LogFile, robot: Robot, plan: TrialPlan, header: TrialHeader) -> None:

@@ -35,7 +35,11 @@ def chosen_run(
     Raises:
         InputError: There are several runs and none is chosen, or there is no run of that number.
     """
-    found = {topic: _restarts(recording.series[topic], clock) for topic, clock in clocks.items()}
+    found = {}  # places in the recording of the messages with which the clock of a topic restarts
+    for topic, clock in clocks.items():
+        usable = np.flatnonzero(clock.usable)
+        first_ones = usable[[*_restarts(clock.times[usable])]]
+        found[topic] = recording.series[topic].places[first_ones]
     most = max(map(len, found.values()))
     if not most and run in (None, 1):
         return recording
@@ -63,13 +67,7 @@ def chosen_run(
     )
 
 
-def _restarts(series: Series, clock: Clocked) -> IntArray:
-    """Places in the recording of the messages of a topic with which its clock begins again."""
-    usable = np.flatnonzero(clock.usable)
-    return series.places[usable[[*_restarts_of(clock.times[usable])]]]
-
-
-def _restarts_of(times: IntArray) -> Iterator[int]:
+def _restarts(times: IntArray) -> Iterator[int]:
     if len(times) <= _SUCCESSION:
         return
     forward = np.diff(times) >= 0

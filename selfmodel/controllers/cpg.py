@@ -144,20 +144,13 @@ class CpgBatch:
         outputs = np.cos(2 * np.pi * phases)
         outputs *= self._amplitudes
         outputs += self._offsets
-        outputs *= amplitude_rise(self._step * self._timestep)
+        # The fraction r of the final amplitude solves r'' = a (a (1 - r) / 4 - r') from rest, which
+        # is critically damped, so the first commands do not jump.
+        exponent = AMPLITUDE_RATE * (self._step * self._timestep) / 2
+        outputs *= 1 - (1 + exponent) * math.exp(-exponent)
         self._scaler.write(outputs, targets)
         # einsum sums each row by itself, in an order that the number of rows does not change.
         speed = 1 + np.einsum("ns,ns->n", self._feedback, self.readings)
         self._phase += self._stride * speed
         self._phase -= np.floor(self._phase)
         self._step += 1
-
-
-def amplitude_rise(time: float) -> float:
-    """Returns the fraction of the final amplitude that is reached after some time, s.
-
-    The fraction r solves r'' = a (a (1 - r) / 4 - r') from rest, with a = ``AMPLITUDE_RATE``. The
-    equation is critically damped, so the first commands do not jump.
-    """
-    exponent = AMPLITUDE_RATE * time / 2
-    return 1 - (1 + exponent) * math.exp(-exponent)

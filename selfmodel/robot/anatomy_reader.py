@@ -116,7 +116,8 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
     """
     own = {body: str(model.body(body).name) for body in groups}
     prefixes = {
-        body: _common_prefix([model.joint(j).name for j in group]) or own[body]
+        # RUF071: of names, not of paths
+        body: commonprefix([model.joint(j).name for j in group]).rstrip("_") or own[body]  # noqa: RUF071
         for body, group in groups.items()
     }
     shared = Counter(prefixes.values())
@@ -129,10 +130,6 @@ def _joint_names(model: mujoco.MjModel, groups: dict[int, list[int]]) -> dict[in
             f"their hinges"
         )
     return names
-
-
-def _common_prefix(names: list[str]) -> str:
-    return commonprefix(names).rstrip("_")  # noqa: RUF071  # of names, not of paths
 
 
 def _sensors(model: mujoco.MjModel, hinges: list[int]) -> tuple[Sensor, ...]:

@@ -4,7 +4,6 @@ A URI is a path relative to the URDF, or to the package that contains it (``pack
 """
 
 from collections import Counter
-from collections.abc import Iterator
 from posixpath import join, normpath, splitext
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
@@ -38,7 +37,7 @@ def read_meshes(urdf: ET.Element, work: Work, files: Files) -> None:
         if mesh is None:
             continue
         uri = mesh.get("filename", "")
-        path = next(filter(files.has, _mesh_paths(uri)), None)
+        path = next((path for path in _paths(uri) if files.has(path)), None)
         if path is not None:
             mesh.set("filename", work.add_asset(files, path, f"<mesh> ({quoted(uri)})"))
         elif part.tag == "visual":
@@ -69,31 +68,28 @@ def _why_unread(uri: str) -> str:
     return f"MuJoCo reads no {ending[:10]}, expected {' or '.join(READABLE)}"
 
 
-def _mesh_paths(uri: str) -> Iterator[str]:
-    """Yields the possible paths of a mesh, relative to the URDF, the most specific first.
+def _paths(uri: str) -> list[str]:
+    """Returns the possible paths of a mesh, relative to the URDF, the most specific first.
 
     In place of a mesh in another format, it is the file of the same name that ends in ``.stl`` or
     ``.obj``.
     """
-    for path in _paths(uri):
-        stem, ending = splitext(path)
-        yield from [path] if ending.lower() in READABLE else [stem + other for other in READABLE]
-
-
-def _paths(uri: str) -> Iterator[str]:
     text = uri.replace("\\", "/")
-    if text.startswith("file://"):
-        yield unquote(text.removeprefix("file://"))
-        return
     scheme = next((scheme for scheme in _PACKAGE_SCHEMES if text.startswith(scheme)), None)
-    if scheme is None:
-        yield normpath(text)
-        return
-    whole = unquote(text.removeprefix(scheme))
-    inside = whole.partition("/")[2]  # of the package
-    for above in _ABOVE:
-        yield normpath(join(above, inside))
-        yield normpath(join(above, whole))
+    if text.startswith("file://"):
+        paths = [unquote(text.removeprefix("file://"))]
+    elif scheme is None:
+        paths = [normpath(text)]
+    else:
+        whole = unquote(text.removeprefix(scheme))
+        inside = whole.partition("/")[2]  # of the package
+        paths = [normpath(join(above, below)) for above in _ABOVE for below in (inside, whole)]
+    stems = [splitext(path) for path in paths]
+    return [
+        stem + each
+        for stem, ending in stems
+        for each in ((ending,) if ending.lower() in READABLE else READABLE)
+    ]
 
 
 def quoted(text: str | None) -> str:
