@@ -366,46 +366,35 @@ def text(content: bytes) -> np.ndarray:
 
 
 NAN = {"tensor/bias0": np.full(16, np.nan)}
+OTHER_MOTORS = {"motors": np.array(["a"] * 8)}
 
 
 @pytest.mark.parametrize(
-    ("change", "match"),
+    ("layer", "change", "match"),
     [
-        ({"content": text(b'{"input": "x"')}, "truncated"),
-        ({"content": text(b'{"input": "x"}')}, "missing required field"),
-        ({"content": text(b"[]")}, "Expected `object`"),
-        ({"content": None}, "it holds genome"),
-        ({"content": np.zeros((2, 2), np.uint8)}, "its arrays have the types and ranks"),
-        ({"kind": np.array("network")}, "it holds content"),
-        ({"kind": np.array("tree")}, "the kind 'network' or 'cpg' or 'policy' or 'compensation'"),
-        ({"genome": np.zeros(1)}, "has 0 weights, got a genome of shape"),
-        ({"tensor/bias0": None}, "bias0 is used by Gemm before it is computed"),
-        ({"xtensor/bias0": np.zeros(1)}, "it holds content"),
-        ({"tensor/weight0": np.zeros((16, 2))}, "Gemm of the shapes"),
-        (NAN, "the tensor bias0 has numbers that are not finite"),
+        (False, {"content": text(b'{"input": "x"')}, "truncated"),
+        (False, {"content": text(b'{"input": "x"}')}, "missing required field"),
+        (False, {"content": text(b"[]")}, "Expected `object`"),
+        (False, {"content": None}, "it holds genome"),
+        (False, {"content": np.zeros((2, 2), np.uint8)}, "its arrays have the types and ranks"),
+        (False, {"kind": np.array("network")}, "it holds content"),
+        (False, {"kind": np.array("tree")}, "'network' or 'cpg' or 'policy' or 'compensation'"),
+        (False, {"genome": np.zeros(1)}, "has 0 weights, got a genome of shape"),
+        (False, {"tensor/bias0": None}, "bias0 is used by Gemm before it is computed"),
+        (False, {"xtensor/bias0": np.zeros(1)}, "it holds content"),
+        (False, {"tensor/weight0": np.zeros((16, 2))}, "Gemm of the shapes"),
+        (False, NAN, "the tensor bias0 has numbers that are not finite"),
+        (True, {"base": text(b"PK no controller")}, "expected a controller"),
+        (True, {"feedback": np.array(1)}, "its arrays have the types and ranks"),
+        (True, {"base": None}, "it holds feedback"),
+        (True, {"genome": np.zeros(3)}, "has 59 weights, got a genome of shape"),
+        (True, OTHER_MOTORS, "the sensors, motors and ranges of the controller within"),
     ],
 )
-def test_an_altered_policy_is_refused(policy: Controller, change: dict, match: str):
-    data = altered(controller_bytes(policy), **change)
-    with pytest.raises(InputError, match=rf"here: expected a controller .*{match}"):
-        parse_controller(data, "here")
-
-
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        ({"base": text(b"PK no controller")}, "expected a controller"),
-        ({"feedback": np.array(1)}, "its arrays have the types and ranks"),
-        ({"base": None}, "it holds feedback"),
-        ({"genome": np.zeros(3)}, "has 59 weights, got a genome of shape"),
-        (
-            {"motors": np.array(["a"] * 8)},
-            "the sensors, motors and ranges of the controller within",
-        ),
-    ],
-)
-def test_an_altered_layer_is_refused(policy: Controller, change: dict, match: str):
-    data = altered(controller_bytes(around(policy)), **change)
+def test_an_altered_policy_or_layer_is_refused(
+    policy: Controller, *, layer: bool, change: dict, match: str
+):
+    data = altered(controller_bytes(around(policy) if layer else policy), **change)
     with pytest.raises(InputError, match=rf"here: expected a controller .*{match}"):
         parse_controller(data, "here")
 

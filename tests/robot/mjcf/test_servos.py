@@ -12,20 +12,22 @@ from hypothesis import given, strategies as st
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings, parse_setting, read_settings, value_of
+from selfmodel.robot.robot import Robot
 from tests.robot.mjcf.awkward import KEY, LEGS, mjcf
 from tests.robot.mjcf.test_adaptation import written
 
 TORQUE_MOTORS = """<motor name="left" joint="left_hip" gear="-4" ctrlrange="-2 1"/>
 <motor name="right" joint="right_hip" ctrlrange="-9 9" forcerange="-7 7"/>"""
 GAINS = ("kp=30", "kd=2")
+STANDING = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
 CLASS = '<default><position kp="7" inheritrange="1"/></default>'
 
 
-def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:
-    """Returns the model of the robot of a text with settings."""
+def loaded(folder: Path, text: str, *given: str) -> Robot:
+    """Returns the robot of a text with settings."""
     path = written(folder, text)
     extra = {key: value for one in given for key, value in parse_setting(one).items()}
-    return load_mjcf(path, read_settings(path, extra)).model
+    return load_mjcf(path, read_settings(path, extra))
 
 
 @pytest.mark.parametrize(
@@ -38,7 +40,7 @@ def loaded(folder: Path, text: str, *given: str) -> mujoco.MjModel:
 def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(
     left: str, limits: list[float], tmp_path: Path
 ):
-    model = loaded(tmp_path, mjcf(motors=left + TORQUE_MOTORS.splitlines()[1]), *GAINS)
+    model = loaded(tmp_path, mjcf(motors=left + TORQUE_MOTORS.splitlines()[1]), *GAINS).model
 
     assert [model.actuator(motor).name for motor in range(model.nu)] == ["left", "right"]
     assert model.actuator_gear[:, 0].tolist() == [1, 1]
@@ -48,7 +50,7 @@ def test_a_torque_motor_becomes_a_servo_with_its_torque_limits(
 
 def test_the_physics_of_joints_and_contacts_is_that_of_the_settings(tmp_path: Path):
     settings = ("armature=0.01", 'damping={left_hip=0.2, "right*"=0.3}', "friction=0.04")
-    model = loaded(tmp_path, mjcf(), *settings, "timestep=0.001", "solref=[0.03, 0.9]")
+    model = loaded(tmp_path, mjcf(), *settings, "timestep=0.001", "solref=[0.03, 0.9]").model
     left, right = (model.joint(f"{side}_hip").dofadr[0] for side in ("left", "right"))
 
     assert model.opt.timestep == 0.001
@@ -62,9 +64,8 @@ def test_the_physics_of_joints_and_contacts_is_that_of_the_settings(tmp_path: Pa
 @pytest.mark.parametrize("remedy", ["timestep", "armature"])
 def test_stiff_servos_have_a_note_whose_remedies_end_it(remedy: str, tmp_path: Path):
     def notes(*given: str) -> list[str]:
-        path = written(tmp_path, mjcf(motors=TORQUE_MOTORS))
-        extra = {key: value for one in given for key, value in parse_setting(one).items()}
-        return [one for one in load_mjcf(path, read_settings(path, extra)).notes if "stiff" in one]
+        found = loaded(tmp_path, mjcf(motors=TORQUE_MOTORS), *given).notes
+        return [one for one in found if "stiff" in one]
 
     stiff = ("kp=9e4", "kd=2")
     (note,) = notes(*stiff)
@@ -79,7 +80,7 @@ def test_stiff_servos_have_a_note_whose_remedies_end_it(remedy: str, tmp_path: P
 def test_a_motor_with_dynamics_stays(tmp_path: Path):
     left = '<general name="left" joint="left_hip" dyntype="filter" dynprm="1" ctrlrange="-1 2"/>'
     motors = left + TORQUE_MOTORS.splitlines()[1]
-    model = loaded(tmp_path, mjcf(motors=motors), *GAINS)
+    model = loaded(tmp_path, mjcf(motors=motors), *GAINS).model
 
     assert model.actuator_gainprm[:, 0].tolist() == [1, 30]
 
@@ -87,7 +88,7 @@ def test_a_motor_with_dynamics_stays(tmp_path: Path):
 @pytest.fixture(scope="module")
 def servos(tmp_path_factory: pytest.TempPathFactory) -> mujoco.MjModel:
     folder = tmp_path_factory.mktemp("servos")
-    return loaded(folder, mjcf(motors=TORQUE_MOTORS), *GAINS)
+    return loaded(folder, mjcf(motors=TORQUE_MOTORS), *GAINS).model
 
 
 @given(angle=st.floats(-0.5, 0.5), speed=st.floats(-3, 3), command=st.floats(-0.5, 0.5))
@@ -106,8 +107,8 @@ def test_the_torque_of_a_servo_is_that_of_its_gains(
 
 def test_attributes_of_a_class_do_not_change_a_servo(tmp_path: Path):
     text = mjcf(motors=TORQUE_MOTORS)
-    plain = loaded(tmp_path, text, *GAINS)
-    of_class = loaded(tmp_path, text.replace("<mujoco>", f"<mujoco>{CLASS}"), *GAINS)
+    plain = loaded(tmp_path, text, *GAINS).model
+    of_class = loaded(tmp_path, text.replace("<mujoco>", f"<mujoco>{CLASS}"), *GAINS).model
 
     for field in ("gainprm", "biasprm", "gear", "ctrlrange", "forcerange", "dyntype"):
         name = f"actuator_{field}"
@@ -119,11 +120,10 @@ def test_a_joint_without_a_range_needs_the_reach(tmp_path: Path):
 
     with pytest.raises(InputError, match=r"range of the joint left_hip.*reach=0\.5"):
         loaded(tmp_path, text, *GAINS)
-    model = loaded(tmp_path, text, *GAINS, "reach=0.5")
+    model = loaded(tmp_path, text, *GAINS, "reach=0.5").model
     assert model.actuator_ctrlrange.tolist() == [[-0.5, 0.5], [-0.5, 0.5]]
-    key = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
-    posed = text.replace("<mujoco>", f"<mujoco>{key}")
-    model = loaded(tmp_path, posed, *GAINS, "reach=0.5")
+    posed = text.replace("<mujoco>", f"<mujoco>{STANDING}")
+    model = loaded(tmp_path, posed, *GAINS, "reach=0.5").model
     assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.9, -0.6, 0.4])
 
 
@@ -137,32 +137,28 @@ SERVOS = """<position name="left" joint="left_hip" kp="5" inheritrange="1"/>
 END = math.radians(40)
 
 
-def test_commands_are_within_reach_of_the_initial_pose_and_in_their_range(tmp_path: Path):
-    key = KEY.format("0 0 .35 1 0 0 0 .4 -.1")
-    model = loaded(tmp_path, mjcf(motors=SERVOS, more=key), "reach=0.5")
+@pytest.mark.parametrize(
+    ("motors", "more", "reach", "ranges"),
+    [
+        (SERVOS, STANDING, "0.5", [-0.1, END, -0.2, 0.4]),
+        (re.sub("inheritrange.*/|ctrlrange.*/", "/", SERVOS), CLASS, "0.5", [-0.5, 0.5] * 2),
+        (SERVOS, "", "{left_hip=0.1}", [-0.1, 0.1, -0.2, 0.6]),
+        (SERVOS.replace("right_hip", 'right_hip" gear="2'), "", "0.1", [-0.1, 0.1, -0.2, 0.6]),
+    ],
+    ids=[
+        "of a pose",
+        "inherited by a class",
+        "of one joint",
+        "of no angle by a gear",
+    ],
+)
+def test_commands_are_within_reach_of_the_initial_pose_and_in_their_range(
+    motors: str, more: str, reach: str, ranges: list[float], tmp_path: Path
+):
+    text = mjcf(motors=motors).replace("<mujoco>", f"<mujoco>{more}")
+    found = loaded(tmp_path, text, f"reach={reach}").model.actuator_ctrlrange
 
-    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, END, -0.2, 0.4])
-
-
-def test_a_range_that_a_class_inherits_from_the_joint_is_limited(tmp_path: Path):
-    text = mjcf(motors=SERVOS.replace('inheritrange="1"', "").replace('ctrlrange="-.2 .6"', ""))
-    text = text.replace("<mujoco>", f"<mujoco>{CLASS}")
-    model = loaded(tmp_path, text, "reach=0.5")
-
-    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.5, 0.5, -0.5, 0.5])
-
-
-def test_only_joints_that_the_patterns_fit_are_limited(tmp_path: Path):
-    model = loaded(tmp_path, mjcf(motors=SERVOS), "reach={left_hip=0.1}")
-
-    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
-
-
-def test_a_servo_with_a_gear_has_no_reach_because_its_command_is_no_angle(tmp_path: Path):
-    motors = SERVOS.replace('name="right"', 'name="right" gear="2"')
-    model = loaded(tmp_path, mjcf(motors=motors), "reach=0.1")
-
-    assert model.actuator_ctrlrange.ravel() == pytest.approx([-0.1, 0.1, -0.2, 0.6])
+    assert found.ravel() == pytest.approx(ranges)
 
 
 def test_one_number_is_for_all_joints_and_a_table_for_those_that_its_patterns_fit():
