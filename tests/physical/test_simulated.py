@@ -33,6 +33,7 @@ from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.command import SMALL, printed
 from tests.helpers.drivers import random_controllers, random_motion
+from tests.helpers.robots.arms import arm, quadruped_on_a_stand
 
 STEPS = 60
 
@@ -54,8 +55,12 @@ def same(one: Trajectory, other: Trajectory) -> bool:
     return all(one[signal].tobytes() == other[signal].tobytes() for signal in SIGNALS)
 
 
-def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot):
-    truth = parse(f"break:{robot.anatomy.joints[0].name}", robot.anatomy)
+@pytest.mark.parametrize("fault", ["break:{}", "motor:{}=0.4"])
+@pytest.mark.parametrize(
+    "robot", [*(entry.robot() for entry in ROBOTS.values()), arm(), quadruped_on_a_stand()]
+)
+def test_a_trial_at_gap_0_is_the_simulators_to_the_bit(robot: Robot, fault: str):
+    truth = parse(fault.format(robot.anatomy.joints[1].name), robot.anatomy)
     (controller,) = random_controllers(robot, 1)
     simulated = Simulator(robot, 1).run([(truth, controller)], STEPS, SIGNALS).trajectory
     for gap in (None, drawn(robot, 0.0)):

@@ -8,9 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.faults.notation import parse
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import (
@@ -26,12 +24,11 @@ from selfmodel.robot.state import (
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import lacking
-from tests.helpers.robots.arms import arm, arm_mjcf, quadruped_on_a_stand, robot_of
+from tests.helpers.robots.arms import arm, arm_mjcf, robot_of
 
 SLIDING = """
 <mujoco>
@@ -51,7 +48,6 @@ SLIDING = """
   <sensor><jointpos name="angle" joint="hip"/></sensor>
 </mujoco>
 """
-BASE = ("base_position", "base_orientation", "base_linear_velocity", "base_angular_velocity")
 
 
 def text(values: np.ndarray) -> str:
@@ -92,7 +88,7 @@ SLIDERS = {"seed": st.integers(0, 2**32), "slides": st.integers(1, 3), "turns": 
 def test_a_sliding_base_has_the_signals_of_its_body(seed: int, slides: int, turns: bool):  # noqa: FBT001 - drawn by hypothesis
     robot = made(seed, slides, turns=turns)
     data = anywhere(robot, seed)
-    told = {signal: current_value(signal_fields(robot)[signal], data) for signal in BASE}
+    told = {signal: current_value(signal_fields(robot)[signal], data) for signal in BASE_SIGNALS}
     body = data.body("torso")
     velocity = np.empty(6)
     of_body = mujoco.mjtObj.mjOBJ_XBODY
@@ -111,7 +107,8 @@ def test_the_signals_of_a_sliding_base_restore_its_state(seed: int, slides: int,
     robot = made(seed, slides, turns=turns)
     data, again = anywhere(robot, seed), mujoco.MjData(robot.model)
     told = {
-        signal: current_value(signal_fields(robot)[signal], data)[np.newaxis] for signal in BASE
+        signal: current_value(signal_fields(robot)[signal], data)[np.newaxis]
+        for signal in BASE_SIGNALS
     }
     state_writer(robot, bind_data(again))(told)
 
@@ -152,20 +149,11 @@ def test_a_row_has_the_same_bits_in_any_batch(rows: int):
     rng = np.random.default_rng(3)
     state = {"qpos": rng.normal(size=(17, robot.model.nq))}
     state["qvel"] = rng.normal(size=(17, robot.model.nv))
-    for signal in BASE:
+    for signal in BASE_SIGNALS:
         place = signal_fields(robot)[signal]
         whole = place(state.__getitem__)()
         part = place({name: rows_[17 - rows :] for name, rows_ in state.items()}.__getitem__)
         np.testing.assert_array_equal(part(), whole[17 - rows :])
-
-
-VELOCITY = ("base_linear_velocity", "base_angular_velocity")
-"""Names of the signals of a base."""
-
-
-def driver_of(robot: Robot) -> Controller:
-    (driver,) = random_cpgs(robot, 1)
-    return driver
 
 
 def nested() -> Robot:
@@ -188,18 +176,8 @@ def test_the_pose_of_the_base_is_that_of_its_body_and_its_velocities_are_zero():
     found = {name: current_value(field, data) for name, field in signal_fields(robot).items()}
     np.testing.assert_allclose(found["base_position"], data.body("foot").xpos, atol=1e-12)
     np.testing.assert_allclose(found["base_orientation"], data.body("foot").xquat, atol=1e-12)
-    assert not any(found[signal].any() for signal in VELOCITY)
+    assert not any(found[signal].any() for signal in BASE_SIGNALS[2:])
     assert robot.standing_height == pytest.approx(0.7)
-
-
-def test_a_physical_robot_without_a_gap_is_simulated_to_the_bit():
-    for robot in (arm(), quadruped_on_a_stand()):
-        driver = driver_of(robot)
-        hidden = parse(f"motor:{robot.anatomy.joints[1].name}=0.4", robot.anatomy)
-        logged = collect(robot.anatomy.names, SimulatedRobot(robot, hidden).run(driver, 60))
-        simulated = Simulator(robot, 1).run([(hidden, driver)], 60, SIGNALS).trajectory
-        for signal in SIGNALS:
-            assert np.array_equal(logged[signal], simulated[signal][0]), signal
 
 
 def trial_of(robot: Robot, steps: int = 200) -> Trial:
