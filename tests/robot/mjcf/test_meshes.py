@@ -1,6 +1,7 @@
 """Tests of meshes that are too large for a log or have no file: stand-ins in the same place."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -22,17 +23,23 @@ RINGS = 24
 """Meshes of 58 kB each."""
 
 
-def adapted(
-    folder: Path, limit: int, monkeypatch: pytest.MonkeyPatch, *, meshes_collide: bool = False
-) -> tuple[Robot, tuple[str, ...]]:
-    """Returns the robot of a package under a limit of its files, and the notes."""
-    if not (folder / "go").exists():
-        menagerie(folder, RINGS, meshes_collide=meshes_collide)
-    monkeypatch.setattr(meshes, "MAX_ASSET_BYTES", limit)
-    files = {f"../meshes/{f.name}": f.read_bytes() for f in (folder / "go" / "meshes").iterdir()}
-    text = (folder / "go" / "xml" / "go.xml").read_text(encoding="utf-8")
-    robot = adapt_text("go", text, files, MjcfSettings())
-    return robot, robot.notes
+Adapt = Callable[..., Robot]
+
+
+@pytest.fixture
+def adapted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Adapt:
+    """Returns a function that makes the robot of a package under a limit of its files."""
+
+    def made(limit: int, *, meshes_collide: bool = False) -> Robot:
+        folder = tmp_path / "go"
+        if not folder.exists():
+            menagerie(tmp_path, RINGS, meshes_collide=meshes_collide)
+        monkeypatch.setattr(meshes, "MAX_ASSET_BYTES", limit)
+        files = {f"../meshes/{f.name}": f.read_bytes() for f in (folder / "meshes").iterdir()}
+        text = (folder / "xml" / "go.xml").read_text(encoding="utf-8")
+        return adapt_text("go", text, files, MjcfSettings())
+
+    return made
 
 
 def points(model: mujoco.MjModel, geom: int) -> np.ndarray:
@@ -54,15 +61,16 @@ def reach(cloud: np.ndarray) -> np.ndarray:
     return (cloud @ directions(500).T).max(axis=0)
 
 
-def test_a_large_visual_mesh_is_drawn_as_its_hull_in_the_same_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_large_visual_mesh_is_drawn_as_its_hull_in_the_same_place_and_moves_the_same(
+    adapted: Adapt,
 ):
-    whole, _ = adapted(tmp_path, 10**6, monkeypatch)
-    reduced, notes = adapted(tmp_path, 10**5, monkeypatch)
+    whole, reduced = adapted(10**6), adapted(10**5)
 
     assert whole.assets
     assert not reduced.assets
-    assert any("3 visual meshes are drawn as convex hulls" in note for note in notes)
+    assert any("3 visual meshes are drawn as convex hulls" in note for note in reduced.notes)
+    assert np.array_equal(whole.model.body_mass, reduced.model.body_mass)
+    assert np.array_equal(motion(whole), motion(reduced))
     assert np.array_equal(meshed(whole.model), meshed(reduced.model))
     for geom in meshed(whole.model):
         before, after = points(whole.model, geom), points(reduced.model, geom)
@@ -72,24 +80,11 @@ def test_a_large_visual_mesh_is_drawn_as_its_hull_in_the_same_place(
         assert np.all(reach(after) <= reach(before) + 1e-4 * size)
 
 
-def test_a_robot_with_reduced_visual_meshes_moves_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    whole, _ = adapted(tmp_path, 10**6, monkeypatch)
-    reduced, _ = adapted(tmp_path, 10**5, monkeypatch)
-
-    assert np.array_equal(whole.model.body_mass, reduced.model.body_mass)
-    assert np.array_equal(motion(whole), motion(reduced))
-
-
-def test_colliding_meshes_become_the_hulls_with_which_they_collide(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    whole, _ = adapted(tmp_path, 10**6, monkeypatch, meshes_collide=True)
-    reduced, notes = adapted(tmp_path, 10**4, monkeypatch, meshes_collide=True)
+def test_colliding_meshes_become_the_hulls_with_which_they_collide(adapted: Adapt):
+    whole, reduced = (adapted(limit, meshes_collide=True) for limit in (10**6, 10**4))
 
     assert not reduced.assets
-    assert any("2 meshes with contacts are replaced" in note for note in notes)
+    assert any("2 meshes with contacts are replaced" in note for note in reduced.notes)
     for geom in meshed(whole.model):
         if whole.model.geom_contype[geom]:
             before, after = points(whole.model, geom), points(reduced.model, geom)
@@ -97,17 +92,14 @@ def test_colliding_meshes_become_the_hulls_with_which_they_collide(
     assert np.allclose(motion(whole)[:200], motion(reduced)[:200], atol=1e-5)
 
 
-def test_hulls_leave_the_masses_that_the_meshes_gave_to_the_bodies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_hulls_leave_the_masses_that_the_meshes_gave_to_the_bodies(tmp_path: Path, adapted: Adapt):
     package = menagerie(tmp_path, RINGS, meshes_collide=True)
     file = package / "xml" / "go.xml"
     shaped = '<inertial (?!pos="0 0 0" mass="0.68")[^>]*/>'  # the hips have no geoms
     text = re.sub(shaped, "", file.read_text(encoding="utf-8"))
     file.write_text(text, encoding="utf-8")
 
-    whole, _ = adapted(tmp_path, 10**6, monkeypatch)
-    reduced, _ = adapted(tmp_path, 10**4, monkeypatch)
+    whole, reduced = adapted(10**6), adapted(10**4)
 
     assert not reduced.assets
     for name in ("body_mass", "body_inertia", "body_ipos"):
@@ -124,7 +116,7 @@ def motion(robot: Robot, steps: int = 100) -> np.ndarray:
 
 @pytest.mark.parametrize("flat", [(1, 1, 0), (1, 0, 0)])
 def test_a_flat_visual_mesh_is_drawn_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flat: tuple[int, int, int]
+    tmp_path: Path, adapted: Adapt, flat: tuple[int, int, int]
 ):
     package = menagerie(tmp_path, RINGS)
     rng = np.random.default_rng(0)
@@ -134,23 +126,20 @@ def test_a_flat_visual_mesh_is_drawn_too(
     text = file.read_text(encoding="utf-8")
     file.write_text(text.replace('file="trunk.stl"', 'file="trunk.stl" inertia="shell"'))
 
-    reduced, _ = adapted(tmp_path, 10**4, monkeypatch)
+    reduced = adapted(10**4)
 
     trunk = int(meshed(reduced.model)[0])
     assert np.ptp(points(reduced.model, trunk), axis=0).max() == pytest.approx(0.2, rel=0.1)
 
 
-def test_a_geom_that_is_fitted_to_a_mesh_stays_as_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_geom_that_is_fitted_to_a_mesh_stays_as_it_is(tmp_path: Path, adapted: Adapt):
     package = menagerie(tmp_path, RINGS)
     file = package / "xml" / "go.xml"
     text = file.read_text(encoding="utf-8")
     box = 'type="box" size="0.125 0.04 0.057"'
     file.write_text(text.replace(box, 'type="box" mesh="trunk" euler="0 0 0.1"'), encoding="utf-8")
 
-    whole, _ = adapted(tmp_path, 10**6, monkeypatch)
-    reduced, _ = adapted(tmp_path, 10**5, monkeypatch)
+    whole, reduced = adapted(10**6), adapted(10**5)
 
     (geom,) = np.flatnonzero(whole.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
     for name in ("geom_size", "geom_pos", "geom_quat"):
