@@ -18,7 +18,7 @@ from selfmodel.logs.messages import WORLD, Part, transforms
 from selfmodel.robot.motion import POSE, Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer
-from selfmodel.rotation import product, rotated
+from selfmodel.rotation import in_body_frame, product, rotated
 
 _JOINTS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",
@@ -194,7 +194,7 @@ class Kinematics:
         poses = body_poses(self._data, qpos)
         parents, children = poses[:, self._model.body_parentid[1:]], poses[:, 1:]
         with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
-            moved = to_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
+            moved = in_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
             turned = product(parents[..., 3:] * _INVERSE, children[..., 3:])
         relative = to_micrometres(np.concatenate([moved, turned[..., _XYZW]], axis=-1))
         steps = np.flatnonzero(known), np.flatnonzero(~known)
@@ -217,10 +217,3 @@ def to_micrometres(values: FloatArray) -> FloatArray:
     with np.errstate(over="ignore"):  # unobserved or extreme values
         rounded: FloatArray = np.rint(values * 2.0**20) / 2.0**20
     return rounded + 0.0  # 0 is 0, never -0
-
-
-def to_body_frame(velocity: FloatArray, orientation: FloatArray) -> FloatArray:
-    """Returns velocities in the frame of a body, as nav_msgs/Odometry requires."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        inverse = np.concatenate([orientation[..., :1], -orientation[..., 1:]], axis=-1)
-        return rotated(velocity, inverse)

@@ -28,6 +28,7 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.physical import safety
 from selfmodel.robot.actuators import driven_names
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import in_body_frame
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
@@ -217,7 +218,8 @@ class TrialWriter:
         steps = np.arange(self._written, self.steps)
         period = self._robot.control_timestep
         stamps = np.rint(steps * period * 1e9).astype(np.int64) + self._first_stamp
-        child = viewers.to_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
+        with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
+            child = in_body_frame(rows["base_linear_velocity"], rows["base_orientation"])
         parts: dict[Part, FloatArray] = {
             **rows,
             "child_linear_velocity": viewers.to_micrometres(child),

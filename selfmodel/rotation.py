@@ -48,6 +48,12 @@ def rotated(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
     return np.asarray(vectors + orientation[..., :1] * twice + cross(orientation[..., 1:], twice))
 
 
+def in_body_frame(vectors: FloatArray, orientation: FloatArray) -> FloatArray:
+    """Returns vectors, ``(..., 3)``, rotated from the world frame to the body frame."""
+    inverse = np.concatenate([orientation[..., :1], -orientation[..., 1:]], axis=-1)
+    return rotated(vectors, inverse)
+
+
 def cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """Returns cross products, bit-identical to ``numpy.cross`` in half of its time.
 

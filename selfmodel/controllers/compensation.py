@@ -15,7 +15,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, ControllerBatch, Design
-from selfmodel.controllers.policy import PolicyBatch, gravity
+from selfmodel.controllers.policy import PolicyBatch
+from selfmodel.rotation import directions
 
 OFFSET = 0.5
 """Largest offset of a motor, as a fraction of the half width of its command range."""
@@ -235,7 +236,8 @@ class CompensatedBatch:
         change = (targets - self._neutral) * (layer.gain - 1) + layer.offset
         if layer.response.size:
             turning = self.observed["base_angular_velocity"]
-            felt = np.concatenate([gravity(self.observed)[:, :2], turning], axis=1)
+            gravity = -directions(self.observed["base_orientation"])[:, 2:4]
+            felt = np.concatenate([gravity, turning], axis=1)
             # einsum sums each row by itself, in an order that the number of rows does not change.
             change += np.einsum("nmk,nk->nm", layer.response, felt)
         targets += np.where(change == 0, -0.0, change)

@@ -18,38 +18,21 @@ from selfmodel.controllers.controller import TASK_PREFIX, Design
 from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
 from selfmodel.errors import unknown_name
-from selfmodel.rotation import directions, rotated
-
-Rows = Mapping[str, FloatArray]
-"""Observed signals by name, ``(n, width)`` each."""
+from selfmodel.rotation import directions, in_body_frame
 
 VELOCITY = 3
 """Numbers of a commanded velocity: forward and to the left, m/s, and the turn to the left, rad/s.
 """
 
-
-def gravity(observed: Rows) -> FloatArray:
-    """Returns the direction of gravity in the body's frame, ``(n, 3)``."""
-    return -directions(observed["base_orientation"])[:, 2:]
-
-
-def body_velocity(observed: Rows) -> FloatArray:
-    """Returns the velocity of the base in its own frame, ``(n, 3)``, m/s."""
-    inverse = observed["base_orientation"] * (1.0, -1.0, -1.0, -1.0)
-    return rotated(observed["base_linear_velocity"], inverse)
-
-
-MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[[Rows], FloatArray]]] = {
-    "linear_velocity": (("base_linear_velocity", "base_orientation"), body_velocity),
-    "angular_velocity": (
-        ("base_angular_velocity",),
-        lambda observed: observed["base_angular_velocity"],
-    ),
-    "gravity": (("base_orientation",), gravity),
-    "joint_positions": (("joint_positions",), lambda observed: observed["joint_positions"]),
-    "joint_velocities": (("joint_velocities",), lambda observed: observed["joint_velocities"]),
+MEASURED: Mapping[str, tuple[tuple[str, ...], Callable[..., FloatArray]]] = {
+    "linear_velocity": (("base_linear_velocity", "base_orientation"), in_body_frame),
+    "angular_velocity": (("base_angular_velocity",), np.asarray),
+    "gravity": (("base_orientation",), lambda turn: -directions(turn)[:, 2:]),
+    "joint_positions": (("joint_positions",), np.asarray),
+    "joint_velocities": (("joint_velocities",), np.asarray),
 }
-"""Terms that a robot measures: the signals they need, and their values from these."""
+"""Terms that a robot measures: the signals they need, and their values from these; vectors are in
+the frame of the base."""
 
 MAX_HISTORY, MIN_PERIOD = 1000, 1e-3
 """Longest history, observations, and shortest period of a clock, s."""
@@ -348,7 +331,8 @@ class PolicyBatch:
 
     def _value(self, term: str) -> FloatArray:
         if term in MEASURED:
-            value = MEASURED[term][1](self.observed)
+            signals, of = MEASURED[term]
+            value = of(*(self.observed[signal] for signal in signals))
             chosen = value[:, self._joints] if term in JOINT_TERMS else value
             return chosen - self._pose if term == "joint_positions" else chosen
         if term == "phase":

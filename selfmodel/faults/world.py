@@ -10,7 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults.kind import ENVIRONMENT, Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
-from selfmodel.rotation import rotated
+from selfmodel.rotation import in_body_frame
 
 if TYPE_CHECKING:
     from mujoco import MjSpec
@@ -162,8 +162,7 @@ class Roughness(FaultKind):
         field = model.hfield(TERRAIN_NAME)
         fields = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
         (geom, *_) = np.flatnonzero(fields & (model.geom_dataid == field.id))
-        inverse = model.geom_quat[geom] * (1.0, -1.0, -1.0, -1.0)
-        in_field_frame = rotated(points - model.geom_pos[geom], inverse)
+        in_field_frame = in_body_frame(points - model.geom_pos[geom], model.geom_quat[geom])
         # The data is a fraction of the field's height above the lowest drawn height.
         lowest = fault.severity * float(unit_heights(variant.seed).min())
         parts = (fault.severity * estimated_heights(in_field_frame) - lowest) / field.size[2]

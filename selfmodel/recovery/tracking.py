@@ -13,7 +13,7 @@ from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.scores import TRACKING, VELOCITY, Score
 from selfmodel.robot.robot import Robot
-from selfmodel.rotation import rotated
+from selfmodel.rotation import in_body_frame
 from selfmodel.trials.trajectory import Trajectory
 
 VELOCITY_WIDTH = 0.25
@@ -136,8 +136,7 @@ def _followed(
     commanded: FloatArray, robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory
 ) -> FloatArray:
     """Returns the scores of a batch of runs, ``(n,)``; NaN for a run without any measurement."""
-    inverse = trajectory["base_orientation"] * (1.0, -1.0, -1.0, -1.0)
-    body = rotated(trajectory["base_linear_velocity"], inverse)
+    body = in_body_frame(trajectory["base_linear_velocity"], trajectory["base_orientation"])
     turn = trajectory["base_angular_velocity"][..., 2]
     error = np.square(body[..., :2] - commanded[:2]).sum(axis=-1)
     rewards = np.exp(-error / VELOCITY_WIDTH)
