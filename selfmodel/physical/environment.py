@@ -34,7 +34,7 @@ from selfmodel.errors import (
     unknown_name,
     whole_number,
 )
-from selfmodel.physical.interface import Limit
+from selfmodel.physical.interface import NORM_TOLERANCE, Limit
 from selfmodel.physical.safety import (
     HangError,
     HeldIterator,
@@ -292,7 +292,8 @@ class EnvironmentRobot:
             for signal in SIGNALS:
                 if signal in controllers.observed:
                     value = values[signal]
-                    if signal == "base_orientation" and abs(np.linalg.norm(value) - 1) > 0.01:
+                    norm = np.linalg.norm(value)
+                    if signal == "base_orientation" and abs(norm - 1) > NORM_TOLERANCE:
                         raise TrialError(
                             f"base_orientation must be a unit quaternion, got {value.tolist()} at "
                             f"step {k}"

@@ -87,9 +87,11 @@ def write_masses(work: Work) -> None:
     work.section("compiler").set("inertiafromgeom", "false")
 
 
+_JOINT_TAGS, _FREE = ("joint", "freejoint"), mujoco.mjtJoint.mjJNT_FREE
+
 _PLACES: Mapping[tuple[str, ...], tuple[str, dict[str, str]]] = {
     ("geom",): ("geom_bodyid", {"pos": "geom_pos", "quat": "geom_quat"}),
-    ("joint", "freejoint"): ("jnt_bodyid", {"pos": "jnt_pos", "axis": "jnt_axis"}),
+    _JOINT_TAGS: ("jnt_bodyid", {"pos": "jnt_pos", "axis": "jnt_axis"}),
     ("site",): ("site_bodyid", {"pos": "site_pos", "quat": "site_quat"}),
     ("camera",): ("cam_bodyid", {"pos": "cam_pos", "quat": "cam_quat"}),
     ("light",): ("light_bodyid", {"pos": "light_pos", "dir": "light_dir"}),
@@ -113,7 +115,8 @@ def _dissolve_frames(work: Work) -> None:
         for tags, (owner, fields) in _PLACES.items():
             ids = np.flatnonzero(getattr(model, owner) == body).tolist()
             for child, number in zip((c for c in children if c.tag in tags), ids, strict=True):
-                if child in moved and not _is_free(model, child, number):
+                is_joint = child.tag in _JOINT_TAGS
+                if child in moved and not (is_joint and model.jnt_type[number] == _FREE):
                     place = {key: getattr(model, name)[number] for key, name in fields.items()}
                     _write(child, _in_file(model, number, place) if child.tag == "geom" else place)
     for name in _POSES:
@@ -139,11 +142,6 @@ def _unwrap(parent: ET.Element, moved: set[ET.Element]) -> None:
                 child.set(attribute, frame.get("childclass", ""))
             moved.add(child)
         parent[index : index + 1] = list(frame)
-
-
-def _is_free(model: mujoco.MjModel, element: ET.Element, number: int) -> bool:
-    is_joint = element.tag in ("joint", "freejoint")
-    return is_joint and bool(model.jnt_type[number] == mujoco.mjtJoint.mjJNT_FREE)
 
 
 def _in_file(
@@ -247,9 +245,6 @@ def name_parts(work: Work) -> None:
                 element.set("name", names.new(base))
     if unnamed:
         work.notes.append(f"{unnamed} parts without a name got one")
-
-
-_JOINT_TAGS = ("joint", "freejoint")
 
 
 def _default_name(
