@@ -2,7 +2,6 @@
 
 import math
 from itertools import combinations
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ from selfmodel.robot.anatomy import Joint
 from selfmodel.robot.contacts import penetration_depths, reaches_ground
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.robot import Robot
+from tests.helpers.robots.arms import robot_of
 from tests.robot.mjcf.awkward import LEGS, MOTORS, mjcf
 from tests.robot.mjcf.samples import SAMPLES
 
@@ -22,12 +22,10 @@ HALF = math.sqrt(0.5)
 RIGID = 'type="capsule" size=".02" fromto="0 0 0 0 0 {length}"'
 
 
-def with_extra(folder: Path, shape: str, height: float = 0.1, ends: str = "-170 170") -> Robot:
+def with_extra(shape: str, height: float = 0.1, ends: str = "-170 170") -> Robot:
     """Returns a robot on two legs, 0.3 m below its torso, with another limb."""
     extra = EXTRA.format(height=height, range=ends, shape=shape)
-    path = folder / "robot.xml"
-    path.write_text(mjcf(legs=LEGS + extra, motors=EXTRA_MOTOR), encoding="utf-8")
-    return load_mjcf(path)
+    return robot_of(mjcf(legs=LEGS + extra, motors=EXTRA_MOTOR))
 
 
 def limb(robot: Robot, joint: str) -> list[Joint]:
@@ -44,9 +42,9 @@ def limb(robot: Robot, joint: str) -> list[Joint]:
     ],
 )
 def test_a_raised_limb_is_lowered_over_the_range_of_its_joint(
-    *, length: float, ends: str, reaches: bool, tmp_path: Path
+    *, length: float, ends: str, reaches: bool
 ):
-    robot = with_extra(tmp_path, RIGID.format(length=length), ends=ends)
+    robot = with_extra(RIGID.format(length=length), ends=ends)
 
     assert reaches_ground(robot, limb(robot, "pitch")) == reaches
 
@@ -62,16 +60,16 @@ def test_a_raised_limb_is_lowered_over_the_range_of_its_joint(
 )
 @pytest.mark.parametrize(("gap", "reaches"), [(0.014, True), (0.019, False)])
 def test_a_tilted_shape_is_a_leg_if_it_ends_within_the_tolerance_of_the_ground(
-    *, shape: str, extent: float, gap: float, reaches: bool, tmp_path: Path
+    *, shape: str, extent: float, gap: float, reaches: bool
 ):
     # The feet are 0.33 m below the torso, of which the tolerance is 0.0165 m.
     tilted = f'{shape} euler="0 45 0"'
-    robot = with_extra(tmp_path, tilted, extent + gap - 0.33, ends="-.01 .01")
+    robot = with_extra(tilted, extent + gap - 0.33, ends="-.01 .01")
 
     assert reaches_ground(robot, limb(robot, "pitch")) == reaches
 
 
-def test_the_hinges_of_a_leg_move_in_turns(tmp_path: Path):
+def test_the_hinges_of_a_leg_move_in_turns():
     upper, lower = 'range="-90 90" axis="0 1 0"', 'range="-90 0" axis="0 1 0"'
     leg = f"""<body name="upper" pos="0 1 0"><joint name="shoulder" {upper}/>
     <geom type="capsule" size=".01" fromto="0 0 0 0 0 -1"/>
@@ -80,17 +78,15 @@ def test_the_hinges_of_a_leg_move_in_turns(tmp_path: Path):
     motors = "".join(
         f'<motor name="{name}" joint="{name}" ctrlrange="-1 1"/>' for name in ("shoulder", "elbow")
     )
-    path = tmp_path / "robot.xml"
     # Each hinge once: 0.71 m + 1 m; the shoulder again: 1.83 m.
-    path.write_text(mjcf(torso='<geom size="1.87"/>', legs=leg, motors=motors), encoding="utf-8")
-    robot = load_mjcf(path)
+    robot = robot_of(mjcf(torso='<geom size="1.87"/>', legs=leg, motors=motors))
 
     assert reaches_ground(robot, [robot.anatomy.joint(name) for name in ("shoulder", "elbow")])
 
 
-def test_a_limb_that_cannot_touch_the_ground_does_not_reach_it(tmp_path: Path):
+def test_a_limb_that_cannot_touch_the_ground_does_not_reach_it():
     ghost = RIGID.format(length=0.5) + ' contype="0" conaffinity="0"'
-    robot = with_extra(tmp_path, ghost)
+    robot = with_extra(ghost)
 
     assert not reaches_ground(robot, limb(robot, "pitch"))
 

@@ -18,7 +18,6 @@ from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.designs import cpg_for
 from selfmodel.robot.mjcf import load
 from selfmodel.robot.mjcf.load import adapt_message, load_mjcf
-from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.mjcf.structure import MIN_ITERATIONS, expand
 from selfmodel.robot.mjcf.work import Work
 from selfmodel.robot.robot import Robot
@@ -27,6 +26,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.drivers import random_controllers
 from tests.helpers.exactness import exactness
+from tests.helpers.robots.arms import robot_of
 from tests.helpers.robots.go1 import go1, trot
 from tests.robot.mjcf.awkward import AWKWARD, LEGS, MOTORS, mjcf
 
@@ -81,8 +81,7 @@ def test_a_child_process_reads_a_file_and_gives_the_robot_or_the_refusal(
 
 
 def test_a_trial_of_a_robot_without_any_sensor_is_logged_and_read(tmp_path: Path):
-    (tmp_path / "robot.xml").write_text(mjcf(), encoding="utf-8")
-    robot = load_mjcf(tmp_path / "robot.xml", MjcfSettings(touch=(), angle=()))
+    robot = robot_of(mjcf(), touch=(), angle=())
     driver = Controller(cpg_for(robot), np.full(cpg_for(robot).weights, 0.5))
     path = write_trial(
         tmp_path / "trial.mcap",
@@ -101,12 +100,6 @@ WARM_START = int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
-def adapted(folder: Path, more: str) -> Robot:
-    path = folder / "robot.xml"
-    path.write_text(mjcf(more=more), encoding="utf-8")
-    return load_mjcf(path)
-
-
 @pytest.mark.parametrize(
     "more",
     [
@@ -115,8 +108,8 @@ def adapted(folder: Path, more: str) -> Robot:
         '<option timestep=".005"/><option><flag gravity="disable" sleep="enable"/></option>',
     ],
 )
-def test_warm_start_and_sleep_are_off_and_a_note_says_so(more: str, tmp_path: Path):
-    copy = adapted(tmp_path, more)
+def test_warm_start_and_sleep_are_off_and_a_note_says_so(more: str):
+    copy = robot_of(mjcf(more=more))
     found = copy.model.opt
 
     assert found.disableflags & WARM_START
@@ -127,17 +120,18 @@ def test_warm_start_and_sleep_are_off_and_a_note_says_so(more: str, tmp_path: Pa
     assert bool(found.disableflags & gravity) == ("gravity" in more)
 
 
-def test_the_iterations_of_a_solver_that_stops_early_are_raised(tmp_path: Path):
+def test_the_iterations_of_a_solver_that_stops_early_are_raised():
     more = '<option iterations="7"/><option iterations="1" ls_iterations="5"/>'
-    copy = adapted(tmp_path, more)
+    copy = robot_of(mjcf(more=more))
     found = copy.model.opt
 
     assert (found.iterations, found.ls_iterations) == tuple(MIN_ITERATIONS.values())
     assert any("iterations from 1 to 100, ls_iterations from 5 to 50" in n for n in copy.notes)
 
 
-def test_a_file_without_hidden_state_keeps_its_options(tmp_path: Path):
-    copy = adapted(tmp_path, '<option iterations="1"><flag warmstart="disable"/></option>')
+def test_a_file_without_hidden_state_keeps_its_options():
+    more = '<option iterations="1"><flag warmstart="disable"/></option>'
+    copy = robot_of(mjcf(more=more))
 
     assert copy.model.opt.iterations == 1
     assert not any("warm start" in note for note in copy.notes)
@@ -152,10 +146,8 @@ def path_of(robot: Robot, stride: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("stride", [0.0, 0.12], ids=["stands", "walks"])
-def test_a_go1_of_one_iteration_moves_as_with_its_warm_start(stride: float, tmp_path: Path):
-    path = tmp_path / "go1.xml"
-    path.write_text(go1(), encoding="utf-8")
-    ours = load_mjcf(path)
+def test_a_go1_of_one_iteration_moves_as_with_its_warm_start(stride: float):
+    ours = robot_of(go1())
     original = ours.mjcf.replace('warmstart="disable"', 'warmstart="enable"')
     for name, least in MIN_ITERATIONS.items():
         own = {"iterations": 1, "ls_iterations": 5}[name]
@@ -169,9 +161,9 @@ def test_a_go1_of_one_iteration_moves_as_with_its_warm_start(stride: float, tmp_
     assert np.linalg.norm(before[-1] - after[-1]) < 0.02
 
 
-def test_a_large_reservation_of_memory_is_left_out_and_a_usual_one_stays(tmp_path: Path):
-    large = adapted(tmp_path, '<size njmax="8000" nconmax="4000"/>')
-    usual = adapted(tmp_path, '<size njmax="500" nconmax="100"/>')
+def test_a_large_reservation_of_memory_is_left_out_and_a_usual_one_stays():
+    large = robot_of(mjcf(more='<size njmax="8000" nconmax="4000"/>'))
+    usual = robot_of(mjcf(more='<size njmax="500" nconmax="100"/>'))
 
     assert any("without njmax=8000, nconmax=4000" in note for note in large.notes)
     assert "njmax" not in large.mjcf
@@ -209,14 +201,10 @@ def test_every_part_of_a_frame_keeps_its_place():
 
 
 @pytest.mark.parametrize("keyframe", ["", "<keyframe><key name='home' qpos='{}'/></keyframe>"])
-def test_limbs_in_frames_are_driven_named_and_started_in_a_keyframe(tmp_path: Path, keyframe: str):
+def test_limbs_in_frames_are_driven_named_and_started_in_a_keyframe(keyframe: str):
     legs = f'<frame pos="0 .1 .01" euler="0 0 5">{LEGS}</frame>'
     pose = "0 0 .4 1 0 0 0 .3 -.3"
-    (tmp_path / "robot.xml").write_text(
-        mjcf(legs=legs, motors=MOTORS, more=keyframe.format(pose)), encoding="utf-8"
-    )
-
-    robot = load_mjcf(tmp_path / "robot.xml")
+    robot = robot_of(mjcf(legs=legs, motors=MOTORS, more=keyframe.format(pose)))
 
     assert robot.anatomy.hinges == ("left_hip", "right_hip")
     assert "<frame" not in robot.mjcf
