@@ -1,7 +1,5 @@
 """Tests of a control delay that grew, and of payloads."""
 
-import dataclasses
-
 import mujoco
 import numpy as np
 import pytest
@@ -11,12 +9,12 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import added_steps
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.requests import Segments, cut_segments
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
 from tests.faults.test_build import assert_same_paths, built, follow
+from tests.helpers.calibration import late
 from tests.helpers.drivers import random_motion
 from tests.helpers.robots.arms import arm
 
@@ -24,10 +22,6 @@ STEPS = 60
 STATES = tuple(
     signal for signal in SIGNALS if signal not in ("sensors", "commands", "joint_efforts")
 )
-
-
-def late(robot: Robot, delay: float) -> Robot:
-    return with_parameters(robot, dataclasses.replace(nominal(robot), delay=delay))
 
 
 def playback(robot: Robot) -> Playback:

@@ -1,4 +1,4 @@
-"""A calibration of less than a second, for promises that need some fitted model."""
+"""A calibration of less than a second, for promises that need some fitted model, and a delay."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation import fit
+from selfmodel.simulation.model_factors import nominal, with_parameters
 
 
 @contextmanager
@@ -18,3 +20,8 @@ def coarse() -> Iterator[None]:
         patch.setattr(fit, "CANDIDATE_STIFFNESSES", (1.0,))
         patch.setattr(fit, "CANDIDATE_DAMPINGS", (0.5, 1.0))
         yield
+
+
+def late(robot: Robot, delay: float) -> Robot:
+    """Returns a robot with another control delay, control steps."""
+    return with_parameters(robot, replace(nominal(robot), delay=delay))

@@ -28,6 +28,7 @@ from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.simulation.model_factors import Weighted, nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial
+from tests.helpers.calibration import late
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import lacking
 
@@ -68,8 +69,7 @@ def test_the_noise_is_that_of_the_physical_robot_and_less_than_assumed_is_known(
     assert assumed.models.draw(np.random.default_rng(0)).differs
     # A later calibration of a model with fitted contacts does not make them certain.
     other = with_parameters(quadruped, replace(nominal(quadruped), contact_damping=0.5))
-    later = with_parameters(other, replace(nominal(other), delay=1))
-    for robot in (other, later):
+    for robot in (other, late(other, 1)):
         found = estimated_uncertainty(Simulator(robot, 1), [trial], calibration)
         assert found.models.contacts == CONTACTS
 

@@ -1,7 +1,5 @@
 """Tests of the state: signals of sliding and fixed bases, known bases, control delays."""
 
-import dataclasses
-
 import mujoco
 import numpy as np
 import pytest
@@ -21,11 +19,11 @@ from selfmodel.robot.state import (
     state_writer,
     with_known_base,
 )
-from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.calibration import late
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.hostile import lacking
 from tests.helpers.robots.arms import arm, arm_mjcf, robot_of
@@ -207,8 +205,9 @@ def test_a_delay_of_half_a_step_is_between_its_neighbours(quadruped: Robot):
     (controller,) = random_controllers(quadruped, 1)
 
     def moved(delay: float) -> np.ndarray:
-        late = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
-        run = Simulator(late, 1).run([(INTACT, controller)], 8, ["joint_positions"])
+        run = Simulator(late(quadruped, delay), 1).run(
+            [(INTACT, controller)], 8, ["joint_positions"]
+        )
         return run.trajectory["joint_positions"][0, 2]
 
     assert not np.array_equal(moved(0.5), moved(0))

@@ -37,6 +37,7 @@ from selfmodel.trials.estimation import BASE
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import collect
 from selfmodel.trials.trial import Trial, TrialPlan
+from tests.helpers.calibration import late
 from tests.helpers.drivers import moving_trial
 from tests.helpers.hostile import lacking, unstable
 from tests.helpers.robots.arms import robot_of as arm_of
@@ -108,9 +109,9 @@ def test_the_faults_of_the_robot_in_a_trial_are_no_parameters_of_its_model():
 
 @search
 def test_a_delay_of_a_part_of_a_control_step_is_found():
-    late = with_parameters(QUADRUPED, dataclasses.replace(nominal(QUADRUPED), delay=1.5))
+    found = calibrate(QUADRUPED, trials(late(QUADRUPED, 1.5)), threads=1)
 
-    assert calibrate(QUADRUPED, trials(late), threads=1).parameters.delay == 1.5
+    assert found.parameters.delay == 1.5
 
 
 @search

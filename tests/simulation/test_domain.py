@@ -22,8 +22,9 @@ from selfmodel.simulation.domain import (
     randomize_joint_angles,
     start_spread,
 )
-from selfmodel.simulation.model_factors import LogNormal, exact, nominal, with_parameters
+from selfmodel.simulation.model_factors import LogNormal, exact
 from selfmodel.simulation.simulator import Simulator
+from tests.helpers.calibration import late
 from tests.helpers.drivers import random_controllers
 
 STEPS = 60
@@ -141,14 +142,13 @@ def test_hypotheses_that_cannot_be_told_apart_are_simulated_in_turn(quadruped: R
 
 def test_an_added_delay_makes_commands_arrive_later(quadruped: Robot):
     delay = 2
-    late = dataclasses.replace(certain(quadruped), delays=(delay,))
-    (condition,) = draw_samples((INTACT,), late, 1, np.random.default_rng(6))
+    delayed = dataclasses.replace(certain(quadruped), delays=(delay,))
+    (condition,) = draw_samples((INTACT,), delayed, 1, np.random.default_rng(6))
 
     assert condition.variant(quadruped).added_delay.tolist() == [delay]
-    slow = with_parameters(quadruped, dataclasses.replace(nominal(quadruped), delay=delay))
     (driver,) = random_controllers(quadruped, 1)
-    outcome = Simulator(quadruped, 1).run_under([condition], late, [driver], STEPS, RECORD)
-    expected = Simulator(slow, 1).run([(INTACT, driver)], STEPS, RECORD)
+    outcome = Simulator(quadruped, 1).run_under([condition], delayed, [driver], STEPS, RECORD)
+    expected = Simulator(late(quadruped, delay), 1).run([(INTACT, driver)], STEPS, RECORD)
     np.testing.assert_allclose(
         outcome.trajectory["joint_positions"][0], expected.trajectory["joint_positions"], atol=1e-3
     )

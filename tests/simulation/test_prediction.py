@@ -20,7 +20,6 @@ from selfmodel.physical.simulated import SimulatedRobot, draw_gap
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import rotation_between
 from selfmodel.simulation import prediction
-from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.prediction import activations, predict
 from selfmodel.simulation.requests import END, MAX_CHAIN, WARM_UP, Segments, chained, cut_segments
 from selfmodel.simulation.rollout import SimulationStats
@@ -28,6 +27,7 @@ from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import JOINTS, ONBOARD, STATE
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory, collect
+from tests.helpers.calibration import late
 from tests.helpers.drivers import random_motion
 from tests.helpers.hostile import exploding
 
@@ -65,10 +65,6 @@ def error(predicted: Trajectory, run: Trajectory, starts: Sequence[int] = STARTS
         apart = rotation_between(own, logged) if signal == "base_orientation" else own - logged
         worst = max(worst, float(np.abs(apart).max()))
     return worst
-
-
-def late(robot: Robot, delay: float) -> Robot:
-    return with_parameters(robot, dataclasses.replace(nominal(robot), delay=delay))
 
 
 def test_every_single_fault_is_predicted_as_it_was(robot: Robot):
