@@ -90,7 +90,8 @@ class Settings:
         if self.population <= self.survivors:
             raise InputError(
                 f"population must exceed the {self.survivors} survivors, got {self.population}: "
-                f"for another population use Settings().scaled({max(2, self.population)})"
+                f"leave it out and add .scaled({max(2, self.population)}) to your settings, which "
+                f"keeps the others"
             )
         if not 0 <= self.crossovers <= (self.population - self.survivors) // 2:
             raise InputError(

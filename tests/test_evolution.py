@@ -147,7 +147,7 @@ def test_a_fitness_that_does_not_fit_is_refused(own: GenomeSearch, fitness: np.n
     [
         ({"steps": 1}, "steps must be at least 2"),
         ({"generations": 0}, "generations must be at least 1, got 0"),
-        ({"population": 50}, "population must exceed the 50 survivors, got 50"),
+        ({"population": 50}, r"exceed the 50 survivors, got 50: .*\.scaled\(50\) to your settings"),
         ({"population": 10_001}, "population must be at most 10000, got 10001"),
         ({"genes": 101}, "genes must be at most 100, got 101"),
         ({"steps": 10**6 + 1}, "steps must be at most 1000000"),

@@ -23,6 +23,7 @@ from selfmodel.logs.files import refuse_existing, refuse_file
 from selfmodel.logs.results import LogsResult, as_json as values_of
 from selfmodel.recovery.repertoire import self_model_digest
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import ADDED
 from selfmodel.trials.trial import by_stage, trial_names
 
 
@@ -97,14 +98,11 @@ def diagnose_logs(
     healthy = trials[:split] + before
     explained = [log for log in logs if log.trial in failed]
     settings = explained[0].settings
-    if options.generations is not None:
-        settings = dataclasses.replace(settings, generations=options.generations)
+    given = {one: getattr(options, one) for one in ("generations", *ADDED)}
+    asked = {name: value for name, value in given.items() if value is not None}
+    settings = dataclasses.replace(settings, **asked)
     if options.population is not None:
         settings = settings.scaled(options.population)
-    if options.diagnostic_search is not None:
-        settings = dataclasses.replace(settings, diagnostic_search=options.diagnostic_search)
-    if options.max_simulated_steps is not None:
-        settings = dataclasses.replace(settings, max_simulated_steps=options.max_simulated_steps)
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
         inputs = set_up_diagnosis(

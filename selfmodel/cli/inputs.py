@@ -3,12 +3,15 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError
+from selfmodel.faults.registry import check_cases
 from selfmodel.logs.files import no_folder, refuse_existing
 
 
-def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None) -> str:
-    """Returns the notation of a failure, given as ``--case`` of Table I or as ``--damage``.
+def case_notation(
+    robot: str, cases: Mapping[int, str], case: int | None, damage: str | None
+) -> str:
+    """Returns the notation of a robot's failure, given as a case of Table I or as ``--damage``.
 
     Raises:
         InputError: Neither or both are given, or there is no case of that number.
@@ -22,8 +25,7 @@ def case_notation(cases: Mapping[int, str], case: int | None, damage: str | None
         )
     if case is None:
         return str(damage)
-    if case not in cases:
-        raise unknown_name("case of Table I", str(case), map(str, cases))
+    check_cases([case], robot, cases)
     return cases[case]
 
 

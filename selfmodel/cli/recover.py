@@ -62,7 +62,7 @@ def experiment_of(options: Recover) -> Experiment:
     """Returns the experiment of the options; refuses what is wrong before any work."""
     entry = arguments.robot_entry(options.robot, options.model_settings or ())
     kinds = plugins.kinds(options.kinds)
-    damage = inputs.case_notation(entry.cases, options.case, options.damage)
+    damage = inputs.case_notation(options.robot, entry.cases, options.case, options.damage)
     robot = entry.robot()
     gait, neurons = None, options.neurons
     if inputs.is_file(options.controller):

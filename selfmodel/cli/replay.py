@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from selfmodel import arguments, plugins
-from selfmodel.arrays import finite_or_none
 from selfmodel.cli.commands import ReplayTrial, Simulated
 from selfmodel.cli.inputs import check_new_file
 from selfmodel.cli.output import figure_text, print_json, print_lines
@@ -22,13 +21,9 @@ from selfmodel.logs.files import replace_file
 from selfmodel.robot.motion import POSE
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator, thread_count
-from selfmodel.simulation.trial_replay import Replay, replay as simulate
-from selfmodel.trials.signals import SIGNALS, Signal
+from selfmodel.simulation.trial_replay import TOLERANCE, Replay, replay as simulate
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trial import check_magnitudes
-
-TOLERANCE = 1e-6
-"""Largest difference that counts as equal between versions of MuJoCo or after an import, SI
-units: some thousand roundings, before contacts amplify them."""
 
 WINDOWS = 10
 """Rows of the table of errors over time."""
@@ -40,15 +35,7 @@ COLUMNS: dict[Signal, str] = {
     "commands": "commands",
     "sensors": "sensors",
 }
-"""Signals in the table, and their titles."""
-
-LINES: dict[Signal, str] = {
-    "base_position": "base position, m",
-    "joint_positions": "joint angles, rad",
-    "commands": "commands",
-    "sensors": "sensor readings",
-}
-"""Signals in the figure, and their titles."""
+"""Signals in the table and in the figure, and their titles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,23 +76,20 @@ def replay(options: ReplayTrial) -> None:
     exact = logged == mujoco.__version__ and not log.imported
     tolerance = 0.0 if exact else TOLERANCE
     found = given.simulated(tolerance)
+    tolerance = TOLERANCE if found.from_log else tolerance
     if not found.observed:
         raise InputError(
             f"{options.file}: nothing was observed: every number of the log is NaN, so there "
             f"is nothing to compare a simulation with: give a log with observations"
         )
-    errors = {signal: found.rms(signal) for signal in SIGNALS}
     result = {
         "log": str(options.file),
         "robot": given.robot.name,
         "model": options.self_model,
         "hypothesis": str(given.hypothesis),
         "steps": log.trial.trajectory.steps,
-        "identical": found.identical,
-        "first_divergence_step": found.first_divergence_step,
-        "rms": {key: finite_or_none(one) for key, one in errors.items()},
+        **found.to_dict(),
         "tolerance": tolerance,
-        "diverged": found.diverged,
         "mujoco": {"logged": logged, "running": mujoco.__version__},
     }
     if options.out is not None:
@@ -133,6 +117,8 @@ def _print(result: dict[str, Any], log: TrialLog, found: Replay) -> None:
         f"{result['hypothesis']}": True,
         f"The log was made with MuJoCo {logged}, this is {running}: {equal}": logged != running,
         f"The log was imported, and resampled: {equal}": log.imported,
+        "The trial began in another pose than the model does, as episodes with a random start do: "
+        f"replayed from the recorded state of step 0; {equal}": found.from_log,
         "The simulation diverged: with this hypothesis the model is unstable.": found.diverged,
         end: True,
     }
@@ -165,7 +151,7 @@ def figure(log: TrialLog, found: Replay, hypothesis: str, kind: str) -> bytes:
     label = figure_text(f"simulated: {hypothesis}")
     path.plot(logged.time, simulated["base_position"][:, 0], "--", label=label)
     path.set_ylabel("base, forward, m")
-    for signal, title in LINES.items():
+    for signal, title in COLUMNS.items():
         # Identical steps have an error of 0, which a logarithmic axis cannot show.
         shown = np.where(found.errors[signal] > 0, found.errors[signal], np.nan)
         error.plot(logged.time, shown, label=title)

@@ -22,6 +22,7 @@ from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, unknown_name
+from selfmodel.faults.registry import TABLE_ONE
 from selfmodel.plugins import RETURN
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
@@ -107,7 +108,7 @@ def paper(options: RepeatPaper) -> None:
     study = plans.paper(
         options.out,
         robots=inputs.texts("--robots", options.robots, ROBOTS),
-        cases=inputs.whole_numbers("--case", options.cases, bodies.TABLE_ONE),
+        cases=inputs.whole_numbers("--case", options.cases, TABLE_ONE),
         seeds=options.every_seed,
         comparators=inputs.texts("--comparator", options.comparators, COMPARATORS),
         settings=options.settings,

@@ -21,7 +21,7 @@ trials, the following is asked before a robot is called damaged:
 Of a fault beside others, only the third is asked, of a fit with the others (``supported``).
 
 A comparator of whole trials, or with one distance per trial, judges only trials that a hypothesis
-reproduces (``unreproduced``).
+reproduces (``unreproduced``). Trials that contradict each other are not judged (``contradiction``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -35,8 +35,9 @@ from selfmodel.diagnosis.joints import excesses, joints_of
 from selfmodel.diagnosis.losses import by_total_loss
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.settings import EA
 from selfmodel.trials.trajectory import Trajectory
-from selfmodel.trials.trial import TrialPart, have_one_gait
+from selfmodel.trials.trial import TrialPart, have_one_gait, whole
 
 COVERAGE = 1.25
 """Largest speed of a joint's commands, relative to that in the healthy trials, that they cover."""
@@ -79,15 +80,20 @@ FASTEST = 0.95
 """Quantile of the speeds of commands that is compared: single jumps are no regime."""
 
 
-WHOLE_TRIALS = Doubt(
+WHOLE_TRIALS = (
     "no hypothesis reproduces the trials, and over a whole trial an error of the self-model grows "
-    "as large as the effect of a fault",
+    "as large as the effect of a fault"
+)
+"""The reason of ``unreproduced``. Across gaps of 0.05 to 0.2, comparators of whole trials were
+right in 594 of 889 diagnoses that had no rival, and in no range of the loss in 95 %."""
+
+SEGMENTS = (
     "repeat the diagnosis with --comparator segment-prediction, or without odometry "
     "segment-prediction-onboard: they compare short segments, and need the joint positions and the "
-    "angular velocity of the base",
+    "angular velocity of the base"
 )
-"""The doubt of ``unreproduced``. Across gaps of 0.05 to 0.2, comparators of whole trials were right
-in 594 of 889 diagnoses that had no rival, and in no range of the loss in 95 %."""
+MIN_SEGMENTED = 49
+"""Shortest trial that these comparators accept, control steps."""
 
 
 def unreproduced(fit: Fit, problem: Problem) -> Doubt | None:
@@ -99,8 +105,53 @@ def unreproduced(fit: Fit, problem: Problem) -> Doubt | None:
     has_many = problem.losses([INTACT]).shape[1] > 1
     if has_many and problem.table.uses_segments([part.trial for part in problem.trials]):
         return None
+    every = [part.trial.trajectory.steps for part in (*problem.healthy_trials, *problem.trials)]
+    again = f"record trials of {MIN_SEGMENTED} control steps or more, and "
     limit = significance.LOSS_FLOOR if has_many else significance.NEGLIGIBLE_LOSS
-    return WHOLE_TRIALS if fit.loss > limit else None
+    remedy = (again if min(every) < MIN_SEGMENTED else "") + SEGMENTS
+    return Doubt(WHOLE_TRIALS, remedy) if fit.loss > limit else None
+
+
+def contradiction(best: Hypothesis, problem: Problem) -> Doubt | None:
+    """Returns the doubt about trials of which some are of a healthy robot, and others are not.
+
+    One hypothesis predicts some trials better than the empty one does, by ``MIN_Z_OF_STEP``, and
+    others as much worse; and the better of the two in each trial predicts all of them significantly
+    better than the best hypothesis, by the surrogate. Of 56 pairs of trials of one robot, healthy
+    or with one of six faults, at gaps of 0.05 and 0.1, the empty one led by at most 0.4 in a trial.
+    """
+    table, trials = problem.surrogate
+    if problem.settings.diagnostic_search == EA:
+        table, trials = problem.table, problem.trials
+    if len(trials) < 2 or not table.uses_segments([whole(one).trial for one in trials]):
+        return None
+    known = [INTACT, *table.known(trials)]
+    each = [table.losses(known, [one]) for one in trials]
+    totals = [rows.sum(axis=1, keepdims=True) for rows in each]
+    nearer = [np.where(t < t[0], rows, rows[0]) for rows, t in zip(each, totals, strict=True)]
+    both = dict(zip(known, np.concatenate(nearer, axis=1), strict=True))
+    faults = search.chosen_of(known, lambda some: np.array([both[one] for one in some]))
+    pairs = [rows[[0, known.index(faults)]] for rows in each]
+    healthy, failed = (
+        " and ".join(
+            f"'{problem.names[whole(one).trial.path]}'"
+            for one, pair in zip(trials, pairs, strict=True)
+            if pair.size and significance.lead(*pair[order]) >= significance.MIN_Z_OF_STEP
+        )
+        for order in ([0, 1], [1, 0])
+    )
+    if not (healthy and failed):
+        return None
+    if not significance.is_better(both[faults], table.losses([best], trials)[0]):
+        return None
+    return Doubt(
+        f"the trials contradict each other: intact predicts {healthy} better than {faults} does, "
+        f"{faults} predicts {failed} better, and no hypothesis predicts all of them",
+        f"if the robot was healthy in {healthy}, give that with --healthy FILE and diagnose the "
+        f"rest; if not, diagnose {failed} alone",
+        f"these logs contradict each other: no fault shows in {healthy}; in {failed}, "
+        f"{faults.words}",
+    )
 
 
 def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:

@@ -193,9 +193,11 @@ class DiagnosticSearch:
             verdict="not judged",
             test=significance.TEST,
             doubt=Doubt(
-                f"the limit of {account.limit:,} simulated control steps ended the search",
+                f"the limit of {account.limit:,} simulated control steps ended the search; "
+                f"{ranked[0]} is the best hypothesis until then",
                 "give more steps (--max-simulated-steps), or search fewer kinds of faults",
-                is_limit=True,
+                f"it is not known whether the robot has a fault: the search ended at its limit, "
+                f"with {ranked[0].words} as its best",
             ),
         )
 

@@ -107,12 +107,12 @@ class Residual:
 class Doubt:
     """The reason for which trials cannot be judged, a clause, and what to do about it.
 
-    ``is_limit`` is whether the limit of simulated control steps ended the search or the verdict.
+    ``words`` is the reason in plain words; empty if it is an error of the self-model.
     """
 
     reason: str
     remedy: str
-    is_limit: bool = False
+    words: str = ""
 
 
 @dataclass(frozen=True)

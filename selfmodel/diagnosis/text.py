@@ -39,7 +39,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, str]:
     if (change := diagnosis.change) is not None:
         when = f"{change.time:.1f} s into the log '{change.trial}'"
         if change.before or diagnosis.verdict == "not judged":
-            earlier = in_words(change.before)
+            earlier = change.before.words
             facts[:1] = [f"until about {when}: {earlier}", f"after that: {facts[0]}"]
         else:
             facts.append(f"this began about {when}")
@@ -64,7 +64,7 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
             is_outside = OUTSIDE.issuperset(fault.kind for fault in best.faults)
             robot = "nothing is wrong with the robot itself: " if is_outside else ""
             each = "whether this is so. If not" if len(best) == 1 else "each. If one is not so"
-            return [robot + in_words(best) + sure], f"check {each}, {again}"
+            return [robot + best.words + sure], f"check {each}, {again}"
         case "ambiguous":
             facts, checks = _alternatives(diagnosis)
             failed = "none of these is" if len(checks) > 1 else "it is not"
@@ -75,19 +75,10 @@ def _answer(diagnosis: Diagnosis) -> tuple[list[str], str]:
         case "unexplained":
             return _unexplained(diagnosis)
         case "not judged":
-            what, doubt = (
-                "it is not known whether the robot has a fault",
-                diagnosis.doubt or NO_DOUBT,
-            )
+            doubt = diagnosis.doubt or NO_DOUBT
+            unknown = "it is not known whether the robot has a fault"
             why = "an error in the simulation model could explain these logs too"
-            if doubt.is_limit:
-                why = f"the search ended at its limit, with {in_words(diagnosis.best)} as its best"
-            return [what, why], doubt.remedy
-
-
-def in_words(hypothesis: Hypothesis) -> str:
-    """Returns the faults of a hypothesis as clauses in plain words."""
-    return ", and ".join(fault.words for fault in hypothesis.faults) or "nothing is wrong"
+            return [doubt.words] if doubt.words else [unknown, why], doubt.remedy
 
 
 def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
@@ -100,10 +91,10 @@ def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
     alike.sort(key=lambda one: -probability.get(str(one), 0.0))
     shared = set.intersection(*(set(one.faults) for one in alike))
     common = Hypothesis(tuple(sorted(shared)))
-    causes, checks = [], [f"whether {in_words(common)}"] if shared else []
+    causes, checks = [], [f"whether {common.words}"] if shared else []
     for number, one in enumerate(alike[:MAX_NAMED], start=1):
         own = Hypothesis(tuple(fault for fault in one.faults if fault not in shared))
-        words = in_words(own) if own or not shared else "nothing else is wrong"
+        words = own.words if own or not shared else "nothing else is wrong"
         causes.append(words if shared else words + _likely(probability.get(str(one))))
         checks += [f"({number})"] if own else []
     if probability and not shared:
@@ -116,7 +107,7 @@ def _alternatives(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
     if not shared:
         return [f"one of these is true: {numbered}"], checks
     having = [p for one, p in probability.items() if _faults(str(common)) <= _faults(one)]
-    what = in_words(common) + _sure(diagnosis, sum(having) if having else None)
+    what = common.words + _sure(diagnosis, sum(having) if having else None)
     return [what, f"in addition, one of these is true: {numbered}"], checks
 
 
@@ -143,13 +134,13 @@ def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
     what = "probably something is wrong that is not among the faults that were tried"
     facts = [what + _sure(diagnosis, rest)]
     has_guess = bool(best) if probability is None else probability >= MIN_GUESS
-    facts += [f"or {in_words(best)}{_likely(probability)}"] if has_guess else []
+    facts += [f"or {best.words}{_likely(probability)}"] if has_guess else []
     kinds = f"all kinds of faults (--kinds all). If this was done, {UNKNOWN}"
-    first = f"check whether {in_words(best)}. If not, " if best and has_guess else ""
+    first = f"check whether {best.words}. If not, " if best and has_guess else ""
     if unsearched is not None:
         kinds = f"this kind of fault too (add {unsearched.kind} to --kinds)"
         better = "a kind of fault that was not asked for fits these logs best. Check whether"
-        first = f"{better} {in_words(unsearched.hypothesis)}. Then "
+        first = f"{better} {unsearched.hypothesis.words}. Then "
     elif fit and fit.joints:
         first = f"check the joint {next(iter(fit.joints))}, where log and model differ most. Then "
     return facts, f"{first}repeat the diagnosis with {kinds}"
@@ -259,10 +250,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
             return f"Unexplained: {_missing(diagnosis)}"
         case "not judged":
             doubt = diagnosis.doubt or NO_DOUBT
-            reason = f"Not judged: {doubt.reason}"
-            if doubt.is_limit:
-                return f"{reason}; {best} is the best hypothesis until then."
-            return f"{reason}, so that a fault and an error of the self-model cannot be told apart."
+            cause = ", so that a fault and an error of the self-model cannot be told apart"
+            return f"Not judged: {doubt.reason}{'' if doubt.words else cause}."
 
 
 def _missing(diagnosis: Diagnosis) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.adequacy import (
+    contradiction,
     doubt_of,
     fit_of,
     is_too_high,
@@ -115,7 +116,7 @@ def diagnosis_of(
     verdict = verdict_of(best, fit, alike, unsearched)
     explained = INTACT if verdict == "unexplained" else best
     accused = explained if unsearched is None else unsearched.hypothesis
-    doubt = unreproduced(fit, by_refit)
+    doubt = unreproduced(fit, by_refit) or contradiction(found, problem)
     if doubt is None and verdict != "intact":
         doubt = doubt_of(accused, fit, by_refit)
     probability: dict[str, float] = {}
@@ -124,12 +125,9 @@ def diagnosis_of(
         misses = unsearched is not None or bool(fit.joints)
         some = {one: leads[one] for one in nearest}
         probability = probabilities(best, some, fit, misses=misses)
-    has_severities = not best and doubt is None
-    severities = (
-        detectable_severities(best, problem.space, problem.losses, problem.observer)
-        if has_severities
-        else []
-    )
+    severities = []
+    if not best and doubt is None:
+        severities = detectable_severities(best, problem.space, problem.losses, problem.observer)
     return Diagnosis(
         ranked=tuple(Candidate(one, totals[one]) for one in order[:kept]),
         trials=len(problem.trials),

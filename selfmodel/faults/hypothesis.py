@@ -36,6 +36,11 @@ class Hypothesis:
         return len(self.faults)
 
     @property
+    def words(self) -> str:
+        """The faults as clauses in plain words."""
+        return ", and ".join(fault.words for fault in self.faults) or "nothing is wrong"
+
+    @property
     def dynamics_part(self) -> "Hypothesis":
         """The faults that change the robot's motion under given commands."""
         return Hypothesis(tuple(fault for fault in self.faults if fault.kind.affects_dynamics))

@@ -5,9 +5,10 @@ row in ``KINDS`` and, to be searched by default, in one of the sets below it, an
 help page, ``cli/options.toml``.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 
+from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults import joints, sensors, world
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.anatomy import Anatomy, Joint
@@ -70,6 +71,46 @@ def notation_kinds(kinds: Iterable[FaultKind]) -> tuple[FaultKind, ...]:
     """Returns the built-in kinds, and those of a search with their degenerate kinds."""
     named = [kind for each in kinds for kind in (each, *each.degenerate_kinds)]
     return tuple(dict.fromkeys((*KINDS.values(), *named)))
+
+
+TABLE_ONE: Mapping[int, str] = {
+    1: "a lower leg breaks off",
+    2: "a whole leg breaks off",
+    3: "a touch sensor fails",
+    4: "2, and the touch sensor of another leg fails",
+    5: "an angle sensor fails",
+    6: "an upper-leg joint jams",
+    7: "2, and the upper-leg joint of another leg jams",
+    8: "7, and the angle sensor of a further leg fails",
+    9: "nothing fails",
+    10: "a hidden neuron fails",
+}
+"""Failures by their number in the paper's Table I."""
+
+_TOUCH, _ANGLE = "a touch sensor at", "an angle sensor at"
+CASE_NEEDS: Mapping[int, str] = {
+    1: "a limb of two joints",
+    2: "a limb",
+    3: f"{_TOUCH} its first limb",
+    4: f"{_TOUCH} another than its first limb",
+    5: f"{_ANGLE} its first limb",
+    6: "a limb",
+    7: "two limbs",
+    8: f"{_ANGLE} a third limb",
+}
+"""What a robot without a case of Table I lacks."""
+
+
+def check_cases(cases: Iterable[int], where: str, known: Collection[int]) -> None:
+    """Raises ``InputError`` for a case that a robot, or Table I, does not have."""
+    for case in cases:
+        if case not in known and case in CASE_NEEDS:
+            raise InputError(
+                f"case {case} of Table I, {TABLE_ONE[case]}, does not apply to {where}: it needs "
+                f"{CASE_NEEDS[case]}; the cases that apply are {', '.join(map(str, known))}"
+            )
+        if case not in known:
+            raise unknown_name(f"case of {where}", str(case), map(str, known))
 
 
 def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Mapping[int, str]:

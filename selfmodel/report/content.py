@@ -220,8 +220,9 @@ def hypotheses_section(subject: Subject) -> Section:
         groups=tuple(charts.Group(str(one), (distance,)) for one, distance in ranked),
     )
     columns = ("rank", "hypothesis", "distance", "probability", "against the best")
+    known = {one: round(number, 2) for one, number in diagnosis.probability.items()}
     rows = tuple(
-        (rank, str(one), distance, diagnosis.probability.get(str(one)), _standing(diagnosis, one))
+        (rank, str(one), distance, known.get(str(one)), _standing(diagnosis, one))
         for rank, (one, distance) in enumerate(ranked, start=1)
     )
     table = charts.Table("Hypotheses", columns, rows)

@@ -2,7 +2,7 @@
 
 import copy
 import os
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, TypeVar
 
@@ -76,14 +76,30 @@ class Simulator:
         self._contact_points = lru_cache(16)(partial(ground_contact_points, robot))
 
     @typed
-    def run(self, runs: Sequence[Run], steps: int, record: Sequence[Signal]) -> SimulationResult:
-        """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``."""
+    def run(
+        self,
+        runs: Sequence[Run],
+        steps: int,
+        record: Sequence[Signal],
+        state: Mapping[Signal, FloatArray] | None = None,
+    ) -> SimulationResult:
+        """Simulates each run (at least one) from the initial pose, ``(n, steps, width)``.
+
+        Or from a state, signals of the joints and of the base, ``(1, width)`` each.
+        """
         if unknown := [str(signal) for signal in record if signal not in SIGNALS]:
             raise unknown_name("signal", unknown[0], SIGNALS)
         check_type(runs[0] if runs else None, tuple, "pairs (Hypothesis, Controller) as runs")
         steps = whole_number("steps", steps, 1000, least=1)
         variants = [self._variant(hypothesis) for hypothesis, _ in runs]
-        return self._run(variants, [driver for _, driver in runs], steps, record)
+        drivers = [driver for _, driver in runs]
+        if state is None:
+            return self._run(variants, drivers, steps, record)
+        start = np.tile(self.robot.model.qpos0, (len(runs), 1))
+        speeds = np.zeros((len(runs), self.robot.model.nv))
+        bind = {"qpos": start, "qvel": speeds}.__getitem__
+        state_writer(self.robot, bind, *(variant.model for variant in variants))(state)
+        return self._run(variants, drivers, steps, record, start=start, speeds=speeds)
 
     def predict(
         self,
@@ -170,7 +186,7 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
-        **changes: Any,  # noqa: ANN401  # ``start`` and ``disturb`` of a rollout
+        **changes: Any,  # noqa: ANN401  # ``start``, ``speeds`` and ``disturb`` of a rollout
     ) -> SimulationResult:
         names, n = self.robot.anatomy.names, len(variants)
         rollout = Rollout(

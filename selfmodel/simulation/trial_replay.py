@@ -9,9 +9,16 @@ import numpy as np
 from selfmodel.arrays import FloatArray, data_frame, finite_or_none
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.estimation import STATE
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
+
+State = Mapping[Signal, FloatArray] | None
+
+TOLERANCE = 1e-6
+"""Largest difference that counts as equal between versions of MuJoCo, after an import, and from a
+logged state: SI units, some thousand roundings, before contacts amplify them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +35,8 @@ class Replay:
         errors: Root mean square error of each signal over its columns, ``(steps,)`` in the signal's
             unit; NaN at a step without an observation.
         diverged: Whether the simulation diverged; its signals are then invalid.
+        from_log: Whether it begins in the logged state of the first step, and not in the initial
+            pose of the model: episodes of other environments have random starts.
     """
 
     simulated: Trajectory
@@ -36,6 +45,7 @@ class Replay:
     first_divergence_step: int | None
     errors: Mapping[Signal, FloatArray]
     diverged: bool
+    from_log: bool = False
 
     def rms(self, signal: Signal, steps: slice = slice(None)) -> float:
         """Returns the root mean square error of a signal over some steps; NaN if not observed."""
@@ -57,13 +67,13 @@ class Replay:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON values; a signal's rms is None if not observed, or not finite."""
-        rms_values = [(signal, self.rms(signal)) for signal in self.errors]
         return {
             "observed": self.observed,
             "identical": self.identical,
             "first_divergence_step": self.first_divergence_step,
             "diverged": self.diverged,
-            "rms": {signal: finite_or_none(rms) for signal, rms in rms_values},
+            "from_log": self.from_log,
+            "rms": {signal: finite_or_none(self.rms(signal)) for signal in self.errors},
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types
@@ -78,10 +88,22 @@ def replay(
     """Simulates a logged trial under a hypothesis and compares the simulation with the log.
 
     A log of another MuJoCo version requires a tolerance above 0: the largest difference of two
-    equal numbers, in the unit of the signal.
+    equal numbers, in the unit of the signal. If the initial pose is not that of the log, the
+    simulation begins in the logged state, if that is the whole state, with ``TOLERANCE`` at least.
     """
+    state = {signal: trial.trajectory[signal][:1] for signal in STATE}
+    found = _compared(trial, hypothesis, simulator, tolerance, None)
+    if found.first_divergence_step != 0 or any(np.isnan(one).any() for one in state.values()):
+        return found
+    other = _compared(trial, hypothesis, simulator, max(tolerance, TOLERANCE), state)
+    return found if other.first_divergence_step == 0 else other
+
+
+def _compared(
+    trial: Trial, hypothesis: Hypothesis, simulator: Simulator, tolerance: float, state: State
+) -> Replay:
     logged = trial.trajectory
-    outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS)
+    outcome = simulator.run([(hypothesis, trial.plan.controller)], logged.steps, SIGNALS, state)
     simulated = outcome.trajectory.run(0)
     errors, known, same = dict[Signal, FloatArray](), list[bool](), list[bool]()
     differs = np.zeros(logged.steps, np.bool_)
@@ -103,4 +125,5 @@ def replay(
         first_divergence_step=int(steps[0]) if len(steps) else None,
         errors=errors,
         diverged=bool(outcome.diverged[0]),
+        from_log=state is not None,
     )

@@ -9,39 +9,9 @@ from selfmodel.controllers.controller import Design, check_silent_neurons
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import notation_kinds
+from selfmodel.faults.registry import check_cases, notation_kinds
 from selfmodel.faults.sensors import silent_neurons
 from selfmodel.tasks import ROBOTS, Entry, suite_bodies
-
-TABLE_ONE: Mapping[int, str] = MappingProxyType(
-    {
-        1: "a lower leg breaks off",
-        2: "a whole leg breaks off",
-        3: "a touch sensor fails",
-        4: "2, and the touch sensor of another leg fails",
-        5: "an angle sensor fails",
-        6: "an upper-leg joint jams",
-        7: "2, and the upper-leg joint of another leg jams",
-        8: "7, and the angle sensor of a further leg fails",
-        9: "nothing fails",
-        10: "a hidden neuron fails",
-    }
-)
-"""Failures by their number in the paper's Table I."""
-
-CASE_NEEDS: Mapping[int, str] = MappingProxyType(
-    {
-        1: "a limb of two joints",
-        2: "a limb",
-        3: "a touch sensor at its first limb",
-        4: "a touch sensor at another than its first limb",
-        5: "an angle sensor at its first limb",
-        6: "a limb",
-        7: "two limbs",
-        8: "an angle sensor at a third limb",
-    }
-)
-"""What a robot without a case of Table I lacks."""
 
 DOMAINS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {name: tuple(entry.suite) for name, entry in ROBOTS.items()}
@@ -104,7 +74,7 @@ def failures_of(
     """Returns the failures of a robot: the number in Table I, or None, and the notation."""
     searched, anatomy = plugins.kinds(kinds), entry.robot().anatomy
     HypothesisSpace.of(searched, anatomy)  # refuses kinds of which none applies
-    check_cases(f"case of {robot}", cases or (), entry.cases)
+    check_cases(cases or (), robot, entry.cases)
     numbered = [(case, entry.cases[case]) for case in (entry.cases if cases is None else cases)]
     named = [str(parse(damage, anatomy, notation_kinds(searched))) for damage in damages]
     return [*numbered, *((None, damage) for damage in dict.fromkeys(named))]
@@ -116,26 +86,11 @@ def judged(
     """Returns failures as ``failures_of`` does, each with the reason why it cannot be, or ""."""
     judged: list[tuple[int | None, str, str]] = []
     for case, damage in asked:
+        cases, damages = ((), (damage,)) if case is None else ((case,), ())
         try:
-            judged.append((case, _applied(robot, entry, design, (case, damage), kinds), ""))
+            ((_, truth),) = failures_of(robot, entry, cases, damages, kinds)
+            check_silent_neurons(design, silent_neurons(parse(truth, entry.robot().anatomy)))
+            judged.append((case, truth, ""))
         except InputError as error:
             judged.append((case, damage, str(error)))
     return judged
-
-
-def _applied(robot: str, entry: Entry, design: Design, asked: Asked, kinds: str) -> str:
-    """Returns a failure in notation; refuses one that the robot or its controllers cannot have."""
-    case, damage = asked
-    if case is not None and case not in entry.cases:
-        raise InputError(f'"{TABLE_ONE[case]}" needs {CASE_NEEDS[case]}, which {robot} lacks')
-    cases, damages = ((), (damage,)) if case is None else ((case,), ())
-    ((_, truth),) = failures_of(robot, entry, cases, damages, kinds)
-    check_silent_neurons(design, silent_neurons(parse(truth, entry.robot().anatomy)))
-    return truth
-
-
-def check_cases(what: str, cases: Sequence[int], known: Iterable[int]) -> None:
-    """Raises ``InputError`` for the number of a case that is unknown."""
-    names = list(map(str, known))
-    for case in cases:
-        plugins.check_known(what, str(case), names)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from selfmodel.faults.registry import TABLE_ONE
 from selfmodel.settings import Settings
 from selfmodel.studies import figures, tables
-from selfmodel.studies.bodies import TABLE_ONE
 from selfmodel.studies.recoveries import ON_ROBOT
 from selfmodel.studies.rows import KINDS, methods_of, study_rows
 from selfmodel.studies.study import Row, grouped, shared_in

@@ -26,7 +26,7 @@ from selfmodel.errors import (
     whole_numbers,
 )
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.registry import kind_names
+from selfmodel.faults.registry import TABLE_ONE, check_cases, kind_names
 from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
@@ -36,10 +36,8 @@ from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.bodies import (
     DOMAINS,
-    TABLE_ONE,
     Asked,
     bodies_of,
-    check_cases,
     failures_of,
     judged,
     known_cases,
@@ -260,7 +258,7 @@ def suite(
     _check_any(cases, damages)
     chosen = repair_parameters(repair, search, score, repair_settings, known=bool(known))
     models = {body: recoveries.planned(body, entry) for body, entry in entries.items()}
-    check_cases("case of these bodies", cases, known_cases(bodies))
+    check_cases(cases, "these bodies", known_cases(bodies))
     asked: list[Asked] = [*((case, "") for case in cases), *((None, one) for one in damages)]
     failures: dict[str, list[tuple[int | None, str, str]]] = {}
     for body, entry in entries.items():
@@ -324,7 +322,7 @@ def paper(
     settings = dataclasses.replace(settings, diagnostic_search=EA)
     for robot in robots:
         plugins.check_known("robot of the paper", robot, ROBOTS)
-    check_cases("case of Table I", cases, TABLE_ONE)
+    check_cases(cases, "Table I", TABLE_ONE)
     for comparator in comparators:
         if comparator == ON_ROBOT:
             raise InputError(f"{ON_ROBOT} is no comparator: it is run in addition to any of them")

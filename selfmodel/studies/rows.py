@@ -196,11 +196,14 @@ class LoadedStudy:
     outcomes: pd.DataFrame
 
     def __repr__(self) -> str:
-        shares = [f"\n  {name}: {right} of {runs} right" for name, right, runs in self._right()]
+        shares = [
+            f"\n  {name}: {right} of {runs} right{f' ({said})' if said else ''}"
+            for name, right, runs, said in self._right()
+        ]
         return f"<LoadedStudy {self.kind}, {counted(len(self.rows), 'row')}{''.join(shares)}>"
 
-    def _right(self) -> list[tuple[str, int, int]]:
-        """Returns the right diagnoses of all and their number, by robot and comparator."""
+    def _right(self) -> list[tuple[str, int, int, str]]:
+        """Returns the right diagnoses, their number and verdicts, by robot and comparator."""
         if "correct" not in self.rows:
             return []
         rows = self.rows[self.rows["correct"].notna()]  # a body cannot have every failure
@@ -209,7 +212,13 @@ class LoadedStudy:
         axes = [name for name in ("robot", "method") if name in rows]
         axes += ["trials"] if self.kind == "ablate" else []
         groups = rows.astype(dict.fromkeys(axes, str)).groupby(axes)
-        return [(", ".join(key), int(own["correct"].sum()), len(own)) for key, own in groups]
+        return [
+            (
+                *(", ".join(key), int(own["correct"].sum()), len(own)),
+                ", ".join(f"{n} {verdict}" for verdict, n in own["verdict"].value_counts().items()),
+            )
+            for key, own in groups
+        ]
 
     def to_pandas(self) -> pd.DataFrame:
         """Returns the rows."""
@@ -227,8 +236,8 @@ class LoadedStudy:
             names = [f"{', '.join(row.table)}: {row.method}" for row in means.itertuples()]
             ends = list(zip(means["mean_low"], means["mean_high"], strict=True))
             return values_by_name(self.kind, "mean", names, list(means["mean"]), ends=ends)
-        shares = [proportion(number, runs) for _, number, runs in right]
-        names = [f"{name} (n = {runs})" for name, _, runs in right]
+        shares = [proportion(number, runs) for _, number, runs, _ in right]
+        names = [f"{name} (n = {runs})" for name, _, runs, _ in right]
         values, ends = [one.estimate for one in shares], [(one.low, one.high) for one in shares]
         label = "right diagnoses (95 % interval)"
         return values_by_name(self.kind, label, names, values, ends=ends)

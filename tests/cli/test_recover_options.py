@@ -35,7 +35,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory, quadruped: Robot) -> Path:
     [
         ("quadrupd --case 1", "unknown robot 'quadrupd': did you mean quadruped?"),
         ("quadruped", "expected either --case N or --damage NOTATION, got neither"),
-        ("quadruped --case 11", "unknown case of Table I '11'"),
+        ("quadruped --case 11", "unknown case of quadruped '11'"),
+        (
+            "suite-fish-swim --case 1",
+            "case 1 of Table I, a lower leg breaks off, does not apply to suite-fish-swim: it",
+        ),
         ("quadruped --case x", "case"),
         ("quadruped --case 1 --damage intact", "got both"),
         ("hexapod --damage break:front_left_hp", "did you mean front_left_hip"),

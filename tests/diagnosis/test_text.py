@@ -19,7 +19,6 @@ from selfmodel.diagnosis.text import (
     detectable_sentences,
     evidence_sentences,
     fit_sentence,
-    in_words,
     right_or_wrong,
     summary,
     verdict_sentences,
@@ -375,4 +374,4 @@ def test_the_summary_says_what_is_wrong_how_sure_since_when_and_what_to_do(
 def test_the_words_of_a_fault_say_its_direction_its_place_and_its_amount_without_a_power(
     fault: str, said: str
 ):
-    assert in_words(parse(fault, ANATOMY)).endswith(said)
+    assert parse(fault, ANATOMY).words.endswith(said)

@@ -15,19 +15,20 @@ import pytest
 from selfmodel import plugins
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
-from selfmodel.diagnosis.adequacy import is_too_high
+from selfmodel.diagnosis.adequacy import MIN_SEGMENTED, is_too_high
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import FAULTY_RATIO, LOSS_RATIO, TEST
-from selfmodel.diagnosis.text import summary
+from selfmodel.diagnosis.text import summary, verdict_sentences
 from selfmodel.diagnosis.verdict import (
     WINDOW,
     diagnosis_of,
     verdict_of,
 )
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.notation import parse
@@ -42,7 +43,7 @@ from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trial import Trial
 from tests.diagnosis.synthetic import problem_of
 from tests.helpers.comparators import Prepared
-from tests.helpers.drivers import random_controllers
+from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.memory import trial_of
 
 SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
@@ -50,6 +51,8 @@ CASES = ROBOTS["quadruped"].cases
 GAIT = 4
 """Index of a random controller under which every failure below is detectable."""
 
+
+DEAD = "motor:front_left_knee=0.0"
 
 trial = partial(trial_of, steps=SMALL.steps)
 
@@ -133,6 +136,42 @@ def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, befo
     assert found.verdict == "unexplained"
 
 
+@pytest.mark.parametrize(("gap", "order"), [(0.0, 1), (0.05, -1)])
+def test_logs_of_a_healthy_and_of_a_damaged_robot_contradict_each_other(
+    quadruped: Robot, gait: Controller, gap: float, order: int
+):
+    walk = random_cpgs(quadruped, 1)[0] if gap else gait  # with it and no gap, a change is found
+    real = draw_gap(quadruped, gap, np.random.default_rng(0)) if gap else None
+    healthy, damaged = (
+        trial(quadruped, truth, walk, name=name, gap=real)
+        for truth, name in (("intact", "first"), (DEAD, "last"))
+    )
+    found = diagnosed(quadruped, [healthy, damaged][::order], kinds=(KINDS["motor"],))
+
+    assert found.verdict == "not judged"
+    what, action = summary(found)
+    dead = parse(DEAD, quadruped.anatomy).words
+    assert f"contradict each other: no fault shows in 'first'; in 'last', {dead}." in what
+    assert "if the robot was healthy in 'first', give that with --healthy FILE" in action
+    assert verdict_sentences(found).endswith("no hypothesis predicts all of them.")
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05])
+def test_a_fault_that_one_of_two_gaits_hardly_shows_is_no_contradiction(
+    quadruped: Robot, gait: Controller, gap: float
+):
+    real = draw_gap(quadruped, gap, np.random.default_rng(0)) if gap else None
+    still = dataclasses.replace(gait, genome=0.05 * gait.genome)
+    trials = [
+        trial(quadruped, DEAD, driver, name=name, gap=real)
+        for driver, name in ((still, "first"), (gait, "last"))
+    ]
+    found = diagnosed(quadruped, trials, kinds=(KINDS["motor"],))
+
+    assert found.doubt is None
+    assert str(found.best) == DEAD or gap
+
+
 WHOLE = sorted(name for name in COMPARATORS if not name.startswith("segment-prediction"))
 
 
@@ -150,6 +189,19 @@ def test_whole_trials_that_no_hypothesis_reproduces_are_not_judged(
     assert found.verdict == "not judged"
     assert found.probability == {}
     assert "segment-prediction" in summary(found)[1]
+    assert "record trials" not in summary(found)[1]
+
+
+def test_trials_that_are_too_short_for_segments_are_to_be_recorded_for_longer(
+    quadruped: Robot, gait: Controller
+):
+    gap = draw_gap(quadruped, 0.1, np.random.default_rng(0))
+    short = trial(quadruped, "intact", gait, steps=MIN_SEGMENTED - 1, gap=gap)
+    found = diagnosed(quadruped, [short], comparator=COMPARATORS["sensor-series"])
+
+    assert f"record trials of {MIN_SEGMENTED} control steps or more" in summary(found)[1]
+    with pytest.raises(InputError, match=f"needs {MIN_SEGMENTED} steps or more"):
+        SEGMENT_PREDICTION.prepare(short)
 
 
 @pytest.mark.parametrize("name", [one for one in WHOLE if one != "noisy-transfer"])

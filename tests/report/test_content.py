@@ -14,6 +14,7 @@ from selfmodel.report.content import (
     details,
     gait_section,
     headline,
+    hypotheses_section,
     report_of,
     trials_section,
 )
@@ -103,3 +104,9 @@ def test_the_spans_of_a_lane_are_the_times_of_contact(subject: Subject, shots: t
             contact |= (trajectory.time >= begin) & (trajectory.time < end)
 
         assert np.array_equal(contact[:-1], (trajectory["sensors"][:, column] > 0.5)[:-1])
+
+
+def test_the_table_of_hypotheses_has_probabilities_of_two_digits(subject: Subject):
+    best = str(subject.diagnosis.best)
+    found = hypotheses_section(with_verdict(subject, probability={best: 0.1234567}))
+    assert found.items[1].rows[0][3] == 0.12

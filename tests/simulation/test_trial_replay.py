@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dm_control import suite
 
+import selfmodel
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import Playback
 from selfmodel.faults.hypothesis import INTACT
@@ -23,7 +25,7 @@ from selfmodel.simulation.trial_replay import Replay, replay
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.command import refused
+from tests.helpers.command import refused, succeeds
 from tests.helpers.drivers import random_controllers, random_cpgs, random_of
 from tests.helpers.hostile import lacking, with_value
 
@@ -163,3 +165,24 @@ def test_nothing_observed_is_not_identical(quadruped: Robot, tmp_path: Path):
     assert "nothing was observed" in repr(found)
     said = "nothing was observed: every number of the log is NaN"
     refused("replay", str(path), said=said, cwd=tmp_path)
+
+
+@pytest.mark.parametrize("domain", ["walker", "quadruped"])
+def test_an_episode_with_a_random_start_is_replayed_from_its_first_state(
+    domain: str, tmp_path: Path
+):
+    robot = selfmodel.load_robot(f"suite-{domain}-walk")
+    rest = [0.0] * len(robot.anatomy.motors)
+    env = suite.load(domain, "walk", {"random": 1})
+    path = tmp_path / "episode.mcap"
+    trial = selfmodel.record(env, lambda _: rest, path, robot=robot, steps=30)
+    found = replayed(path, "intact")
+
+    assert found.from_log
+    assert found.rms("joint_positions") < 1e-9
+    assert found.rms("base_position") < 1e-9
+    said = succeeds("replay", "episode.mcap", cwd=tmp_path).stdout
+    assert "began in another pose than the model does" in said
+    signals = {"base_linear_velocity": np.full((30, 3), np.nan)}
+    part = dataclasses.replace(trial, trajectory=trial.trajectory.with_signals(signals))
+    assert not replay(part, INTACT, Simulator(robot, 1)).from_log
