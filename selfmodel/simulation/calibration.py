@@ -226,6 +226,21 @@ def calibrate(
         )
 
 
+def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
+    """Returns the prediction error of a self-model on trials, as for ``calibrate``.
+
+    It is the root mean square error over all columns after all valid steps, in units of
+    ``CALIBRATION_ERROR_SCALES``.
+
+    Raises:
+        InputError: Too little of a trial was observed.
+    """
+    errors = _segment_errors(robot, [(one, INTACT) for one in trials], threads, {}).of(
+        [nominal(robot)]
+    )[:, 0]
+    return float(root_mean_square(errors))
+
+
 def _segment_errors(
     robot: Robot,
     trials: Sequence[tuple[Trial, Hypothesis]],

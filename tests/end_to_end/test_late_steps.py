@@ -23,13 +23,12 @@ from selfmodel.logs.writer import write_trial
 from selfmodel.physical.environment import EnvironmentRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.simulation.calibration import EXACT_ERROR
+from selfmodel.simulation.calibration import EXACT_ERROR, prediction_error
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.tasks import ROBOTS, load
 from selfmodel.tasks.walking import motion_capture
 from selfmodel.trials.estimation import estimated_states
 from selfmodel.trials.trial import Trial, TrialPlan
-from tests.helpers.calibration import prediction_error
 from tests.helpers.drivers import random_controllers, random_motion
 from tests.helpers.hostile import with_value, without_encoders
 from tests.helpers.memory import in_memory

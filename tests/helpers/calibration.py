@@ -1,16 +1,14 @@
 """A calibration of less than a second, for promises that need some fitted model, and a delay."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
 
-from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
-from selfmodel.simulation import calibration, fit
+from selfmodel.simulation import fit
 from selfmodel.simulation.model_factors import nominal, with_parameters
-from selfmodel.trials.trial import Trial
 
 
 @contextmanager
@@ -27,18 +25,3 @@ def coarse() -> Iterator[None]:
 def late(robot: Robot, delay: float) -> Robot:
     """Returns a robot with another control delay, control steps."""
     return with_parameters(robot, replace(nominal(robot), delay=delay))
-
-
-def prediction_error(robot: Robot, trials: Sequence[Trial], threads: int) -> float:
-    """Returns the prediction error of a self-model on trials, as for `calibrate`.
-
-    It is the root mean square error over all columns after all valid steps, in units of
-    ``CALIBRATION_ERROR_SCALES``.
-
-    Raises:
-        InputError: Too little of a trial was observed.
-    """
-    errors = calibration._segment_errors(robot, [(one, INTACT) for one in trials], threads, {}).of(
-        [nominal(robot)]
-    )[:, 0]
-    return float(calibration.root_mean_square(errors))

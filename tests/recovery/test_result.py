@@ -105,7 +105,8 @@ def test_a_replay_is_serialisable_and_a_table(trial: Trial, different: Replay):
     values = json.loads(json.dumps(different.to_dict(), allow_nan=False))
     table = different.to_pandas()
 
-    assert list(values) == ["observed", "identical", "first_divergence_step", "diverged", "rms"]
+    names = ["observed", "identical", "first_divergence_step", "diverged", "from_log", "rms"]
+    assert list(values) == names
     assert values["rms"] == {signal: different.rms(signal) for signal in SIGNALS}
     assert table["step"].tolist() == list(range(60))
     assert table["commands"][7] == different.errors["commands"][7]

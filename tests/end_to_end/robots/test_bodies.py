@@ -28,6 +28,7 @@ from selfmodel.robot.mjcf.settings import MjcfSettings
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import rotation_between
 from selfmodel.settings import Settings
+from selfmodel.simulation.calibration import prediction_error
 from selfmodel.simulation.model_factors import nominal, with_parameters
 from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.requests import Segments
@@ -37,7 +38,6 @@ from selfmodel.trials.estimation import BASE, STATE
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory, collect
 from selfmodel.trials.trial import TrialPlan
-from tests.helpers.calibration import prediction_error
 from tests.helpers.drivers import random_controllers
 from tests.helpers.exactness import exactness
 from tests.helpers.hostile import lacking
