@@ -9,7 +9,7 @@ from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, Union, cast, get_args, get_origin
+from typing import Any, Protocol, TypeVar, Union, cast, get_args, get_origin, runtime_checkable
 
 
 class InputError(ValueError):
@@ -61,7 +61,22 @@ _HAD_BY = {
     "Robot": 'selfmodel.load_robot("quadruped")',
     "Trial": 'selfmodel.read_log("walk.mcap").trial',
 }
-_WIDER = {float: Real, int: Real, tuple: tuple | list, Path: str | os.PathLike}
+
+
+@runtime_checkable
+class _Array(Protocol):
+    """An array of any library."""
+
+    def __array__(self) -> Any: ...  # noqa: ANN401  # that of numpy
+
+
+_WIDER: dict[str, Any] = {
+    "float": Real,
+    "int": Real,
+    "ndarray": _Array,
+    "Path": str | os.PathLike,
+    "tuple": tuple | list,
+}
 Target = TypeVar("Target", bound=Callable[..., Any])
 
 
@@ -71,10 +86,12 @@ def typed(target: Target) -> Target:
     The items of tuples and the like are not checked, and what is no class is not. A class has the
     arguments of its constructor.
     """
-    function: Callable[..., Any] = vars(target).get("__init__", target)
+    function = getattr(target, "__init__") if isinstance(target, type) else target  # noqa: B009
     parameters = inspect.signature(function).parameters.items()
     classes = {name: _classes(one.annotation) for name, one in parameters}
-    accepted = {name: tuple(_WIDER.get(one, one) for one in own) for name, own in classes.items()}
+    accepted = {
+        name: tuple(_WIDER.get(one.__name__, one) for one in own) for name, own in classes.items()
+    }
 
     @wraps(function)
     def checked(*given: object, **named: object) -> object:

@@ -133,23 +133,33 @@ def contradiction(best: Hypothesis, problem: Problem) -> Doubt | None:
     faults = search.chosen_of(known, lambda some: np.array([both[one] for one in some]))
     pairs = [rows[[0, known.index(faults)]] for rows in each]
     healthy, failed = (
-        " and ".join(
-            f"'{problem.names[whole(one).trial.path]}'"
+        [
+            one
             for one, pair in zip(trials, pairs, strict=True)
             if pair.size and significance.lead(*pair[order]) >= significance.MIN_Z_OF_STEP
-        )
+        ]
         for order in ([0, 1], [1, 0])
     )
     if not (healthy and failed):
         return None
     if not significance.is_better(both[faults], table.losses([best], trials)[0]):
         return None
+    # Beside one fault, the empty hypothesis may be the better of two wrong ones.
+    other = search.chosen_of(known, lambda some: table.losses(list(some), healthy))
+    these, those = (
+        " and ".join(f"'{problem.names[whole(one).trial.path]}'" for one in some)
+        for some in (healthy, failed)
+    )
+    alone = f"diagnose {those} alone"
     return Doubt(
-        f"the trials contradict each other: intact predicts {healthy} better than {faults} does, "
-        f"{faults} predicts {failed} better, and no hypothesis predicts all of them",
-        f"if the robot was healthy in {healthy}, give that with --healthy FILE and diagnose the "
-        f"rest; if not, diagnose {failed} alone",
-        f"these logs contradict each other: no fault shows in {healthy}; in {failed}, "
+        f"the trials contradict each other: {other} predicts {these} better than {faults} does, "
+        f"{faults} predicts {those} better, and no hypothesis predicts all of them",
+        f"{alone}, and {these} alone"
+        if other
+        else f"if the robot was healthy in {these}, name that with --healthy FILE and diagnose the "
+        f"rest; if not, {alone}",
+        f"these logs contradict each other: "
+        f"{f'in {these}, {other.words}' if other else f'no fault shows in {these}'}; in {those}, "
         f"{faults.words}",
     )
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from selfmodel.arrays import FloatArray, data_frame, finite_or_none
+from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.motion import POSE
 from selfmodel.simulation.simulator import Simulator
@@ -94,12 +95,16 @@ def replay(
 
     A log of another MuJoCo version requires a tolerance above 0: the largest difference of two
     equal numbers, in the unit of the signal. If the initial pose is not that of the log, the
-    simulation begins in the logged state, if that is the whole state, with ``TOLERANCE`` at least.
+    simulation begins in the logged state, with ``TOLERANCE`` at least: if that is the whole state,
+    the trial begins at rest as an episode does, and no fault moves the initial pose or an encoder.
     """
     state = {signal: trial.trajectory[signal][:1] for signal in STATE}
     found = _compared(trial, hypothesis, simulator, tolerance, None)
-    is_known = not any(np.isnan(one).any() for one in state.values())
-    if not is_known or max(found.errors[signal][0] for signal in POSE) <= NEAR:
+    variant, pose = build(simulator.robot, hypothesis), simulator.robot.model.qpos0
+    moves = not np.array_equal(variant.model.qpos0, pose) or variant.encoder_offset.any()
+    if moves or any(np.isnan(one).any() for one in state.values()):
+        return found
+    if max(found.errors[signal][0] for signal in POSE) <= NEAR:
         return found
     other = _compared(trial, hypothesis, simulator, max(tolerance, TOLERANCE), state)
     return found if other.first_divergence_step == 0 else other

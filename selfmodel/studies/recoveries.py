@@ -80,7 +80,8 @@ NO_EFFECT = 0.05
 RULE = (
     f"The best trial is one without a fall, unless the robot fell in all, which is no recovery. A "
     f"failure has no effect if it took at most {100 * NO_EFFECT:g} % of the score, and the robot "
-    f"did not fall because of it."
+    f"did not fall because of it; it is worse if the best trial then lost more, or fell. Better is "
+    f"a larger score than after the failure, or no fall where the failure made the robot fall."
 )
 """What ``outcome_of`` means, for readers."""
 
@@ -391,17 +392,18 @@ def outcome_of(
 ) -> tuple[float | None, str | None]:
     """Returns the share of the lost score that the best recovery trial regained, and the outcome.
 
-    The outcome is by the ``RULE`` ``no effect`` or ``fell``; or else ``better`` or ``not better``
-    than after the failure, with a share unless the failure took no score. A fall that there was
-    before the failure too is not its effect. Both are None without all scores.
+    The outcome is by the ``RULE`` ``no effect`` or ``worse``, or ``fell``; or else ``better`` or
+    ``not better`` than after the failure, with a share unless the failure took no score. A fall
+    that there was before the failure too is not its effect. Both are None without all scores.
     """
     if before.score is None or after.score is None or best.score is None:
         return None, None
-    loss = before.score - after.score
-    has_lost = loss > NO_EFFECT * abs(before.score)
+    loss, limit = before.score - after.score, NO_EFFECT * abs(before.score)
+    has_lost, falls = loss > limit, best.fell_at_step is not None
     if not has_lost and (after.fell_at_step is None or before.fell_at_step is not None):
-        return None, "no effect"
-    if best.fell_at_step is not None:
+        is_worse = before.score - best.score > limit or (falls and after.fell_at_step is None)
+        return None, "worse" if is_worse else "no effect"
+    if falls:
         return None, "fell"
     share = (best.score - after.score) / loss if has_lost else None
     return share, "better" if share is None or share > 0 else "not better"

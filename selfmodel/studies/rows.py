@@ -377,7 +377,11 @@ def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:
         raise InputError(f"{folder}: expected the folder of a study, got none: run the study first")
     rows = rows_in(folder, table or kind.table)
     if table is None:
-        rows = [{column: row.get(column) for column in kind.columns} for row in rows]
+        former = {new: old for old, new in FORMER.items()} if name == "suite" else {}
+        rows = [
+            {column: row.get(column, row.get(former.get(column, ""))) for column in kind.columns}
+            for row in rows
+        ]
     return sorted(rows, key=kind.order)
 
 

@@ -26,7 +26,7 @@ from selfmodel.errors import InputError, typed, unknown_name
 from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.files import read_file
+from selfmodel.files import path_of, read_file
 from selfmodel.logs.controllers import NPZ_FAILURES, read_arrays
 from selfmodel.logs.files import make_folder, refuse_existing, replace_file
 from selfmodel.logs.policies import Commanded, Observed, PolicyFile, policy_of
@@ -347,6 +347,7 @@ def evolve_policy(
             source.
     """
     training = Training(robot, settings, thread_count(threads))
+    folder = path_of(folder, "a folder")
     make_folder(folder)
     if (folder / STATE).exists():
         training.resume(folder / STATE)

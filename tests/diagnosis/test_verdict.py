@@ -152,8 +152,21 @@ def test_logs_of_a_healthy_and_of_a_damaged_robot_contradict_each_other(
     what, action = summary(found)
     dead = parse(DEAD, quadruped.anatomy).words
     assert f"contradict each other: no fault shows in 'first'; in 'last', {dead}." in what
-    assert "if the robot was healthy in 'first', give that with --healthy FILE" in action
+    assert "if the robot was healthy in 'first', name that with --healthy FILE" in action
     assert verdict_sentences(found).endswith("no hypothesis predicts all of them.")
+
+
+def test_a_log_of_another_fault_is_not_called_healthy(quadruped: Robot):
+    first, last = random_cpgs(quadruped, 2)[0], random_controllers(quadruped, 5)[4]
+    winds = (("wind=-16", first, "first"), ("wind=16", last, "last"))
+    trials = [trial(quadruped, text, driver, name=name) for text, driver, name in winds]
+    found = diagnosed(quadruped, trials, kinds=(KINDS["wind"], KINDS["motor"]))
+
+    assert found.verdict == "not judged"
+    what, action = summary(found)
+    assert "no fault" not in what
+    assert "--healthy" not in action
+    assert all(f"'{name}' alone" in action for name in ("first", "last"))
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.05])

@@ -74,6 +74,17 @@ def test_a_trial_that_oscillators_drove_replays_to_the_bit(quadruped: Robot, tmp
     assert replayed(path, truth, 2).identical
 
 
+@pytest.mark.parametrize("text", ["jam:front_left_knee=0.5", "encoder-offset:front_left_knee=0.3"])
+def test_a_hypothesis_that_moves_the_pose_or_an_encoder_begins_in_its_own_pose(
+    quadruped: Robot, tmp_path: Path, text: str
+):
+    path = logged(tmp_path, quadruped, "intact", random_cpgs(quadruped, 1)[0], 30)
+    found = replayed(path, text)
+
+    assert not found.from_log
+    assert found.first_divergence_step == 0
+
+
 @pytest.mark.parametrize("numeric", ["", OF_0_1], ids=["", "of version 0.1"])
 def test_a_trial_of_a_larger_network_replays_to_the_bit_with_its_neurons(
     quadruped: Robot, tmp_path: Path, numeric: str

@@ -20,7 +20,8 @@ def trial(score: float | None, fall: int | None = None) -> TrialResult:
         (trial(-1.0), trial(-3.0), trial(-1.0), 1.0, "better"),  # a cost
         (trial(2.0), trial(1.0), trial(1.9, 7), None, "fell"),
         (trial(2.0), trial(1.91), trial(2.5), None, "no effect"),
-        (trial(2.0), trial(2.2), trial(1.0, 7), None, "no effect"),  # to be regained
+        (trial(2.0), trial(2.2), trial(1.0), None, "worse"),  # by the repair
+        (trial(2.0), trial(2.2), trial(2.0, 7), None, "worse"),
         (trial(2.0, 5), trial(2.0, 5), trial(3.0), None, "no effect"),
         (trial(2.0), trial(2.2, 5), trial(1.5), None, "better"),  # it stands again
         (trial(2.0), trial(2.2, 5), trial(3.0, 6), None, "fell"),
