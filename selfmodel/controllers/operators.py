@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import expit
 
 from selfmodel.arrays import FloatArray
 
@@ -42,10 +43,6 @@ def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
 def _product(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix = arguments
     return [_matmul(rows, np.ascontiguousarray(matrix.T))]
-
-
-def _sigmoid(x: FloatArray) -> FloatArray:
-    return np.asarray((1 + np.tanh(x / 2)) / 2)  # does not overflow
 
 
 def _elu(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
@@ -190,8 +187,8 @@ def _lstm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
         hidden, kept = states
         gates = x + _matmul(hidden, own) + (bias + back)
         enter, leave, forget, new = np.split(gates, 4, axis=1)
-        kept = _sigmoid(forget) * kept + _sigmoid(enter) * np.tanh(new)
-        return [_sigmoid(leave) * np.tanh(kept), kept]
+        kept = expit(forget) * kept + expit(enter) * np.tanh(new)
+        return [expit(leave) * np.tanh(kept), kept]
 
     return _recurrent(arguments, attributes, 4, cell)
 
@@ -203,7 +200,7 @@ def _gru(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
         hidden, width = states[0], own.shape[1]
         end = 2 * width  # of the weights of its two gates
         gates = x[:, :end] + _matmul(hidden, own[:end]) + (bias + back)[:end]
-        update, reset = np.split(_sigmoid(gates), 2, axis=1)
+        update, reset = np.split(expit(gates), 2, axis=1)
         if attributes.get("linear_before_reset"):
             past = reset * (_matmul(hidden, own[end:]) + back[end:])
         else:
@@ -268,7 +265,7 @@ OPERATORS: Mapping[str, Operator] = {
     "Sin": _of(1, np.sin),
     "Cos": _of(1, np.cos),
     "Tanh": _of(1, np.tanh),
-    "Sigmoid": _of(1, _sigmoid),
+    "Sigmoid": _of(1, expit),
     "Relu": _of(1, lambda x: np.maximum(x, 0.0)),
     "Softplus": _of(1, lambda x: np.logaddexp(x, 0.0)),
     "Softsign": _of(1, lambda x: x / (1 + np.abs(x))),
