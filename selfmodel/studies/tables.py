@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.diagnosis.diagnosis import to_json
-from selfmodel.errors import InputError, typed
+from selfmodel.errors import InputError, counted, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
@@ -36,7 +36,7 @@ from selfmodel.studies.rows import (
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
 from selfmodel.studies.study import Row, grouped, shared_in
 from selfmodel.style import figure_style
-from selfmodel.tasks.suite_bodies import EPISODE
+from selfmodel.tasks.suite_bodies import DOMAINS, EPISODE, PREFIX
 
 TRIAL_COLUMNS = (
     *("robot", "case", "truth", "seed", "number", "stage", "hypothesis", "score", "predicted"),
@@ -270,17 +270,34 @@ def _legend(summaries: Sequence[Row]) -> str:
         if one["reason"]:
             failure = one["truth"] or f"case {one['case']}"
             lines.append(f"Not run: {one['robot']}, {failure}: {one['reason']}")
-    run = next((one for one in summaries if one["runs"]), None)
-    if run is None:
+    # Without the summaries of single faults, which have the runs of others.
+    ran = [one for one in summaries if one["runs"] and one["truth"]]
+    if not ran:
         return "\n".join(lines)
+    run = ran[0]
     text = (
         f"The score is {run['score']}, of trials of {run['control_steps']} control steps: medians "
         f"before and after the failure, and in the best trial since. {RULE} Otherwise, loss "
         f"regained is (best trial - after) / (before - after). "
     )
-    if most := next((one["return_most"] for one in summaries if one["return_most"]), None):
+    if most := next((one["return_most"] for one in ran if one["return_most"]), None):
         which = "as these trials" if most == EPISODE else f"of which these trials have {most:,}"
         text += f"An episode of dm_control has {EPISODE:,} rewards of up to 1, {which}. "
+    fell = []
+    for (robot,), own in grouped(ran, "robot").items():
+        if own[0]["return_before"] is not None and not own[0]["return_most"]:
+            text += f"The rewards of {robot} are speeds, m/s, whose sum has no largest value. "
+        if robot in DOMAINS:
+            text += f"{robot} is selfmodel's own robot; that of dm_control is {PREFIX}{robot}. "
+        known = [one for one in own if one["upright_before"] is not None]
+        runs = sum(one["runs"] for one in known)
+        if falls := runs - sum(one["upright_before"] for one in known):
+            fell.append(f"{falls} of {counted(runs, 'run')} of {robot}")
+    if fell:
+        text += (
+            f"The gait before the failure fell in {', '.join(fell)}: a larger budget "
+            f"(--repair-population, --repair-generations) or another --controller may keep it up. "
+        )
     return "\n".join([f"{text}Right has its 95 % interval, %.", *lines])
 
 

@@ -102,9 +102,30 @@ def test_the_table_of_bodies_says_score_steps_returns_falls_and_what_was_not_run
     assert second["return best trial"] == "40.000", "speeds have no largest sum"
     assert "The score is return, of trials of 200 control steps" in results.legend
     assert "1,000 rewards of up to 1, of which these trials have 199" in results.legend
+    assert "The rewards of quadruped are speeds, m/s, whose sum has no largest" in results.legend
+    assert "quadruped is selfmodel's own robot; that of dm_control is suite-quadruped." in (
+        results.legend
+    )
+    assert "gait before" not in results.legend, "no gait fell before the failure"
     assert results.legend.endswith("Not run: fish, case 1: it has no limb of two joints")
     assert results.tables[0].records["reason"].iloc[-1] == "it has no limb of two joints"
     assert {"results.csv", "trials.csv", "figures/bodies.png"} < results.files.keys()
+
+
+def test_the_table_of_bodies_says_which_gaits_fell_before_the_failure(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    fell, stood = {"upright_before": False}, {"upright_before": True}
+    rows = [body(0, **fell), body(1, **stood), body(0, case=2, truth="break:y", **fell)]
+    rows += [body(robot="b", **stood), body(robot="c", **fell), body(robot="d")]
+    tables = {None: rows, "trials": []}
+    monkeypatch.setattr(module, "study_rows", lambda _kind, _folder, table=None: tables[table])
+    legend = suite_results(Path("unused")).legend
+
+    assert "The gait before the failure fell in 2 of 3 runs of a, 1 of 1 run of c: a" in legend
+    assert "--repair-generations" in legend
+    assert "selfmodel's own robot" not in legend
+    assert "speeds" not in legend
 
 
 def test_a_fall_is_a_cross_in_the_figure_of_bodies():
