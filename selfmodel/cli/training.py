@@ -3,6 +3,7 @@
 from selfmodel.cli.commands import EvolvePolicy
 from selfmodel.cli.output import print_json, print_lines
 from selfmodel.cli.progress import display
+from selfmodel.recovery.result import SearchBegins
 from selfmodel.studies.training import POLICY, TrainingSettings, evolve_policy
 from selfmodel.tasks.suite_bodies import EPISODE
 
@@ -20,6 +21,7 @@ def evolve(options: EvolvePolicy) -> None:
         seed=options.seed,
     )
     with display() as show:
+        show(SearchBegins("policy"))
         try:
             training = evolve_policy(
                 *(options.robot, options.out, settings),

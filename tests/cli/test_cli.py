@@ -11,6 +11,7 @@ import pytest
 from selfmodel import cli
 from selfmodel.diagnosis.diagnosis import Verdict
 from selfmodel.errors import TrialError
+from selfmodel.evolution import Generation, GenerationCallback
 from selfmodel.files import file_digest
 from selfmodel.logs import read_log, save_controller
 from selfmodel.logs.results import read_result, versions
@@ -209,10 +210,15 @@ def test_an_interrupted_recovery_keeps_its_finished_trials(
 def test_an_interrupted_training_says_that_the_same_command_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(Training, "run", lambda *_: signal.raise_signal(signal.SIGINT))
+    def interrupted(_: Training, __: int, after: GenerationCallback) -> None:
+        after(Generation(1, 1, 2.5, 24, 6.0))
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Training, "run", interrupted)
     done = selfmodel("suite", "evolve", "suite-hopper-stand", "--out", "policy", cwd=tmp_path)
 
     assert done.returncode == 130
+    assert done.stderr.startswith("policy: 24 evaluations, best 2.5000, 4/s"), "with its stage"
     assert "finished generations are kept in policy; the same command continues" in done.stderr
 
 
