@@ -33,19 +33,19 @@ DISABLED = "disable"
 
 @cache
 def prepare_dm_control() -> None:
-    """Makes dm_control draw where there is no screen and no library was chosen, once.
+    """Makes dm_control draw where there is no screen and no library without one was chosen, once.
 
     It chooses a library as it is imported, one that needs a screen or, if a robot was loaded
     before, none.
 
     Raises:
-        WorkError: No library works.
+        WorkError: No library works, or not the chosen one.
     """
     has_screen = any(os.environ.get(screen) for screen in ("DISPLAY", "WAYLAND_DISPLAY"))
     wanted = os.environ.get(GL, "")
-    if wanted not in ("", DISABLED) or (has_screen and not wanted):
+    if wanted != DISABLED if has_screen else wanted in WITHOUT_SCREEN:
         return
-    os.environ[GL] = ""
+    os.environ[GL] = "" if wanted == DISABLED else wanted
     os.environ[GL] = "glfw" if has_screen else choose_gl("leave render_mode out")
     importlib.reload(importlib.import_module("dm_control._render"))
 

@@ -120,6 +120,15 @@ def test_egl_is_tried_before_osmesa_and_where_neither_is_packages_are_named(
             opengl.choose_gl(render.INSTEAD)
 
 
+def test_a_library_that_needs_a_screen_is_refused_without_one(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(screen, raising=False)
+    monkeypatch.setattr(opengl, "draws", lambda _: False)
+    with pytest.raises(WorkError, match=r"MUJOCO_GL=glfw: unset it, .* leave render_mode out"):
+        opengl.prepare_dm_control.__wrapped__()
+
+
 @pytest.mark.parametrize(
     ("text", "best"),
     [
