@@ -14,9 +14,12 @@ from selfmodel.diagnosis.choice import ChosenComparator
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import counted
 from selfmodel.evolution import Generation
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.progress import Progress, time_left, timed
+from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins, TrialScore
 from selfmodel.recovery.scores import DISPLACEMENT
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.studies.grid import CellEnds, GridBegins
 from selfmodel.trials.trial import Trial
@@ -50,17 +53,21 @@ def _bar(*columns: bars.ProgressColumn, transient: bool = False) -> Iterator[bar
 
 
 @contextmanager
-def display() -> Iterator[Callable[[Event], None]]:
-    """Yields a function that displays the events of a recovery or a diagnosis."""
+def display(robot: Robot | None = None) -> Iterator[Callable[[Event], None]]:
+    """Yields a function that displays the events of a recovery or a diagnosis.
+
+    With a robot, the falls of its trials are shown, by the best hypothesis so far.
+    """
     names = ("{task.description}", "{task.percentage:.0f} %", "{task.fields[detail]}")
     text, share, detail = map(bars.TextColumn, names)
     with _bar(text, bars.BarColumn(bar_width=None), share, detail, transient=True) as bar:
-        yield _Events(bar)
+        yield _Events(bar, robot)
 
 
 class _Events(Display):
-    def __init__(self, bar: bars.Progress | None) -> None:
+    def __init__(self, bar: bars.Progress | None, robot: Robot | None) -> None:
         super().__init__(bar)
+        self._robot, self._best = robot, INTACT
         self._search, self._stage = SearchBegins(""), timed(self._show)
         self._told = monotonic()
 
@@ -82,13 +89,24 @@ class _Events(Display):
             case Calibration():
                 self.print_lines(*_fit_lines(event))
             case Trial() | TrialScore():
-                self.print_lines(*_trial_lines(event))
+                self.print_lines(*self._trial_lines(event))
             case Diagnosis():
+                self._best = event.best
                 first, trials = event.ranked[0], counted(event.trials, "trial")
                 finite = math.isfinite(first.distance)
                 distance = f"distance {first.distance:.4f}" if finite else "diverged"
                 found = f"{first.hypothesis} ({distance}), {event.verdict}"
                 self.print_lines(f"diagnosis from {trials}: {found}")
+
+    def _trial_lines(self, event: Trial | TrialScore) -> list[str]:
+        """Returns the way and the fall of a trial; then its score, if the way is not all."""
+        if isinstance(event, TrialScore):
+            return [] if event.score is DISPLACEMENT and event.fall is None else [str(event)]
+        went, steps = event.displacement, counted(event.trajectory.steps, "step")
+        # A base that is fixed or not observed has no displacement.
+        way = f"{went:.3f} m forward" if went and math.isfinite(went) else steps
+        fall = fall_of(self._robot, self._best, event) if self._robot else None
+        return [f"trial {event.plan.name}: {way}{fall_text(fall)}"]
 
     def _show(self, now: Progress, detail: str = "") -> None:
         """Shows a stage, on one bar for all, or by a line now and then."""
@@ -103,16 +121,6 @@ class _Events(Display):
         elif left and monotonic() - self._told >= QUIET:
             self._told = monotonic()
             self.print_lines(str(now))
-
-
-def _trial_lines(event: Trial | TrialScore) -> list[str]:
-    """Returns the measured way of a trial; then its score and its fall, if the way is not all."""
-    if isinstance(event, Trial):
-        went, steps = event.displacement, counted(event.trajectory.steps, "step")
-        # A base that is fixed or not observed has no displacement.
-        way = f"{went:.3f} m forward" if went and math.isfinite(went) else steps
-        return [f"trial {event.plan.name}: {way}"]
-    return [] if event.score is DISPLACEMENT and event.fall is None else [str(event)]
 
 
 def _fit_lines(fit: Calibration) -> list[str]:

@@ -33,7 +33,7 @@ from selfmodel.studies.experiment import Experiment, choose_score, result_of, ru
 def recover(options: Recover) -> None:
     """Recover a robot from a failure: diagnose it from logged trials, evolve a controller."""
     experiment = experiment_of(options)
-    with display() as on_event:
+    with display(experiment.robot) as on_event:
         progress = RunProgress(
             experiment.folder,
             experiment.robot,

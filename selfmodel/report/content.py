@@ -18,7 +18,7 @@ from selfmodel.diagnosis.text import (
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.logs.results import RecoveryResult, Search
-from selfmodel.recovery.falls import fall_text
+from selfmodel.recovery.falls import fall_of, fall_text
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, score_label, value_text
 from selfmodel.report import charts
 from selfmodel.report.charts import Item, Report, Section
@@ -147,7 +147,10 @@ def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
                 title="Forward displacement of each trial, observed and predicted",
                 x_label="forward displacement, m",
                 names=("observed", "best hypothesis or self-model", "runner-up"),
-                groups=tuple(charts.Group(one.name, _displacements(one)) for one in shots),
+                groups=tuple(
+                    charts.Group(one.name, _displacements(one), _fall(subject, one))
+                    for one in shots
+                ),
             )
         )
     items.append(_trials_table(subject, shots))
@@ -161,8 +164,9 @@ def _score_chart(result: RecoveryResult) -> list[Item]:
         return []
     groups = [
         charts.Group(
-            one.name + fall_text(one.fell_at_step),
+            one.name,
             tuple(math.nan if it is None else it for it in (one.score, one.predicted_score)),
+            (fall_text(one.fell_at_step)[2:],),
         )
         for one in trials
     ]
@@ -174,6 +178,11 @@ def _score_chart(result: RecoveryResult) -> list[Item]:
             groups=tuple(groups),
         )
     ]
+
+
+def _fall(subject: Subject, shot: Shot) -> tuple[str]:
+    """Returns the note of the bar of an observed trial: the fall by the best hypothesis."""
+    return (fall_text(fall_of(subject.robot, shot.rollouts[0].hypothesis, shot.trial))[2:],)
 
 
 def _displacements(shot: Shot) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ import io
 import re
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from selfmodel.cli import progress
 from selfmodel.evolution import Generation
 from selfmodel.progress import Progress
 from selfmodel.recovery.result import Event, SearchBegins
+from selfmodel.robot.robot import Robot
 
 LOG = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials" / "00-before.mcap"
 """A trial of a healthy robot."""
@@ -57,6 +59,21 @@ def test_in_a_file_a_stage_is_a_line_now_and_then_with_the_time_left(
         "diagnostic EA: 900 evaluations, best -0.1250, 30/s",
         "refinement: 33%, about 4 min 00 s left",
     ]
+
+
+def test_the_line_of_a_trial_has_its_way_and_its_fall(
+    quadruped: Robot, capsys: pytest.CaptureFixture[str]
+):
+    trial = selfmodel.read_log(LOG).trial
+    logged = trial.trajectory
+    turned = dict(logged.signals, base_orientation=logged["base_orientation"].copy())
+    turned["base_orientation"][30:] = [0.0, 1.0, 0.0, 0.0]
+    fell = replace(trial, trajectory=replace(logged, signals=turned))
+    with progress.display(quadruped) as on_event:
+        on_event(trial)
+        on_event(fell)
+    went = f"trial 00-before: {trial.displacement:.3f} m forward"
+    assert capsys.readouterr().err.splitlines() == [went, f"{went}, fell at step 30"]
 
 
 def test_on_a_terminal_a_stage_is_a_bar_with_the_time_left(

@@ -59,11 +59,28 @@ def test_a_score_other_than_the_displacement_has_its_chart_with_falls_and_its_li
     expected = [(one.score, one.predicted_score) for one in trials]
     np.testing.assert_equal(values, np.array(expected, dtype=float))
     assert chart.x_label == "return (of 99)"
-    assert chart.groups[0].label == "00-before, fell at step 7"
+    assert (chart.groups[0].label, chart.groups[0].notes) == ("00-before", ("fell at step 7",))
     assert displacement.x_label == "forward displacement, m"
     said = headline(scored)
     assert f"scored {score.before:.3f} of 99 (return) before the failure" in said
     assert said.endswith("at best in 1 trial since, and fell, which is no recovery.")
+
+
+def test_the_chart_of_displacements_marks_the_trials_that_fell(
+    subject: Subject, shots: tuple[Shot, ...]
+):
+    first, second, *others = shots
+    logged = first.trial.trajectory
+    turned = dict(logged.signals, base_orientation=logged["base_orientation"].copy())
+    turned["base_orientation"][30:] = [0.0, 1.0, 0.0, 0.0]
+    trajectory = dataclasses.replace(logged, signals=turned)
+    fell = dataclasses.replace(first, trial=dataclasses.replace(first.trial, trajectory=trajectory))
+    (chart,) = (
+        one
+        for one in trials_section(subject, (fell, second, *others)).items
+        if one.title.startswith("Forward displacement")
+    )
+    assert [one.notes for one in chart.groups[:2]] == [("fell at step 30",), ("",)]
 
 
 def test_logs_have_their_number_and_the_summary_and_no_truth(subject: Subject):
