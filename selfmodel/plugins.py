@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import entry_points
-from inspect import signature
+from inspect import isfunction, signature
 from types import MappingProxyType
 from typing import Any, cast
 
@@ -390,9 +390,12 @@ def _function(parameter: str, source: object) -> Callable[..., Any]:
     try:
         signature(found).bind(*registry.takes)  # type: ignore[arg-type]  # it raises TypeError
     except (TypeError, ValueError) as error:
+        got = f"the function {found.__qualname__}" if isfunction(found) else f"{found!r:.200}"
+        policy = '; a policy is given by a file NAME.toml with network = "package.module:function"'
         raise InputError(
-            f"{source!r:.200} is no {registry.what}: expected a function of the arguments "
-            f"{', '.join(registry.takes)}, got {found!r:.200} ({error})"
+            f"{repr(source) if isinstance(source, str) else got} is no {registry.what}: expected a "
+            f"function of the arguments {', '.join(registry.takes)}, got {got} ({error})"
+            f"{policy if parameter == 'controller' else ''}"
         ) from error
     return cast("Callable[..., Any]", found)
 

@@ -387,6 +387,10 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda p: evolved(p, design="calls_plugins:Dtw"),
         "no kind of controller: expected a function of the arguments robot, hidden, got .*Dtw",
     ),
+    "a policy as a design": (
+        lambda p: evolved(p, design="calls_made:choice"),
+        "'calls_made:choice' is no kind .*, got the function choice .*; a policy .* network = ",
+    ),
     "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
     "a trajectory to follow in an ablation": (
         lambda _: planned(score="tracking"),
