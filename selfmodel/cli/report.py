@@ -21,6 +21,11 @@ from selfmodel.trials.trial import trial_names
 
 def report(options: MakeReport) -> None:
     """Write a report of a run, of logs or of a campaign: one HTML file, which needs no network."""
+    for path in options.sources:
+        if not path.exists() or path.suffix in (".csv", ".json", ".jsonl", ".toml"):
+            got = f"a file: give {path.parent}" if path.exists() else "no such file or folder"
+            expected = "expected logs, NAME.mcap, or the folder of a run or of a study"
+            raise InputError(f"{path}: {expected}, got {got}")
     folder = options.sources[0] if options.sources[0].is_dir() else None
     if folder is not None and len(options.sources) > 1:
         raise InputError(

@@ -49,6 +49,17 @@ def test_logs_are_diagnosed_and_reported_and_a_diagnosis_made_before_gives_the_s
     assert "diagnostic EA" not in again.stderr
 
 
+@pytest.mark.parametrize(
+    ("given", "got"),
+    [("nofolder", "got no such file or folder"), ("study/rows.csv", "got a file: give study")],
+)
+def test_what_is_neither_logs_nor_a_folder_is_refused(tmp_path: Path, given: str, got: str):
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "rows.csv").write_text("case\n1\n", encoding="utf-8")
+    said = f"{given}: expected logs, NAME.mcap, or the folder of a run or of a study, {got}"
+    refused("report", given, said=said, cwd=tmp_path)
+
+
 def test_a_diagnosis_of_other_logs_is_refused(logs: Path, diagnosed: Path):
     (logs / "moved").mkdir()
     shutil.copy(logs / "before.mcap", logs / "moved" / "after.mcap")

@@ -91,7 +91,7 @@ def test_time_steps_and_episodes_are_the_suites(domain: str, task: str):
         ("suite-walker-fly", "suite-walker-"),
         ("suite-walker", "suite-walker-"),
         ("walker", "suite-walker-"),
-        ("suite-walke-run", "suite-DOMAIN-TASK"),
+        ("suite-walke-run", "did you mean suite-walker-run"),
         ("hexapd", "did you mean hexapod"),
     ],
 )
