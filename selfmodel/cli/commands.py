@@ -86,7 +86,7 @@ class Study(Computed):
     @property
     def settings(self) -> Settings:
         """The parameters of each recovery."""
-        return settings_of(self, self.steps or Settings.steps)
+        return settings_of(self)
 
     @property
     def every_seed(self) -> range:
@@ -144,7 +144,7 @@ class Recover(Robot, Searched):
     max_joint_torque: float | None = None
     max_self_collision: float | None = None
     seed: int = 0
-    steps: int = Settings.steps
+    steps: int | None = None
     trials: int = Settings.trials
     population: int = Settings.population
     generations: int = Settings.generations
@@ -411,8 +411,9 @@ class Check(Command):
     self_model: str | None = None
 
 
-def settings_of(options: Study | Recover, steps: int) -> Settings:
-    """Returns the parameters of a recovery in trials of that many steps."""
+def settings_of(options: Study | Recover, score: str | None = None) -> Settings:
+    """Returns the parameters of a recovery; with the score ``return``, of trials of an episode."""
+    steps = options.steps or Settings.steps + (score == "return")  # the last has no reward
     small = Settings(steps=steps, trials=options.trials, generations=options.generations)
     if isinstance(options, Searched):
         small = replace(small, max_simulated_steps=options.max_simulated_steps)

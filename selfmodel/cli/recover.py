@@ -74,11 +74,13 @@ def experiment_of(options: Recover) -> Experiment:
     gaits = arguments.repertoire_of(options.repertoire, robot, design)
     plugins.repair(repair, options.search, gaits)
     plugins.next_trial(options.next_trial)
+    fitness = options.score or plugins.DEFAULT_SCORES[repair]
+    settings = settings_of(options, fitness)
     score = choose_score(
-        options.score or plugins.DEFAULT_SCORES[repair],
+        fitness,
         entry,
         design,
-        steps=options.steps,
+        steps=settings.steps,
         seed=options.seed,
         reference=options.reference,
         gait=gait,
@@ -92,7 +94,7 @@ def experiment_of(options: Recover) -> Experiment:
             f"controller, a {design.name} with random weights: the {score.score.name} before the "
             f"failure is 0, except for a reality gap"
         )
-    now, settings = datetime.now().astimezone(), settings_of(options, options.steps)
+    now = datetime.now().astimezone()
     return Experiment(
         robot=robot,
         case=options.case,

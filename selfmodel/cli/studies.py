@@ -23,8 +23,6 @@ from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnosis import to_json
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.registry import TABLE_ONE
-from selfmodel.plugins import RETURN
-from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import bodies, paper_page, plans, tables as formats
 from selfmodel.studies.definition import read_study
@@ -32,7 +30,6 @@ from selfmodel.studies.grid import CellEnds, dask_executor
 from selfmodel.studies.study import Study
 from selfmodel.style import figure_style, read_style
 from selfmodel.tasks import ROBOTS
-from selfmodel.tasks.suite_bodies import EPISODE
 
 RESULTS: Mapping[str, Callable[[Path], formats.Results]] = {
     "ablate": formats.ablation_results,
@@ -79,9 +76,7 @@ def run_suite(options: RunSuite) -> None:
         else inputs.texts("--tasks", options.tasks, bodies.tasks_of(names))
     )
     chosen = bodies.bodies_of(names, wanted)
-    # The last sample of a trial has no reward.
-    length = options.steps or (EPISODE + 1 if options.score == RETURN else Settings.steps)
-    settings = settings_of(options, length)
+    settings = settings_of(options, options.score)
     study = plans.suite(
         options.out,
         bodies=chosen,

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from selfmodel.cli.commands import Recover
+from selfmodel.cli.recover import experiment_of
 from selfmodel.logs import read_log
 from selfmodel.logs.journal import is_calibrated
 from selfmodel.logs.repertoires import save_repertoire
@@ -150,6 +152,15 @@ def test_a_recovery_begins_from_a_repertoire(tmp_path: Path, folder: Path):
     assert [one["repertoire"] is None for one in found] == [False, True]
     assert found[0]["repertoire"]["robot"] == "quadruped"
     assert recovered[0] != recovered[1]
+
+
+@pytest.mark.parametrize(
+    ("given", "steps"),
+    [({"score": "return"}, 1001), ({"score": "return", "steps": 80}, 80), ({}, 1000)],
+)
+def test_a_trial_of_a_return_has_an_episode_and_the_last_sample(given: dict, steps: int):
+    experiment = experiment_of(Recover(robot="quadruped", case=1, **given))
+    assert experiment.settings.steps == steps
 
 
 @pytest.mark.search
