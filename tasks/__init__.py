@@ -60,7 +60,7 @@ def entry(name: str) -> Entry:
     bodies = [suite_bodies.name(*body) for body in suite_bodies.BODIES]
     if name in bodies:
         return suite_bodies.entry(domain, task)
-    if domain in suite_bodies.DOMAINS:
+    if domain in suite_bodies.DOMAINS or name.startswith(suite_bodies.PREFIX):
         raise unknown_name("robot", name, bodies)
     raise unknown_name("robot", name, (*ROBOTS, "suite-DOMAIN-TASK"))
 

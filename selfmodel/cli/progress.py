@@ -54,10 +54,7 @@ def _bar(*columns: bars.ProgressColumn, transient: bool = False) -> Iterator[bar
 
 @contextmanager
 def display(robot: Robot | None = None) -> Iterator[Callable[[Event], None]]:
-    """Yields a function that displays the events of a recovery or a diagnosis.
-
-    With a robot, the falls of its trials are shown, by the best hypothesis so far.
-    """
+    """Yields a function that displays the events of a diagnosis, or of a recovery of a robot."""
     names = ("{task.description}", "{task.percentage:.0f} %", "{task.fields[detail]}")
     text, share, detail = map(bars.TextColumn, names)
     with _bar(text, bars.BarColumn(bar_width=None), share, detail, transient=True) as bar:

@@ -25,6 +25,7 @@ from selfmodel.report.charts import Item, Report, Section
 from selfmodel.report.evidence import residual_section, separation_section
 from selfmodel.report.scene import Motion, Shot, scene_of
 from selfmodel.report.subject import Subject
+from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
 from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.trial import Trial
@@ -147,10 +148,7 @@ def trials_section(subject: Subject, shots: Sequence[Shot]) -> Section:
                 title="Forward displacement of each trial, observed and predicted",
                 x_label="forward displacement, m",
                 names=("observed", "best hypothesis or self-model", "runner-up"),
-                groups=tuple(
-                    charts.Group(one.name, _displacements(one), _fall(subject, one))
-                    for one in shots
-                ),
+                groups=tuple(_displacements(subject.robot, one) for one in shots),
             )
         )
     items.append(_trials_table(subject, shots))
@@ -180,14 +178,11 @@ def _score_chart(result: RecoveryResult) -> list[Item]:
     ]
 
 
-def _fall(subject: Subject, shot: Shot) -> tuple[str]:
-    """Returns the note of the bar of an observed trial: the fall by the best hypothesis."""
-    return (fall_text(fall_of(subject.robot, shot.rollouts[0].hypothesis, shot.trial))[2:],)
-
-
-def _displacements(shot: Shot) -> tuple[float, ...]:
-    predicted = [rollout.displacement for rollout in shot.rollouts]
-    return (shot.trial.displacement, *(*predicted, math.nan)[:2])
+def _displacements(robot: Robot, shot: Shot) -> charts.Group:
+    """Returns the bars of a trial, the first with its fall by the best hypothesis."""
+    ways = [shot.trial.displacement, *(one.displacement for one in shot.rollouts), math.nan]
+    fall = fall_of(robot, shot.rollouts[0].hypothesis, shot.trial)
+    return charts.Group(shot.name, tuple(ways[:3]), (fall_text(fall)[2:],))
 
 
 def _trials_table(subject: Subject, shots: Sequence[Shot]) -> charts.Table:

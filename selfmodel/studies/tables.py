@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.diagnosis.diagnosis import to_json
-from selfmodel.errors import InputError, counted, typed
+from selfmodel.errors import InputError, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
 from selfmodel.plugins import RETURN, check_known
@@ -270,15 +270,13 @@ def _legend(summaries: Sequence[Row]) -> str:
         if one["reason"]:
             failure = one["truth"] or f"case {one['case']}"
             lines.append(f"Not run: {one['robot']}, {failure}: {one['reason']}")
-    # Without the summaries of single faults, which have the runs of others.
-    ran = [one for one in summaries if one["runs"] and one["truth"]]
+    ran = [one for one in summaries if one["runs"] and one["truth"]]  # not those of several faults
     if not ran:
         return "\n".join(lines)
-    run = ran[0]
     text = (
-        f"The score is {run['score']}, of trials of {run['control_steps']} control steps: medians "
-        f"before and after the failure, and in the best trial since. {RULE} Otherwise, loss "
-        f"regained is (best trial - after) / (before - after). "
+        f"The score is {ran[0]['score']}, of trials of {ran[0]['control_steps']} control steps: "
+        f"medians before and after the failure, and in the best trial since. {RULE} Otherwise, "
+        f"loss regained is (best trial - after) / (before - after). "
     )
     if most := next((one["return_most"] for one in ran if one["return_most"]), None):
         which = "as these trials" if most == EPISODE else f"of which these trials have {most:,}"
@@ -289,15 +287,12 @@ def _legend(summaries: Sequence[Row]) -> str:
             text += f"The rewards of {robot} are speeds, m/s, whose sum has no largest value. "
         if robot in DOMAINS:
             text += f"{robot} is selfmodel's own robot; that of dm_control is {PREFIX}{robot}. "
-        known = [one for one in own if one["upright_before"] is not None]
-        runs = sum(one["runs"] for one in known)
-        if falls := runs - sum(one["upright_before"] for one in known):
-            fell.append(f"{falls} of {counted(runs, 'run')} of {robot}")
+        stood = [(one["upright_before"], one["runs"]) for one in own]
+        if falls := sum(runs - up for up, runs in stood if up is not None):
+            fell.append(f"{falls} of {sum(runs for _, runs in stood)} runs of {robot}")
     if fell:
-        text += (
-            f"The gait before the failure fell in {', '.join(fell)}: a larger budget "
-            f"(--repair-population, --repair-generations) or another --controller may keep it up. "
-        )
+        text += f"The gait before the failure fell in {', '.join(fell)}: a larger budget "
+        text += "(--repair-generations) or another --controller may keep it up. "
     return "\n".join([f"{text}Right has its 95 % interval, %.", *lines])
 
 

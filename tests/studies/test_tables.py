@@ -122,7 +122,7 @@ def test_the_table_of_bodies_says_which_gaits_fell_before_the_failure(
     monkeypatch.setattr(module, "study_rows", lambda _kind, _folder, table=None: tables[table])
     legend = suite_results(Path("unused")).legend
 
-    assert "The gait before the failure fell in 2 of 3 runs of a, 1 of 1 run of c: a" in legend
+    assert "The gait before the failure fell in 2 of 3 runs of a, 1 of 1 runs of c: a" in legend
     assert "--repair-generations" in legend
     assert "selfmodel's own robot" not in legend
     assert "speeds" not in legend
