@@ -49,8 +49,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#3
 Source: M. Okabe and K. Ito, *Color Universal Design* (2008).
 """
 
-MARKERS = "osD^v<P*"
-"""Markers of methods, one more than colours, so that no pair recurs soon."""
+MARKERS, LINES = "osD^v<P*", ("-", "--", ":", "-.")
+"""Markers and lines of methods; both change when the colours recur."""
 
 Style = dict[str, Any]
 """Arguments of matplotlib."""
@@ -130,10 +130,16 @@ def files_of(name: str, figure: Figure) -> dict[str, bytes]:
 
 
 @figure_style()
-def look(number: int) -> Style:
-    """Returns colour and marker of a method by its number, as arguments of matplotlib."""
+def look(number: int, variant: int = 0, of: int = 1) -> Style:
+    """Returns colour, marker and line of a method, one of some, as arguments of matplotlib.
+
+    A variant of a method has its colour. No two of eight times as many as the colours look alike.
+    """
     colours = mpl.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
-    return {"color": colours[number % len(colours)], "marker": MARKERS[number % len(MARKERS)]}
+    turn, place = divmod(number, len(colours))
+    turn += variant * math.ceil(of / len(colours))
+    marker, line = MARKERS[(place + turn) % len(MARKERS)], LINES[turn % len(LINES)]
+    return {"color": colours[place], "marker": marker, "linestyle": line}
 
 
 def errorbars(axes: Axes, points: Any, number: int, **style: Any) -> None:  # noqa: ANN401  # of matplotlib
@@ -174,15 +180,23 @@ def panels_of(
 
 
 def legend_below(figure: Figure, columns: int) -> None:
-    """Puts a legend of the labels of all panels below them."""
+    """Puts a legend of the labels of all panels below them, for which the figure grows."""
     handles = {
-        label: handle
+        folded(label): handle
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    if (width := _width.get()) is not None:
-        columns = max(1, min(columns, int(width / (0.6 + _inches(max(handles, key=len))))))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
+    while True:
+        place: Style = {"loc": "outside lower center", "handlelength": 3, "ncols": columns}
+        legend = figure.legend(handles.values(), handles.keys(), **place)
+        size = legend.get_window_extent()
+        if columns == 1 or size.width <= figure.bbox.width:
+            break
+        legend.remove()
+        columns -= 1
+    # The margins of figures have room for two lines.
+    more = size.height / figure.dpi - 4 * text_size(1) / 72
+    figure.set_figheight(figure.get_figheight() + max(0, more))
 
 
 def given_width() -> float | None:

@@ -61,11 +61,20 @@ def of_ablation(rows: Sequence[Row], scores: Sequence[Row]) -> dict[str, bytes]:
 def by_gap(scores: Sequence[Row]) -> Figure:
     """Returns right diagnoses by gap: a panel per robot and trial count, a line per method.
 
-    The legend has the number n of diagnoses per point of each line.
+    Methods of one comparator, which differ in their search, have one colour. The legend has the
+    number n of diagnoses per point of each line.
     """
     robots, gaps, methods = (
         sorted({score[name] for score in scores}) for name in ("robot", "gap", "method")
     )
+    searches: dict[str, list[str]] = {}
+    for name, comparator in sorted({(score["method"], score["comparator"]) for score in scores}):
+        searches.setdefault(comparator, []).append(name)
+    looks = {
+        name: look(number, variant, len(searches))
+        for number, names in enumerate(searches.values())
+        for variant, name in enumerate(names)
+    }
     ends = _first_and_last(scores)
     counts = len(robots) * len(ends), len(ends)
     figure, panels = panels_of(
@@ -84,13 +93,14 @@ def by_gap(scores: Sequence[Row]) -> Figure:
             ]
             if points:
                 label = f"{name} ({counts_text(one['runs'] for one in own)})"
-                errorbars(axes, points, number, label=label)
+                errorbars(axes, points, number, label=label, **looks[name])
         axes.set(title=f"{robot}, {counted(trials, 'trial')}", ylim=(-0.03, 1.03), xticks=gaps)
         axes.grid(axis="y")
     for axes in panels:
         if (place := axes.get_subplotspec()) and place.is_last_row():
             axes.set_xlabel("reality gap")
-    figure.supylabel("right diagnoses (95 % interval)")
+        if place and place.is_first_col():
+            axes.set_ylabel("right diagnoses\n(95 % interval)")
     legend_below(figure, columns=min(2, len(methods)))
     return figure
 

@@ -216,6 +216,40 @@ def test_the_figures_of_an_ablation_have_the_numbers_of_diagnoses_and_one_look_a
     assert hexapod == quadruped[:1] != quadruped[1:]
 
 
+@pytest.mark.parametrize("width", [3.5, None])
+def test_twelve_methods_differ_in_look_and_their_legend_takes_no_height_from_the_axes(
+    tmp_path: Path, width: float | None
+):
+    (style := tmp_path / "own.mplstyle").write_text(
+        "axes.prop_cycle: cycler('color', ['red', 'blue', 'green'])\n"
+        + (f"figure.figsize: {width}, 3\nfont.size: 8\n" if width else "")
+    )
+    names = ("forward-displacement", "segment-prediction", "sensor-history", "dtw")
+    rows = [
+        diagnosis(name, diagnostic_search=search, gap=gap)
+        for name, search, gap in itertools.product(
+            names, ("ea", "stepwise", "ea+stepwise"), (0, 0.1)
+        )
+    ]
+    heights = {}
+    with figure_style(style):
+        for few in (True, False):
+            own = [r for r in rows if r["comparator"] == "dtw" or not few]
+            figure = figures.by_gap(ablation_scores(own))
+            figure.draw_without_rendering()
+            heights[few] = figure.axes[0].get_window_extent().height
+    legend = figure.legends[0].get_window_extent()
+    lines = [bar[0] for bar in figure.axes[0].containers]
+
+    assert heights[False] > 0.9 * heights[True]
+    assert legend.x0 >= 0
+    assert legend.x1 <= figure.bbox.width
+    assert legend.y1 < figure.axes[0].get_window_extent().y0
+    assert len({(line.get_color(), line.get_marker()) for line in lines}) == 12
+    assert lines[0].get_linestyle() != lines[1].get_linestyle()
+    assert len({line.get_color() for line in lines[:3]}) == 1
+
+
 def test_a_pair_of_methods_has_its_difference_its_runs_and_a_filled_marker_if_it_is_better():
     rows = [diagnosis(n, seed=seed, correct=n == "a") for n in "a$^{" for seed in range(12)]
     found = compare(outcomes_of("ablate", rows))
