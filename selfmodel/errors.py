@@ -212,6 +212,11 @@ def listed(names: Sequence[str], most: int = 200) -> str:
     return (", ".join(names[:most]) or "none") + more
 
 
+def joined(names: Sequence[str]) -> str:
+    """Returns names as part of a sentence: ea, ea+stepwise and stepwise."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
 def counted(number: float, noun: str) -> str:
     """Returns a number and its noun in the singular or plural.
 

@@ -186,14 +186,13 @@ def legend_below(figure: Figure, columns: int) -> None:
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    while True:
-        place: Style = {"loc": "outside lower center", "handlelength": 3, "ncols": columns}
+    for ncols in range(columns, 0, -1):
+        place: Style = {"loc": "outside lower center", "handlelength": 3, "ncols": ncols}
         legend = figure.legend(handles.values(), handles.keys(), **place)
         size = legend.get_window_extent()
-        if columns == 1 or size.width <= figure.bbox.width:
+        if ncols == 1 or size.width <= figure.bbox.width:
             break
         legend.remove()
-        columns -= 1
     # The margins of figures have room for two lines.
     more = size.height / figure.dpi - 4 * text_size(1) / 72
     figure.set_figheight(figure.get_figheight() + max(0, more))

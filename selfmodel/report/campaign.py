@@ -20,8 +20,9 @@ from selfmodel.files import check_regular, encodable, read_file
 from selfmodel.logs.results import parse_json
 from selfmodel.report.charts import Cell, Picture, Report, Section, Table
 from selfmodel.report.study import CORRECT, compared, methods_in, recoveries, shares
-from selfmodel.studies.rows import kind_of, load
+from selfmodel.studies.rows import LoadedStudy, ablation_notes, kind_of, load
 from selfmodel.studies.statistics import proportion
+from selfmodel.studies.study import shared_in
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 """Media types of figures; an SVG file is preferred to a PNG file of the same name."""
@@ -60,10 +61,15 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
         )
     every = {**other_lists(folder), **tables}
     shown = tuple(Table.of(encodable(name), records) for name, records in every.items())
-    headline, verdict, found = _findings(folder, tables)
+    names = (name for name, one in tables.items() if kind_of({key for row in one for key in row}))
+    study = load(folder / name) if (name := next(names, "")) else None
+    notes: tuple[str, ...] = ()
+    if study is not None and study.kind == "ablate":
+        notes = ablation_notes(to_json(study.rows.to_dict("records")), shared_in(folder))
+    headline, verdict, found = _findings(study, tables)
     sections = [
         *found,
-        Section("tables", "Tables", ("A heading sorts its table by that column.",), shown),
+        Section("tables", "Tables", ("A heading sorts its table by that column.", *notes), shown),
         _figures(folder, most_figures),
     ]
     counts = ", ".join(
@@ -72,19 +78,17 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     return Report(
         title=f"campaign: {encodable(folder.resolve().name)}",
         headline=headline or f"The campaign has {counts}.",
-        verdict=(*verdict, f"Tables: {counts}.") if headline else (),
+        verdict=(*verdict, *notes[1:], f"Tables: {counts}.") if headline else (),
         sections=tuple(section for section in sections if section is not None),
     )
 
 
 def _findings(
-    folder: Path, tables: Mapping[str, Sequence[Record]]
+    study: LoadedStudy | None, tables: Mapping[str, Sequence[Record]]
 ) -> tuple[str, tuple[str, ...], list[Section | None]]:
     """Returns headline, further sentences and sections of what the tables of a campaign show."""
     judged = [[row for row in one if isinstance(row.get(CORRECT), bool)] for one in tables.values()]
     rows = next(filter(None, judged), [])
-    names = (name for name, one in tables.items() if kind_of({key for row in one for key in row}))
-    study = load(folder / name) if (name := next(names, "")) else None
     if study is not None and study.kind == "suite":
         headline, sections = recoveries(to_json(study.rows.to_dict("records")))
         return headline, (), [*sections, shares(rows, by_method=True)]

@@ -6,7 +6,7 @@ from statistics import median
 
 import pandas as pd
 
-from selfmodel.errors import counted, listed
+from selfmodel.errors import counted, joined
 from selfmodel.report.charts import BarChart, Cell, Estimate, Group, IntervalChart, Section, Table
 from selfmodel.studies.comparisons import p_text
 from selfmodel.studies.recoveries import ENDS, RULE
@@ -21,8 +21,8 @@ MINUS = "\N{MINUS SIGN}"
 
 P = (
     "A difference is of the n runs that both methods have, with its 95 % interval over seeds; p is "
-    "the larger of a test over runs and one over seeds, corrected for the pairs of a chart. A "
-    "filled point is decided, by a p below 0.05; fewer than four seeds decide nothing."
+    "the larger of a test over runs and one over seeds, corrected for all pairs of its "
+    "methods. A filled point is decided, by a p below 0.05; fewer than four seeds decide nothing."
 )
 
 
@@ -35,10 +35,16 @@ def compared(study: LoadedStudy) -> tuple[str, tuple[str, ...], list[Section]]:
         f"{counted(len(pairs), 'paired comparison')} {'is' if decided == 1 else 'are'} decided."
     )
     best = [_best(table, own, pairs) for table, own in means.groupby("table", sort=False)]
-    charts = [_differences(*one) for one in pairs.groupby("table", sort=False)]
+    near = _nearest(pairs, study)
+    items: list[IntervalChart | Table] = []
+    items += [_differences(*one) for one in pairs[near].groupby("table", sort=False)]
+    if not near.all():
+        records = pairs.assign(table=pairs["table"].map(", ".join)).to_dict("records")
+        title = "All pairs; a chart has those that differ in comparator or search alone"
+        items.append(Table.of(title, records))
     text = (P, *(f"Warning: {one}." for one in study.warnings()))
     sections = [
-        Section("comparisons", "Paired comparisons", text, tuple(charts)),
+        Section("comparisons", "Paired comparisons", text, tuple(items)),
         Section(
             "methods",
             "Methods",
@@ -49,11 +55,22 @@ def compared(study: LoadedStudy) -> tuple[str, tuple[str, ...], list[Section]]:
     return headline, tuple(best), sections
 
 
+def _nearest(pairs: pd.DataFrame, study: LoadedStudy) -> pd.Series:
+    """Returns whether pairs differ in comparator or search alone; all, where none does."""
+    rows = study.rows.to_dict("records")
+    parts = {
+        name: {str(row.get("comparator")), str(row.get("diagnostic_search"))}
+        for name, row in zip(methods_in(rows), rows, strict=True)
+    }
+    near = [bool(parts[row.first] & parts[row.second]) for row in pairs.itertuples()]
+    return pd.Series(near if any(near) else True, index=pairs.index)
+
+
 def _best(table: tuple[str, ...], means: pd.DataFrame, pairs: pd.DataFrame) -> str:
     first = means.sort_values("mean", ascending=False, kind="stable").iloc[0]
     equal = means["method"][means["mean"] == first["mean"]]
     if len(equal) > 1:
-        return f"{', '.join(table)}: {listed([*equal])} have the largest mean, {first['mean']:.3g}."
+        return f"{', '.join(table)}: {joined([*equal])} have the largest mean, {first['mean']:.3g}."
     better = int(((pairs["table"] == table) & (pairs["better"] == first["method"])).sum())
     return (
         f"{', '.join(table)}: {first['method']} has the largest mean, {first['mean']:.3g}, and is "

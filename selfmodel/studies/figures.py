@@ -67,13 +67,11 @@ def by_gap(scores: Sequence[Row]) -> Figure:
     robots, gaps, methods = (
         sorted({score[name] for score in scores}) for name in ("robot", "gap", "method")
     )
-    searches: dict[str, list[str]] = {}
-    for name, comparator in sorted({(score["method"], score["comparator"]) for score in scores}):
-        searches.setdefault(comparator, []).append(name)
+    comparators = grouped(scores, "comparator").values()
     looks = {
-        name: look(number, variant, len(searches))
-        for number, names in enumerate(searches.values())
-        for variant, name in enumerate(names)
+        name: look(number, variant, len(comparators))
+        for number, own in enumerate(comparators)
+        for variant, name in enumerate(_distinct(own, "method"))
     }
     ends = _first_and_last(scores)
     counts = len(robots) * len(ends), len(ends)

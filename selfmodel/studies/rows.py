@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.comparators import FORWARD_DISPLACEMENT
-from selfmodel.errors import InputError, counted
+from selfmodel.errors import InputError, counted, joined
 from selfmodel.files import path_of, read_file
 from selfmodel.plugins import RETURN
 from selfmodel.recovery.scores import score_label
@@ -353,7 +353,7 @@ def methods_of(rows: Sequence[Row]) -> list[str]:
 
     A method is a comparator, by the name of its object, which a row of a newer study has. With two
     objects of one name, it is that by which they were given, ``package.module:object``; with
-    several searches of the diagnoses, the search is added: ``segment-prediction, ea``.
+    several searches of the diagnoses, the search is added: ``segment-prediction with ea``.
     """
     named = {row["comparator"]: row.get("comparator_name") for row in rows}
     names = {given: name if isinstance(name, str) else given for given, name in named.items()}
@@ -363,8 +363,22 @@ def methods_of(rows: Sequence[Row]) -> list[str]:
     for row in rows:
         given = row["comparator"]
         name = names[given] if shown.count(names[given]) == 1 else given
-        methods.append(f"{name}, {row['diagnostic_search']}" if len(searches) > 1 else name)
+        methods.append(f"{name} with {row['diagnostic_search']}" if len(searches) > 1 else name)
     return methods
+
+
+def ablation_notes(rows: Sequence[Row], shared: Mapping[str, Any]) -> tuple[str, ...]:
+    """Returns what the scores of an ablation are, and with which search and cost it compares."""
+    limit = shared.get("settings", {}).get("max_simulated_steps")
+    searches = {str(row["diagnostic_search"]): None for row in rows if row["diagnostic_search"]}
+    same, ending = (" with the same search", "es") if len(searches) > 1 else ("", "")
+    text = f"With 95 % intervals; time as a multiple of {REFERENCE}'s{same}; -: not measured."
+    if limit is None:
+        return (text,)
+    return text, (
+        f"Each comparator has the search{ending} {joined([*searches])}, and simulated at most "
+        f"{limit:,} control steps for each trial; simulated steps: the median."
+    )
 
 
 def study_rows(name: str, folder: Path, table: str | None = None) -> list[Row]:

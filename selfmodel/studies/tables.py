@@ -26,6 +26,7 @@ from selfmodel.studies.rows import (
     AT_ENDS,
     KINDS,
     REFERENCE,
+    ablation_notes,
     frame_of,
     methods_of,
     outcomes_of,
@@ -225,7 +226,7 @@ def ablation_results(folder: str | Path, style: str | Path | None = None) -> Res
         drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
-    legend = _ablation_legend(rows, shared_in(folder))
+    legend = " ".join(ablation_notes(rows, shared_in(folder)))
     return Results(
         facts,
         [dataclasses.replace(_score_table(scores), note=legend)],
@@ -233,19 +234,6 @@ def ablation_results(folder: str | Path, style: str | Path | None = None) -> Res
         legend,
         _files("ablate", facts) | {f"figures/{name}": data for name, data in drawn.items()},
         [f"warning: {warning}" for warning in warnings],
-    )
-
-
-def _ablation_legend(rows: Sequence[Row], shared: Mapping[str, Any]) -> str:
-    """Returns what the columns are, and with which search and cost comparators are compared."""
-    limit = shared.get("settings", {}).get("max_simulated_steps")
-    searches = dict.fromkeys(str(row["diagnostic_search"]) for row in rows)
-    text = "With 95 % intervals; time as a multiple of forward-displacement's; -: not measured."
-    if limit is None:
-        return text
-    return (
-        f"{text} Each comparator has the search {' and '.join(searches)}, and simulated at most "
-        f"{limit:,} control steps for each trial; simulated steps: the median."
     )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
+from selfmodel.report import campaign
 from selfmodel.report.campaign import (
     MAX_INTEGER,
     other_lists,
@@ -100,6 +101,42 @@ def test_a_study_of_comparators_begins_with_its_paired_comparisons_of_each_robot
     (table,) = shares.items
     assert table.columns == ("robot", "method", "1", "2")
     assert table.rows[0] == ("ant", "A", "6/6", "6/6")
+
+
+def test_with_several_searches_a_chart_has_the_pairs_that_differ_in_one_thing(tmp_path: Path):
+    names = [(name, search) for name in "ab" for search in ("ea", "stepwise", "ea+stepwise")]
+    rows = [
+        diagnosis(name, diagnostic_search=search, seed=seed)
+        for name, search in names
+        for seed in range(4)
+    ]
+    report = study(tmp_path, "ablate", rows)
+    chart, table = report.sections[0].items
+    pairs = [one.label.split(" (n")[0].split(" \N{MINUS SIGN} ") for one in chart.estimates]
+
+    assert len(pairs) == 3 + 2 * 3
+    for first, second in pairs:
+        assert len(set(first.split(" with ")) & set(second.split(" with "))) == 1
+    assert len(table.rows) == 15
+    assert (
+        "a with stepwise, b with ea, b with ea+stepwise and b with stepwise have"
+        in (report.verdict[0])
+    )
+    assert "the same search" in report.sections[-1].text[1]
+
+
+def test_the_search_and_the_limit_of_an_ablation_are_below_the_headline(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    shared = {"settings": {"max_simulated_steps": 960}}
+    monkeypatch.setattr(campaign, "shared_in", lambda _folder: shared)
+    for searches, said in (
+        (("ea",), "the search ea,"),
+        (("ea", "ea+stepwise", "stepwise"), "the searches ea, ea+stepwise and stepwise,"),
+    ):
+        rows = [diagnosis(diagnostic_search=search) for search in searches]
+        verdict = " ".join(study(tmp_path, "ablate", rows).verdict)
+        assert f"has {said} and simulated at most 960 control steps" in verdict
 
 
 def test_a_study_of_bodies_begins_with_what_they_recovered_and_marks_falls(tmp_path: Path):

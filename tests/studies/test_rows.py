@@ -116,7 +116,10 @@ def test_comparators_are_compared_over_all_gaps_and_at_each():
         ([("dtw:DTW", None, None), ("b", math.nan, None)], ["dtw:DTW", "b"]),
         ([("a:X", "dtw", "ea"), ("b:Y", "dtw", "ea")], ["a:X", "b:Y"]),
         ([("a:X", "b", "ea"), ("b", "b", "ea")], ["a:X", "b"]),
-        ([("dtw:DTW", "dtw", "ea"), ("dtw:DTW", "dtw", "stepwise")], ["dtw, ea", "dtw, stepwise"]),
+        (
+            [("dtw:DTW", "dtw", "ea"), ("dtw:DTW", "dtw", "stepwise")],
+            ["dtw with ea", "dtw with stepwise"],
+        ),
     ],
 )
 def test_a_method_is_named_by_its_comparators_object_and_by_its_search_among_several(
