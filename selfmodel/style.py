@@ -40,7 +40,9 @@ PANEL = 3.0
 FONT = 10.0
 """Size of the font in ``STYLE``, with which the sizes of figures are stated, points."""
 
-_width: ContextVar[float | None] = ContextVar("width", default=None)
+given_width: ContextVar[float | None] = ContextVar("given_width", default=None)
+"""Width of figures that the style sets, inches; None for that of each."""
+
 _styled: ContextVar[bool] = ContextVar("styled", default=False)
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#333333")
@@ -75,13 +77,13 @@ def figure_style(style: str | Path | None = None) -> Iterator[None]:
         return
     own = read_style(style)
     size = own.get("figure.figsize")
-    tokens = _width.set(None if size is None else float(size[0])), _styled.set(True)
+    tokens = given_width.set(None if size is None else float(size[0])), _styled.set(True)
     try:
         with mpl.rc_context(fname=STYLE):
             use_style(dict(own))
             yield
     finally:
-        _width.reset(tokens[0])
+        given_width.reset(tokens[0])
         _styled.reset(tokens[1])
 
 
@@ -163,7 +165,7 @@ def panels_of(
 
     The panels share the axes ``x``, ``y``, both (True) or none (False).
     """
-    width, columns = _width.get(), min(count, columns)
+    width, columns = given_width.get(), min(count, columns)
     if width is not None:
         columns = max(1, min(columns, int(width / PANEL)))
         scale = text_size(1) / FONT
@@ -198,31 +200,21 @@ def legend_below(figure: Figure, columns: int) -> None:
     figure.set_figheight(figure.get_figheight() + max(0, more))
 
 
-def given_width() -> float | None:
-    """Returns the width of figures that the style sets, inches; None for that of each."""
-    return _width.get()
-
-
 def text_size(share: float) -> float:
     """Returns a part of the size of the font, in points."""
     return share * float(mpl.rcParams["font.size"])
 
 
-def _inches(text: str) -> float:
-    """Returns about the width of a text."""
-    return 0.55 * len(text) * text_size(1) / 72
-
-
 def row_label(name: str, rest: str) -> str:
     """Returns a label of a row: on two lines in a figure of a given width."""
-    space = " " if _width.get() is None else "\n"
+    space = " " if given_width.get() is None else "\n"
     return f"{name}{space}{rest}"
 
 
 def folded(text: str) -> str:
     """Returns a text on lines that a figure of a given width has room for."""
-    width = _width.get()
-    return text if width is None else textwrap.fill(text, int(width * len(text) / _inches(text)))
+    width = given_width.get()
+    return text if width is None else textwrap.fill(text, int(72 * width / text_size(0.55)))
 
 
 @figure_style()

@@ -16,8 +16,14 @@ from selfmodel.studies.rows import LoadedStudy, load, whole
 from selfmodel.studies.study import Row
 from selfmodel.style import figure_style, read_style
 
-COMPARISON = "comparison"
-"""Folder of the files, in the folder of a study."""
+MEANS = "Means are over the cells that all methods have."
+PAIRS = (
+    "Differences are on the n runs that both methods have, with 95 % intervals over seeds, which "
+    "are not corrected. p: the larger of a test over runs (exact McNemar, or sign flips) and one "
+    "over seeds (Student's; of fewer than four seeds, or of seeds without variance, exact sign "
+    "flips, whose p is 0.25 at least of three seeds), corrected for the number of pairs (Holm). "
+    "Better (*): p below 0.05."
+)
 
 
 def compare(options: Compare) -> None:
@@ -32,14 +38,14 @@ def compare(options: Compare) -> None:
     pairs, means = found.comparisons(), found.marginal_means()
     pair_rows, mean_rows = _records(pairs), _records(means)
     tables = [
-        *([] if options.table in formats.FOR_READERS else [formats.table_of("rows", found.rows)]),
-        formats.table_of("marginal-means", means, list(map(_mean_texts, mean_rows)), texts=2),
-        formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), texts=2),
+        *([] if options.table in ("latex", "markdown") else [formats.table_of("rows", found.rows)]),
+        formats.table_of("marginal-means", means, list(map(_mean_texts, mean_rows)), 2, MEANS),
+        formats.table_of("comparisons", pairs, list(map(_pair_texts, pair_rows)), 2, PAIRS),
     ]
     with figure_style(options.style):
         content = formats.table_files(tables, options.table) | figures.of_comparisons(pairs)
     if options.out is None:  # within the study, where no linked folder is written to
-        content = {f"{COMPARISON}/{name}": data for name, data in content.items()}
+        content = {f"comparison/{name}": data for name, data in content.items()}
     files = list(map(str, formats.write_files(options.out or options.study, content)))
     if options.as_json:
         facts = {
@@ -73,13 +79,7 @@ def _print_comparison(study: LoadedStudy, found: list[Row], means: pd.DataFrame)
         texts = pd.DataFrame(map(_mean_texts, own)).drop(columns="table")
         show(list(texts.columns), texts.to_numpy().tolist(), texts=1)
         print_lines(*(_pair_line(one) for one in found if one["table"] == name))
-    print_lines(
-        "Means are over the cells that all methods have. Differences are on the n runs that both "
-        "methods have, with 95 % intervals over seeds. p: the larger of a test over runs (exact "
-        "McNemar, or sign flips) and one over seeds (Student's; of fewer than four seeds, or of "
-        "seeds without variance, exact sign flips, whose p is 2 / 2^seeds at least), corrected for "
-        "the number of pairs (Holm). Better: p below 0.05."
-    )
+    print_lines(f"{MEANS} {PAIRS}")
 
 
 def _pair_line(one: Row) -> str:

@@ -27,8 +27,6 @@ from selfmodel.studies.study import shared_in
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 """Media types of figures; an SVG file is preferred to a PNG file of the same name."""
 
-FIGURES = "figures"
-
 MAX_FIGURE_BYTES = 8_000_000
 """Largest size of all figures together, bytes; those beyond are named instead."""
 
@@ -113,7 +111,7 @@ def _figures(folder: Path, most: int) -> Section | None:
     shown: list[Picture] = []
     left_out: list[str] = []
     figures: dict[str, Path] = {}
-    for place in (folder, folder / FIGURES):
+    for place in (folder, folder / "figures"):
         for suffix in MEDIA_TYPES:
             for path in sorted(place.glob(f"*{suffix}")):
                 figures.setdefault(path.stem, path)

@@ -98,13 +98,9 @@ def _means(table: tuple[str, ...], means: pd.DataFrame, study: LoadedStudy) -> I
         for row in means.itertuples()
     )
     share = measure == "share"
-    label = "share of right diagnoses" if share else "mean"
-    return IntervalChart(
-        f"{', '.join(table)}: mean of each method",
-        label,
-        estimates,
-        limits=(0.0, 1.0) if share else None,
-    )
+    label, limits = ("share of right diagnoses", (0.0, 1.0)) if share else ("mean", None)
+    title = f"{', '.join(table)}: mean of each method"
+    return IntervalChart(title, label, estimates, limits=limits)
 
 
 def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | None:
@@ -117,12 +113,13 @@ def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | 
     named = [{**row, "method": name} for row, name in zip(rows, methods_in(rows), strict=True)]
     names = ("robot", "trials", "method")
     split = [name for name in names if len({row.get(name) for row in named}) > 1] or ["method"]
-    groups = dict(sorted(grouped(named, *split).items(), key=_order))
+    found = grouped(named, *split).items()
+    groups = dict(sorted(found, key=lambda one: [_numbers_first(str(value)) for value in one[0]]))
     items: list[IntervalChart | Table] = []
     if by_method and len(groups) > 1:
-        found = tuple(_share(", ".join(map(str, key)), own) for key, own in groups.items())
+        points = tuple(_share(", ".join(map(str, key)), own) for key, own in groups.items())
         title = f"Share of right diagnoses by {' and '.join(split)}, with 95 % intervals"
-        items.append(IntervalChart(title, "share of right diagnoses", found, limits=(0.0, 1.0)))
+        items.append(IntervalChart(title, "share of right diagnoses", points, limits=(0.0, 1.0)))
     for factor in ("case", "gap"):
         values = sorted({_value(row, factor) for row in named}, key=_numbers_first)
         if len(values) > 1:
@@ -161,10 +158,6 @@ def _count(rows: Sequence[Mapping[str, Cell]]) -> str | None:
 def _share(name: str, rows: Sequence[Mapping[str, Cell]]) -> Estimate:
     share = proportion(sum(bool(row[CORRECT]) for row in rows), len(rows))
     return Estimate(f"{name} (n = {len(rows)})", share.estimate, share.low, share.high)
-
-
-def _order(group: tuple[tuple[Cell, ...], object]) -> list[tuple[float, str]]:
-    return [_numbers_first(str(value)) for value in group[0]]
 
 
 def _numbers_first(name: str) -> tuple[float, str]:

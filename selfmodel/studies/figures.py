@@ -76,7 +76,7 @@ def by_gap(scores: Sequence[Row]) -> Figure:
     ends = _first_and_last(scores)
     counts = len(robots) * len(ends), len(ends)
     figure, panels = panels_of(
-        *counts, size=(4.2, 2.4 if given_width() else 3.2), margin=(1, 0.8), share=True
+        *counts, size=(4.2, 2.4 if given_width.get() else 3.2), margin=(1, 0.8), share=True
     )
     spread = 0.012 * (max(gaps) - min(gaps) or 1)  # error bars side by side
     for axes, (robot, trials) in zip(panels, itertools.product(robots, ends), strict=True):
@@ -207,7 +207,10 @@ def paired_differences(comparisons: pd.DataFrame) -> Figure:
     ends = comparisons[["difference_low", "difference_high"]]
     figure, panels = panels_of(
         len(tables),
-        size=(3.7 + 0.068 * longest, 0.7 + (0.28 if given_width() else 0.21) * tables.size().max()),
+        size=(
+            3.7 + 0.068 * longest,
+            0.7 + (0.28 if given_width.get() else 0.21) * tables.size().max(),
+        ),
         margin=(0.4, 0.5),
         share="x" if (ends.abs() <= 1).all(axis=None) else False,
     )

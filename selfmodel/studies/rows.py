@@ -375,9 +375,9 @@ def ablation_notes(rows: Sequence[Row], shared: Mapping[str, Any]) -> tuple[str,
     text = f"With 95 % intervals; time as a multiple of {REFERENCE}'s{same}; -: not measured."
     if limit is None:
         return (text,)
-    return text, (
+    return f"{text[:-1]}; simulated steps: the median.", (
         f"Each comparator has the search{ending} {joined([*searches])}, and simulated at most "
-        f"{limit:,} control steps for each trial; simulated steps: the median."
+        f"{limit:,} control steps for each trial."
     )
 
 

@@ -166,6 +166,7 @@ def table_of(
     records: pd.DataFrame | Sequence[Row],
     shown: Sequence[Mapping[str, str]] | None = None,
     texts: int = 0,
+    note: str = "",
 ) -> Table:
     """Returns rows as a table.
 
@@ -175,6 +176,7 @@ def table_of(
             table in a frame one text.
         shown: Their texts for readers, by the title of the column; None for the values themselves.
         texts: Number of leading columns of texts.
+        note: What the columns are.
     """
     if isinstance(records, pd.DataFrame):
         named = "table" in records
@@ -185,7 +187,7 @@ def table_of(
     if shown is None:
         values = frame.astype(object).where(frame.notna(), "-").map(str)
         return Table(name, frame, values, len(frame.columns))
-    return Table(name, frame, pd.DataFrame(shown), texts)
+    return Table(name, frame, pd.DataFrame(shown), texts, note)
 
 
 def _flat(record: Row, intervals: set[str]) -> Row:
@@ -229,7 +231,7 @@ def ablation_results(folder: str | Path, style: str | Path | None = None) -> Res
     legend = " ".join(ablation_notes(rows, shared_in(folder)))
     return Results(
         facts,
-        [dataclasses.replace(_score_table(scores), note=legend)],
+        [_score_table(scores, legend)],
         _score_table(shown),
         legend,
         _files("ablate", facts) | {f"figures/{name}": data for name, data in drawn.items()},
@@ -291,7 +293,7 @@ def _files(name: str, facts: Mapping[str, Any]) -> dict[str, bytes]:
     }
 
 
-def _score_table(scores: Sequence[Row]) -> Table:
+def _score_table(scores: Sequence[Row], note: str = "") -> Table:
     has_recovery = any(one["recovery"] for one in scores)
     has_steps = any(one["simulated_steps"] for one in scores)
     texts = [
@@ -308,7 +310,7 @@ def _score_table(scores: Sequence[Row]) -> Table:
         }
         for one in scores
     ]
-    return table_of("scores", scores, texts, texts=3)
+    return table_of("scores", scores, texts, 3, note)
 
 
 def _summary_text(one: Row, every: Sequence[Row]) -> dict[str, str]:
@@ -380,7 +382,10 @@ def _latex(table: Table) -> bytes:
     text = table.shown.style.hide(axis="index").format(_mathematical, escape="latex")
     text = text.format_index(escape="latex", axis="columns")
     latex: str = text.to_latex(column_format=sides, hrules=True)
-    return (f"% {table.note}\n{latex}" if table.note else latex).encode()
+    if table.note:
+        note = _mathematical(re.sub(r"[%&#_$]", r"\\\g<0>", table.note))
+        latex += f"\\par\\smallskip{{\\footnotesize {note}\\par}}\n"
+    return latex.encode()
 
 
 def _mathematical(text: str) -> str:
@@ -409,9 +414,6 @@ FORMATS: Mapping[str, tuple[str, Callable[[Table], bytes]]] = MappingProxyType(
 )
 """Suffix and writer by the name of a format. CSV and Parquet files have the records, LaTeX (with
 the package booktabs) and Markdown the rows for readers."""
-
-FOR_READERS = ("latex", "markdown")
-"""Formats of tables for readers, which have no table of all rows."""
 
 
 def check_format(wanted: str | None) -> None:

@@ -48,11 +48,15 @@ def test_a_table_for_a_paper_has_five_columns_and_none_has_all_rows(folder: Path
     for wanted in ("markdown", "latex"):
         succeeds("compare", "rows.csv", "-o", "out", "--table", wanted, cwd=folder)
 
-    (head, _, pair) = (folder / "out" / "comparisons.md").read_text().splitlines()
+    head, _, pair, _, note = (folder / "out" / "comparisons.md").read_text().splitlines()
     assert head == "| table | comparison | difference (95 %) | n | p |"
     assert pair.startswith("| quadruped, 1 trial | a vs. b | 1.000 (")
     assert pair.endswith("| 18 | 0.031* |")
     assert (folder / "out" / "marginal-means.tex").read_text().count("&") == 3 * 4
+    latex = (folder / "out" / "comparisons.tex").read_text()
+    for said in ("95 % intervals over seeds, which are not corrected", "corrected for the number"):
+        assert said in note
+        assert said.replace("%", r"\%") in latex.split(r"\end{tabular}")[1]
     assert not list((folder / "out").glob("rows.*"))
 
 
