@@ -22,7 +22,6 @@ from selfmodel.report.charts import Cell, Picture, Report, Section, Table
 from selfmodel.report.study import CORRECT, compared, methods_in, recoveries, shares
 from selfmodel.studies.rows import LoadedStudy, ablation_notes, kind_of, load
 from selfmodel.studies.statistics import proportion
-from selfmodel.studies.study import shared_in
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 """Media types of figures; an SVG file is preferred to a PNG file of the same name."""
@@ -63,7 +62,7 @@ def report_of_campaign(folder: Path, most_figures: int = MAX_FIGURE_BYTES) -> Re
     study = load(folder / name) if (name := next(names, "")) else None
     notes: tuple[str, ...] = ()
     if study is not None and study.kind == "ablate":
-        notes = ablation_notes(to_json(study.rows.to_dict("records")), shared_in(folder))
+        notes = ablation_notes(to_json(study.rows.to_dict("records")), folder)
     headline, verdict, found = _findings(study, tables)
     sections = [
         *found,

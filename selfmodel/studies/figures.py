@@ -94,7 +94,6 @@ def by_gap(scores: Sequence[Row]) -> Figure:
                 errorbars(axes, points, number, label=label, **looks[name])
         axes.set(title=f"{robot}, {counted(trials, 'trial')}", ylim=(-0.03, 1.03), xticks=gaps)
         axes.grid(axis="y")
-    for axes in panels:
         if (place := axes.get_subplotspec()) and place.is_last_row():
             axes.set_xlabel("reality gap")
         if place and place.is_first_col():

@@ -367,9 +367,9 @@ def methods_of(rows: Sequence[Row]) -> list[str]:
     return methods
 
 
-def ablation_notes(rows: Sequence[Row], shared: Mapping[str, Any]) -> tuple[str, ...]:
+def ablation_notes(rows: Sequence[Row], folder: Path) -> tuple[str, ...]:
     """Returns what the scores of an ablation are, and with which search and cost it compares."""
-    limit = shared.get("settings", {}).get("max_simulated_steps")
+    limit = shared_in(folder).get("settings", {}).get("max_simulated_steps")
     searches = {str(row["diagnostic_search"]): None for row in rows if row["diagnostic_search"]}
     same, ending = (" with the same search", "es") if len(searches) > 1 else ("", "")
     text = f"With 95 % intervals; time as a multiple of {REFERENCE}'s{same}; -: not measured."

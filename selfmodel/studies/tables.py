@@ -35,7 +35,7 @@ from selfmodel.studies.rows import (
     whole,
 )
 from selfmodel.studies.statistics import UNKNOWN, Interval, proportion, ratio
-from selfmodel.studies.study import Row, grouped, shared_in
+from selfmodel.studies.study import Row, grouped
 from selfmodel.style import figure_style
 from selfmodel.tasks.suite_bodies import DOMAINS, EPISODE, PREFIX
 
@@ -228,7 +228,7 @@ def ablation_results(folder: str | Path, style: str | Path | None = None) -> Res
         drawn = figures.of_ablation(rows, scores)
     warnings = balance_warnings(whole(outcomes_of("ablate", rows)))
     facts = {"rows": rows, "scores": scores}
-    legend = " ".join(ablation_notes(rows, shared_in(folder)))
+    legend = " ".join(ablation_notes(rows, folder))
     return Results(
         facts,
         [_score_table(scores, legend)],

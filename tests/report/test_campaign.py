@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.report import campaign
 from selfmodel.report.campaign import (
     MAX_INTEGER,
     other_lists,
@@ -13,6 +12,7 @@ from selfmodel.report.campaign import (
     report_of_campaign,
 )
 from selfmodel.report.charts import Cell, IntervalChart, Picture, Report, Table, html_of
+from selfmodel.studies import rows as rows_of_studies
 from selfmodel.studies.recoveries import ENDS
 from selfmodel.studies.rows import KINDS, frame_of
 from selfmodel.studies.tables import csv_bytes
@@ -129,7 +129,7 @@ def test_the_search_and_the_limit_of_an_ablation_are_below_the_headline(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     shared = {"settings": {"max_simulated_steps": 960}}
-    monkeypatch.setattr(campaign, "shared_in", lambda _folder: shared)
+    monkeypatch.setattr(rows_of_studies, "shared_in", lambda _folder: shared)
     for searches, said in (
         (("ea",), "the search ea,"),
         (("ea", "ea+stepwise", "stepwise"), "the searches ea, ea+stepwise and stepwise,"),
