@@ -51,15 +51,15 @@ def robot_of(log: TrialLog) -> Robot:
     return robot
 
 
-def describe_difference(names: Names, logged: Names) -> str:
-    """Returns the differences between a robot's names and those of a log, as text."""
+def describe_difference(names: Names, other: Names) -> str:
+    """Returns the differences between a robot's names and those of another, as text."""
     differences = []
     for what in ("sensors", "motors", "hinges"):
-        own, recorded = getattr(names, what), getattr(logged, what)
+        own, recorded = getattr(names, what), getattr(other, what)
         if own != recorded:
             lacks = [name for name in recorded if name not in own]
             differences.append(
-                f"it has {len(own)} {what}, the log {len(recorded)}"
+                f"it has {len(own)} {what}, the other {len(recorded)}"
                 + (f", of which it lacks {', '.join(lacks[:3])}" if lacks else " or in other order")
             )
     return "; ".join(differences) or "their parts have the same names"

@@ -129,8 +129,8 @@ def calibrate(
     """
     arguments.check_options(on_event)
     (healthy,), _ = arguments.trials_of(trials)
-    threads, on_event = thread_count(threads), timed(on_event)
-    return calibration.calibrate(arguments.load_robot(robot), healthy, threads, on_event)
+    arguments.check_trials(robot := arguments.load_robot(robot), *healthy)
+    return calibration.calibrate(robot, healthy, thread_count(threads), timed(on_event))
 
 
 def replay(
@@ -160,7 +160,7 @@ def replay(
     """
     logged = arguments.trial_of(trial)
     tolerance = real_number("tolerance", tolerance, 0.0, 0.0, "real")
-    robot = arguments.load_robot(robot)
+    arguments.check_trials(robot := arguments.load_robot(robot), logged)
     assumed = arguments.parse_hypothesis(hypothesis, robot)
     return trial_replay.replay(logged, assumed, Simulator(robot, threads), tolerance)
 
@@ -226,11 +226,13 @@ def diagnose(
         )
     if not reference:
         to_explain, reference = by_stage(to_explain)
+    own = own or arguments.robot_of_logs(logs, None)
+    arguments.check_trials(own, *to_explain, *reference)
     logged = {log.trial.path: log.settings for log in logs}
     return set_up_diagnosis(
         to_explain,
         reference,
-        robot=own or arguments.robot_of_logs(logs, None),
+        robot=own,
         choose_comparator=choose,
         kinds=searched,
         settings=arguments.settings_of(settings or logged.get(to_explain[0].path)),
@@ -310,11 +312,11 @@ def recover(
             not observed of the robot.
         TrialError: A physical robot could not finish a trial.
     """
-    arguments.check_physical(healthy, damaged)
     arguments.check_options(on_event, calibrate=calibrate)
     check_type(repair_settings, Settings | None, arguments.REPAIR_SETTINGS)
     folder, on_event = path_of(folder, "a new or empty folder"), timed(on_event)
     robot = (entry := arguments.entry_of(robot)).robot()
+    arguments.check_physical(robot, healthy, damaged)
     seed, count = whole_number("seed", seed, 0, least=0), thread_count(threads)
     chosen, searched = arguments.settings_of(settings), arguments.kinds_of(kinds)
     drawn = arguments.design_of(design, robot)

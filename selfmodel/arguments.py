@@ -217,14 +217,28 @@ def check_options(on_event: object, *, calibrate: object = True) -> None:
     check_type(calibrate, bool | int | np.bool_, "True or False as calibrate")
 
 
-def check_physical(*robots: object) -> None:
-    """Raises ``InputError`` for an object that is no physical robot."""
+def check_physical(self_model: Robot, *robots: object) -> None:
+    """Raises ``InputError`` for an object that is no physical robot, or is one of another robot."""
     for one in robots:
         if not callable(getattr(one, "run", None)):
             raise InputError(
                 f"expected a physical robot, with a method run, got {one!r:.80}: give "
                 f'selfmodel.simulated_robot("quadruped"), or an EnvironmentRobot'
             )
+        if isinstance(own := getattr(one, "robot", None), Robot):
+            _check_names(self_model, own.anatomy.names, f"the physical robot {own.name}")
+
+
+def check_trials(self_model: Robot, *trials: Trial) -> None:
+    """Raises ``InputError`` for a trial of a robot with other sensors, motors or hinges."""
+    for trial in trials:
+        _check_names(self_model, trial.trajectory.names, f"that of {trial.path}")
+
+
+def _check_names(robot: Robot, names: Names, of: str, called: str = "") -> None:
+    if robot.anatomy.names != names:
+        difference = describe_difference(robot.anatomy.names, names)
+        raise InputError(f"{called or robot.name} is another robot than {of}: {difference}")
 
 
 def repertoire_of(
@@ -391,11 +405,7 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
         return own
     names = own.anatomy.names
     chosen = recorded_robot(override, own.control_timestep, names)
-    if chosen.anatomy.names != names:
-        raise InputError(
-            f"{override} is another robot than that of {found[0].trial.path}: "
-            f"{describe_difference(chosen.anatomy.names, names)}"
-        )
+    _check_names(chosen, names, f"that of {found[0].trial.path}", override)
     return chosen
 
 

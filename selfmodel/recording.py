@@ -69,9 +69,9 @@ def run_trial(
         LogError: The robot stopped early, or the log failed its verification.
         TrialError: The physical robot could not finish the trial.
     """
-    arguments.check_physical(physical)
     path, header = path_of(path, "the new log"), TrialHeader(Settings())
     robot, seed = arguments.load_robot(robot), whole_number("seed", seed, 0, least=0)
+    arguments.check_physical(robot, physical)
     if not isinstance(controller, Playback):
         controller = arguments.controller_of(controller, robot)
     plan = TrialPlan(path.stem, stage, controller, whole_number("steps", steps, 1000), seed)

@@ -415,6 +415,36 @@ def test_another_call_is_refused_in_a_sentence(name: str, place: Place):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda _: selfmodel.calibrate("walk.mcap", "hexapod"),
+        lambda p: selfmodel.replay(p.trial, "break:front_left_knee", "hexapod"),
+        lambda _: diagnosed(robot="hexapod"),
+        lambda p: diagnosed(trials=p.trial, healthy="walk.mcap", robot="hexapod"),
+    ],
+)
+def test_a_trial_of_another_robot_is_refused_by_its_parts(call: Call, place: Place):
+    sentence = r"hexapod is another robot than that of \S*walk.mcap: it has 12 sensors, the other 8"
+    with pytest.raises(InputError, match=sentence):
+        call(place)
+
+
+@pytest.mark.parametrize("at", ["healthy", "damaged"])
+def test_a_physical_robot_of_another_self_model_is_refused_before_it_moves(at: str, place: Place):
+    other = selfmodel.simulated_robot("hexapod")
+    sentence = "quadruped is another robot than the physical robot hexapod: it has 8 sensors"
+    with pytest.raises(InputError, match=sentence):
+        selfmodel.recover(
+            **{"healthy": place.physical, "damaged": place.damaged, at: other},
+            robot=place.robot,
+            folder="other",
+        )
+    assert not Path("other").exists()
+    with pytest.raises(InputError, match=sentence):
+        ran(place, physical=other)
+
+
 @pytest.mark.parametrize("wrong", [{"next_trial": "reppair"}, {"comparator": "dtww"}])
 def test_a_refused_recovery_leaves_no_folder(place: Place, wrong: dict[str, str]):
     with pytest.raises(InputError, match="unknown"):

@@ -115,7 +115,7 @@ class SimulatedRobot:
         gap: RealityGap | None = None,
         stream: int = 0,
     ) -> None:
-        self._robot = robot
+        self.robot = robot
         self._gap = gap if gap is not None and gap.level > 0 else None
         seed = gap.seed if gap else OWN_SEED
         self._variant, self._limbs = physical_variant(robot, hidden, seed, self._gap)
@@ -139,7 +139,7 @@ class SimulatedRobot:
     def _run(
         self, child: np.random.SeedSequence, controller: CommandSource, steps: int
     ) -> Iterator[Sample]:
-        robot, variant, gap = self._robot, self._variant, self._gap
+        robot, variant, gap = self.robot, self._variant, self._gap
         measurement, start = Measurement(), None
         if gap is not None:
             (of_faults,) = child.spawn(1)

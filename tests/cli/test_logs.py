@@ -252,7 +252,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
         (["diagnose", "a.mcap", "copy.mcap"], "a.mcap and copy.mcap are the same log"),
         (
             ["diagnose", "a.mcap", "--robot", "hexapod"],
-            "hexapod is another robot than that of a.mcap: it has 12 sensors, the log 8",
+            "hexapod is another robot than that of a.mcap: it has 12 sensors, the other 8",
         ),
         (["diagnose", "a.mcap", "--kinds", "frction"], "'frction': did you mean friction, joint-f"),
         (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
