@@ -26,7 +26,7 @@ from selfmodel.faults.registry import TABLE_ONE
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import bodies, paper_page, plans, tables as formats
 from selfmodel.studies.definition import read_study
-from selfmodel.studies.grid import CellEnds, dask_executor
+from selfmodel.studies.grid import CellEnds, dask_executor, failures_text
 from selfmodel.studies.study import Study
 from selfmodel.style import figure_style, read_style
 from selfmodel.tasks import ROBOTS
@@ -149,10 +149,7 @@ def _run(study: Study, options: Computed) -> None:
         print_notes(*found.notes)
         print_lines(*paths)
     if failed:
-        print_notes(
-            f"{len(failed)} failed, the first of them {failed[0].name}: {failed[0].error}; the "
-            f"same command tries them again"
-        )
+        print_notes(failures_text(failed, "the same command"))
         raise typer.Exit(1)
 
 
@@ -173,7 +170,7 @@ def _compute(study: Study, options: Computed) -> Sequence[CellEnds]:
     workers = thread_count(options.workers)
     with opened as given, grid_display() as shown:
         try:
-            return study.run(executor=given, workers=workers, on_event=shown)
+            return study.run(executor=given, workers=workers, on_event=shown, warns=False)
         except KeyboardInterrupt as interruption:
             interruption.add_note(
                 f"{shown.done} of {shown.total} are done and kept in {study.folder}; the same "

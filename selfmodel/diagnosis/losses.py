@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from selfmodel.diagnosis.comparator import (
     Losses,
     PiecewiseTrial,
     PreparedPart,
+    TrialRefusedError,
     as_comparator,
     piece_steps_of,
     pieces_within,
@@ -26,6 +27,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.actuators import holding_commands
 from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments
 from selfmodel.simulation.rollout import SimulationResult, largest_batch
 from selfmodel.simulation.simulator import Simulator
@@ -338,14 +340,27 @@ def check_limit(limit: int | None, choose: ComparatorChoice, trial: Trial, robot
         )
 
 
+def check_steps(comparator: Comparator, trial: Trial, robot: Robot) -> None:
+    """Raises ``InputError`` if a comparator refuses a still trial, and not one of a usual length.
+
+    What it refuses in any length may be for other robots of a study.
+    """
+    try:
+        prepared_trial(comparator, robot, trial)
+    except TrialRefusedError as error:
+        with suppress(TrialRefusedError):
+            prepared_trial(comparator, robot, still_trial(robot, Settings.steps))
+            raise InputError(f"{error.reason}: give more steps, or another comparator") from error
+
+
 def still_trial(robot: Robot, steps: int) -> Trial:
     """Returns a simulated trial of a healthy robot whose motors hold their initial pose."""
     names, hold = robot.anatomy.names, holding_commands(robot.model)[np.newaxis]
     driver = Playback(names.motors, hold)
     run = Simulator(robot, threads=1).run([(INTACT, driver)], steps, SIGNALS).trajectory
     signals = {name: values[0] for name, values in run.signals.items()}
-    trajectory = Trajectory(names, run.time, signals)
-    return Trial(TrialPlan("still", "single", driver, steps, 0), robot.name, trajectory, "still")
+    trajectory, path = Trajectory(names, run.time, signals), f"a trial of {steps} steps"
+    return Trial(TrialPlan("still", "single", driver, steps, 0), robot.name, trajectory, path)
 
 
 def simulate(

@@ -28,6 +28,7 @@ from selfmodel.errors import (
     whole_number,
 )
 from selfmodel.logs.files import make_folder
+from selfmodel.progress import ignore
 from selfmodel.studies import cells as cell_files
 from selfmodel.studies.cells import (
     CELL,
@@ -96,10 +97,12 @@ class CellEnds:
         return f"{3600 * self.rate:.0f} an hour, {minutes // 60} h {minutes % 60:02d} min left"
 
 
-def warn_of_earlier(event: GridBegins | CellEnds) -> None:
-    """Warns of cells of an earlier source of a plug-in, and tells nothing else of a grid."""
-    if isinstance(event, GridBegins) and event.earlier:
-        warnings.warn(event.earlier, stacklevel=4)
+def failures_text(failed: Sequence[CellEnds], again: str) -> str:
+    """Returns a sentence on failed cells, at least one; ``again`` is what tries them again."""
+    first, count = failed[0], f"{len(failed)} of {counted(failed[0].total, 'cell')}"
+    return (
+        f"{count} failed, the first of them {first.name}: {first.error}; {again} tries them again"
+    )
 
 
 def run_grid(
@@ -108,7 +111,8 @@ def run_grid(
     *,
     executor: Executor | None = None,
     workers: int = 1,
-    on_event: Callable[[GridBegins | CellEnds], None] = warn_of_earlier,
+    on_event: Callable[[GridBegins | CellEnds], None] = ignore,
+    warns: bool = True,
 ) -> tuple[CellEnds, ...]:
     """Computes all cells that are not finished, and returns the failed ones.
 
@@ -122,8 +126,8 @@ def run_grid(
         cells: The cells; those that they need are computed as well, once.
         executor: Executor whose workers can import selfmodel; None for processes of this machine.
         workers: Number of these processes.
-        on_event: Called with the start of the grid and the end of every cell; without it, a Python
-            warning tells of cells of an earlier source.
+        on_event: Called with the start of the grid and the end of every cell.
+        warns: Whether Python warnings tell of failures, and of cells of an earlier source.
 
     Raises:
         InputError: A cell in the folder is damaged or of other code, or a worker has other code.
@@ -135,6 +139,8 @@ def run_grid(
     workers, every = whole_number("workers", workers, 2, least=1), _with_needs(cells)
     left, earlier = _unfinished(folder, cells, every)
     number = before = len(every) - len(left)
+    if earlier and warns:
+        warnings.warn(earlier, stacklevel=3)
     on_event(GridBegins(len(every), number, earlier))
     start = perf_counter()
     failures: list[CellEnds] = []
@@ -148,6 +154,8 @@ def run_grid(
             on_event(end)
     with suppress(OSError):  # another command computes cells there
         (folder / UNFINISHED).rmdir()
+    if failures and warns:
+        warnings.warn(failures_text(failures, "the same call"), stacklevel=3)
     return tuple(failures)
 
 

@@ -15,7 +15,7 @@ from selfmodel.arguments import AUTO, KindSource, comparator_choice, read_contro
 from selfmodel.comparators import COMPARATORS, FORWARD_DISPLACEMENT, SEGMENT_PREDICTION
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.losses import check_limit, still_trial
+from selfmodel.diagnosis.losses import check_limit, check_steps, still_trial
 from selfmodel.errors import (
     InputError,
     items_of,
@@ -31,6 +31,7 @@ from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import TRACKING, Score
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
@@ -168,9 +169,7 @@ def ablation(
     }
     for entry in entries.values():
         check_score(chosen["score"], entry)
-        still = still_trial(entry.robot(), settings.steps)
-        for name in comparators:
-            check_limit(limit, comparator_choice(name), still, entry.robot())
+        _check_trials(comparators, entry.robot(), settings.steps, limit)
     runs = [
         _point(models[robot], case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
@@ -214,6 +213,14 @@ def ablation(
     ]
     function = "diagnose" if by_bank else "recover"
     return _study("ablate", folder, points, shared, needs, function=function)
+
+
+def _check_trials(comparators: Iterable[str], robot: Robot, steps: int, limit: int) -> None:
+    """Refuses trials that are too short for a comparator, and too low a limit."""
+    still = still_trial(robot, steps)
+    for name in comparators:
+        check_steps(plugins.comparator(name), still, robot)
+        check_limit(limit, comparator_choice(name), still, robot)
 
 
 def suite(

@@ -12,8 +12,9 @@ from urllib.parse import quote
 from selfmodel.errors import InputError, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
+from selfmodel.progress import ignore
 from selfmodel.studies.cells import REMEDY, Cell, changed, finished, read_cells, versions_of
-from selfmodel.studies.grid import CellEnds, GridBegins, run_grid, warn_of_earlier
+from selfmodel.studies.grid import CellEnds, GridBegins, run_grid
 
 RUNS = "runs"
 """Kind of the cells at the points of a study; those that they need have kinds of their own."""
@@ -100,14 +101,17 @@ class Study:
         *,
         executor: Executor | None = None,
         workers: int = 1,
-        on_event: Callable[[GridBegins | CellEnds], None] = warn_of_earlier,
+        on_event: Callable[[GridBegins | CellEnds], None] = ignore,
+        warns: bool = True,
     ) -> tuple[CellEnds, ...]:
         """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
         cells = self.cells()
         if self.definition:
             make_folder(self.folder)
             replace_file(self.folder / DEFINITION, self.definition)
-        return run_grid(self.folder, cells, executor=executor, workers=workers, on_event=on_event)
+        return run_grid(
+            self.folder, cells, executor=executor, workers=workers, on_event=on_event, warns=warns
+        )
 
     def rows(self, table: str | None = None) -> list[Row]:
         """Returns the rows of all finished runs in the folder; see ``rows_in``."""

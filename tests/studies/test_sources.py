@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 SCRIPT = """
 import sys
+import warnings
 from pathlib import Path
 from selfmodel.studies import Study, points_of
 
@@ -30,9 +31,11 @@ if __name__ == "__main__":
     points = points_of(way=["own_way", "other_way"], seed=range(3))
     study = Study("mine", "study", "my_work:work", points, modules=lambda point: [point["way"]])
     events = []
-    study.run(workers=2, on_event=events.append)
+    with warnings.catch_warnings(record=True) as warned:
+        study.run(workers=2, on_event=events.append)
     begins, *ends = events
     print([begins.finished, sorted(end.name for end in ends)])
+    assert [str(one.message) for one in warned] == [begins.earlier] * bool(begins.earlier)
     print(begins.earlier)
     print([(row["way"], row["seed"], row["way_is"]) for row in study.rows()])
 """

@@ -80,6 +80,20 @@ def test_a_study_is_extended_by_points_and_refuses_other_settings_before_anythin
     assert len(more.rows()) == 2
 
 
+@pytest.mark.parametrize("observed", [{}, {"on_event": lambda _: None}])
+def test_failed_runs_are_a_warning_with_the_first_reason_with_and_without_an_observer(
+    observed: dict, tmp_path: Path, threads: ThreadPoolExecutor
+):
+    wanted = study(tmp_path, points_of(factor=[1, 2]), form="none")
+    told = r"^2 of 2 cells failed, the first of them factor=1: .*KeyError.* tries them again$"
+    with pytest.warns(UserWarning, match=told) as warned:
+        failed = wanted.run(executor=threads, **observed)
+
+    assert [end.name for end in failed] == ["factor=1", "factor=2"]
+    assert [Path(one.filename) for one in warned] == [Path(__file__)], "names the caller's line"
+    assert wanted.run(executor=threads, warns=False, **observed), "the command line prints it"
+
+
 def test_a_run_whose_needs_are_others_is_refused(tmp_path: Path, threads: ThreadPoolExecutor):
     def needing(number: int) -> Study:
         gait = cell(tmp_path, "gait", number, kind="gaits")
