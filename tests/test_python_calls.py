@@ -319,7 +319,11 @@ REFUSED: dict[str, tuple[Call, str]] = {
     "a thread": (lambda p: evolved(p, threads=-1), "of 0 or above as threads, got -1"),
     "a class": (
         lambda _: diagnosed(comparator=mine("Dtw")),
-        "'Dtw' is no comparator: .* not a class",
+        "'Dtw' is no comparator: .* not a class, .* got a class: <class",
+    ),
+    "half a check": (
+        lambda p: check_comparator(SENSOR_SERIES, simulated=p.trial.trajectory),
+        "expected the trial of simulations, got these alone: give both or none",
     ),
     "no answer": (lambda _: diagnosed(calibrate="no"), "expected True or False as calibrate"),
     "a folder": (lambda p: recovered(p, folder=5), "the path of a new or empty folder, got .* int"),
@@ -391,7 +395,6 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda p: evolved(p, design="calls_made:choice"),
         "'calls_made:choice' is no kind .*, got the function choice .*; a policy .* network = ",
     ),
-    "half a check": (lambda p: check_comparator(SENSOR_SERIES, p.trial), "give both or none"),
     "a trajectory to follow in an ablation": (
         lambda _: planned(score="tracking"),
         "the score tracking follows a gait, and .* evolves its gaits: give bank=",
@@ -460,26 +463,3 @@ def test_a_comparator_of_a_script_is_no_comparator_of_other_processes(
 
     with pytest.raises(InputError, match=r"which is no variable of an imported module: write it"):
         planned(comparators=[dtw])
-
-
-def test_a_comparator_that_depends_on_the_batch_fails_the_check_of_one_argument():
-    class Uneven:
-        """Distances of the sensor series, less their smallest: the others change each."""
-
-        name = "uneven"
-
-        def prepare(self, trial: Trial) -> object:
-            prepared = SENSOR_SERIES.prepare(trial)
-
-            class Ours:
-                request = prepared.request
-
-                def distances(self, simulated: selfmodel.Trajectory) -> np.ndarray:
-                    found = prepared.losses(simulated)
-                    total = getattr(found, "total", found).mean(axis=1)
-                    return total * len(total)
-
-            return Ours()
-
-    with pytest.raises(ValueError, match=r"other runs, .* differ by up to 0\.\d+. It may"):
-        check_comparator(Uneven())

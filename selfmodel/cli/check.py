@@ -10,7 +10,7 @@ from selfmodel.cli.commands import Check
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.errors import InputError, WorkError
 from selfmodel.plugins import check_known
-from selfmodel.testing.diagnosis import ContractError
+from selfmodel.testing.contract import ContractError
 
 _SAME, _ALONE, _KEPT = "equal arguments, equal results", "no dependence on the batch", "no change"
 CHECKS: Mapping[str, tuple[Callable[..., None], tuple[str, ...]]] = MappingProxyType(
@@ -62,6 +62,8 @@ def check(options: Check) -> None:
     try:
         function(name, **given)
     except (ContractError, InputError) as error:
+        if isinstance(error, ContractError) and error.__cause__:
+            print_notes(*"".join(traceback.format_exception(error.__cause__)).splitlines())
         raise WorkError(f"{what} {name}: {error}") from error
     except Exception as error:  # a plug-in may raise any exception
         print_notes(*"".join(traceback.format_exception(error)).splitlines())

@@ -160,7 +160,9 @@ def as_comparator(value: Any, name: str = "") -> Comparator:  # noqa: ANN401  # 
     if isinstance(value, Comparator) and not isinstance(value, type):
         return value
     called = name or getattr(value, "__name__", type(value).__name__)
+    lacks = " and ".join(one for one in ("name", "prepare") if not hasattr(value, one))
+    wrong = "a class" if isinstance(value, type) else f"one without {lacks}"
     raise InputError(
-        f"{called!r} is no comparator: expected an object, not a class, with the members of "
-        f"selfmodel.diagnosis.comparator.Comparator, got {value!r}"
+        f"{called!r} is no comparator: expected an object, not a class, with name and prepare, as "
+        f"help(selfmodel.Comparator) says, got {wrong}: {value!r}"
     )

@@ -25,7 +25,7 @@ from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.signals import SIGNALS, Signal
-from selfmodel.trials.trajectory import Trajectory, forward_displacement
+from selfmodel.trials.trajectory import NotRecordedError, Trajectory, forward_displacement
 from selfmodel.trials.trial import Trial
 
 TRACKING = "tracking"
@@ -327,12 +327,10 @@ def _checked(
     expected = f"the score {name!r}: expected one number for each of {runs} runs"
     try:
         result: object = score.of(robot, hypothesis, trajectory)
-    except KeyError as error:
-        if "was not recorded" not in str(error):
-            raise
+    except NotRecordedError as error:
         raise InputError(
-            f"the score {name!r} reads a signal that it does not name: {error.args[0]}; add the "
-            f"signal to `record` of the score"
+            f"the score {name!r} reads a signal that it does not name: {error}; add the signal to "
+            f"`record` of the score"
         ) from error
     try:
         values = np.asarray(result, dtype=np.float64)

@@ -1,5 +1,5 @@
+from .contract import ContractError as ContractError
 from .diagnosis import (
-    ContractError as ContractError,
     check_comparator as check_comparator,
     check_fault_kind as check_fault_kind,
     shown as shown,

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from selfmodel.arguments import RobotSource, comparator_of, kinds_of, load_robot, parse_hypothesis
+from selfmodel import arguments
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.controllers.network import MAX_HIDDEN_NEURONS
@@ -25,12 +26,14 @@ from selfmodel.errors import InputError, typed
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request, Segments, recordable
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.testing.contract import ContractError, called, require, require_alone
 from selfmodel.trials.estimation import JOINTS
 from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trajectory import Trajectory
@@ -41,27 +44,6 @@ CHECKED_STEPS = 60
 
 BATCH_STEPS = 20
 """Control steps of the check that robots with the fault share a batch with others."""
-
-
-class ContractError(ValueError):
-    """A plug-in breaks a rule of its contract, which the message names."""
-
-
-def require(holds: object, breach: str) -> None:
-    """Raises ``ContractError`` unless a rule holds."""
-    if not holds:
-        raise ContractError(breach)
-
-
-def require_alone(what: str, alone: FloatArray, together: FloatArray) -> None:
-    """Raises ``ContractError`` unless a run has the same values alone and in a batch."""
-    if not np.array_equal(alone, together, equal_nan=True):
-        difference = np.nanmax(np.abs(alone - together), initial=0)
-        raise ContractError(
-            f"the {what} must not depend on the other runs, to the last bit: alone and in a batch "
-            f"they differ by up to {difference:.3g}. It may use a number of the batch, such as its "
-            f"mean or size, or sums in numpy's memory order: try np.ascontiguousarray before a sum"
-        )
 
 
 @typed
@@ -92,19 +74,20 @@ def check_comparator(
         simulated: The simulation that ``comparator.prepare(trial).request`` requires, for at least
             two hypotheses; the first reproduces the trial to the bit, as ``shown`` returns. Other
             signals are ignored: all signals, ``(n, steps, width)``, serve every ``ClosedLoop``
-            request.
+            request. None for those of the robot in the trial's log, or else of its name.
 
     Raises:
-        ContractError: The comparator violates its contract, or ``simulated`` does not have the
-            requested shapes; the message names the violation.
+        ContractError: The comparator violates its contract or raises another error, or
+            ``simulated`` does not have the requested shapes; the message names the violation.
         InputError: The name is unknown, the object is no comparator, it refuses the trial of the
-            quadruped, or there are no simulations with the trial.
+            quadruped, or there are simulations without a trial.
     """
-    comparator = comparator_of(comparator)
-    if (trial is None) != (simulated is None):
-        raise InputError("expected a trial and its simulations, got one of them: give both or none")
-    if trial is None or simulated is None:
-        trial, simulated = _walk(comparator)
+    comparator = arguments.comparator_of(comparator)
+    if simulated is None:
+        trial = trial or _walk()
+        simulated = _simulated(comparator, trial)
+    elif trial is None:
+        raise InputError("expected the trial of simulations, got these alone: give both or none")
     name = comparator.name
     require(
         isinstance(name, str) and name and name == name.strip(),
@@ -145,26 +128,35 @@ def check_comparator(
     require(logged == _bits(trial.trajectory.signals), "a comparator must not change the trial")
 
 
-def _walk(comparator: Comparator) -> tuple[Trial, Trajectory]:
-    """Returns a trial of the quadruped, and what a comparator requires: exact, then damaged."""
-    robot = load_robot("quadruped")
+def _walk() -> Trial:
+    """Returns a simulated trial of the quadruped."""
+    robot = arguments.load_robot("quadruped")
     network = network_for(robot)
     controller = Controller(network, np.linspace(-1, 1, network.weights))
-    simulator = Simulator(robot, 1)
-    logged = simulator.run([(INTACT, controller)], CHECKED_STEPS, SIGNALS).trajectory.run(0)
+    run = [(INTACT, controller)]
+    logged = Simulator(robot, 1).run(run, CHECKED_STEPS, SIGNALS).trajectory.run(0)
     plan = TrialPlan("check", "single", controller, CHECKED_STEPS, 0)
-    trial = Trial(plan, robot.name, logged, "check")
+    return Trial(plan, robot.name, logged, "check")
+
+
+def _simulated(comparator: Comparator, trial: Trial) -> Trajectory:
+    """Returns what a comparator requires of a trial: exact, then of a damaged robot."""
+    log = Path(trial.path)
+    logs = arguments.read_logs([log] if log.is_file() else [])
+    robot = arguments.robot_of_logs(logs, None) if logs else arguments.load_robot(trial.robot)
+    arguments.check_trials(robot, trial)
     request = _prepared(comparator, trial).request
     _check_request(request, trial)
-    broken = parse_hypothesis("break:front_left_knee", robot)
-    runs = simulate(simulator, request, trial, [INTACT, broken]).trajectory
+    faults = BROKEN.candidates(robot.anatomy) or JAMMED.candidates(robot.anatomy)
+    damaged = Hypothesis(faults[:1])
+    runs = simulate(Simulator(robot, 1), request, trial, [INTACT, damaged]).trajectory
     exact = shown(request, trial)
     signals = {one: np.concatenate([exact[one], runs[one][1:]]) for one in request.record}
-    return trial, replace(runs, signals=signals)
+    return replace(runs, signals=signals)
 
 
 def _prepared(comparator: Comparator, trial: Trial) -> PreparedTrial | PiecewiseTrial:
-    prepared = comparator.prepare(trial)
+    prepared = called("prepare", comparator.prepare, trial)
     require(
         isinstance(prepared, PreparedTrial | PiecewiseTrial),
         f"prepare must return an object with request and losses or distances, got {prepared!r}",
@@ -189,8 +181,8 @@ def _parts(
 ) -> dict[str, FloatArray]:
     """Returns everything that a comparison returns, by its name."""
     if not isinstance(prepared, PiecewiseTrial):
-        return {"distances": np.asarray(prepared.distances(simulated))}
-    found = prepared.losses(simulated)
+        return {"distances": np.asarray(called("distances", prepared.distances, simulated))}
+    found = called("losses", prepared.losses, simulated)
     losses = found if isinstance(found, Losses) else Losses(np.asarray(found))
     parts = {f"losses of {name}": part for name, part in losses.by_signal.items()}
     by_hinge = {} if losses.by_hinge is None else {"losses of hinges": losses.by_hinge}
@@ -321,7 +313,7 @@ def _as_requested(request: Request, trial: Trial, simulated: Trajectory) -> Traj
     return replace(simulated, signals=signals)
 
 
-def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") -> None:
+def check_fault_kind(kind: FaultKind | str, robot: arguments.RobotSource = "quadruped") -> None:
     """Checks that a kind fulfils the contract of ``FaultKind``.
 
     Example:
@@ -338,7 +330,7 @@ def check_fault_kind(kind: FaultKind | str, robot: RobotSource = "quadruped") ->
         InputError: The notation of the kind's own faults cannot be parsed, or an argument is no
             kind or robot.
     """
-    robot, kinds = load_robot(robot), kinds_of(kind)
+    robot, kinds = arguments.load_robot(robot), arguments.kinds_of(kind)
     if len(kinds) != 1:
         raise InputError(f"expected one kind, got {len(kinds)}: check each of them")
     (kind,) = kinds

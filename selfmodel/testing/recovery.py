@@ -25,7 +25,8 @@ from selfmodel.recovery.scores import Score, check_measurable, checked
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.testing.diagnosis import CHECKED_STEPS, require, require_alone
+from selfmodel.testing.contract import require, require_alone
+from selfmodel.testing.diagnosis import CHECKED_STEPS
 from selfmodel.trials.trajectory import Trajectory
 
 RUNS = 3

@@ -49,6 +49,10 @@ class Sample:
     moment: StepTiming | None = None
 
 
+class NotRecordedError(InputError):
+    """A signal that a trajectory does not have; the message lists those that it has."""
+
+
 @typed
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -104,12 +108,10 @@ class Trajectory:
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
 
     def __getitem__(self, signal: Signal) -> FloatArray:
-        """Returns one signal, ``(..., steps, width)``; a ``KeyError`` names those recorded."""
-        try:
-            return self.signals[signal]
-        except KeyError:
-            recorded = ", ".join(self.signals) or "nothing"
-            raise KeyError(f"{signal} was not recorded; recorded: {recorded}") from None
+        """Returns one signal, ``(..., steps, width)``, or raises ``NotRecordedError``."""
+        if signal not in self.signals:
+            raise NotRecordedError(str(unknown_name("recorded signal", signal, self.signals)))
+        return self.signals[signal]
 
     def hinge_mask(self, effect: Literal["welded", "detached"]) -> BoolArray:
         """Returns ``welded`` or ``detached`` of a batch of runs, ``(runs, hinges)``."""

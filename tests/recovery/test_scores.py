@@ -436,7 +436,10 @@ def test_signals_that_are_unknown_are_refused_when_the_score_is_loaded(record: o
         (lambda _run: ["fast"] * RUNS, "got list .*return an array of numbers"),
         (lambda _run: [np.nan, 0, np.nan], "got nan for 2 of them"),
         (lambda _run: [np.inf, 0, 1], "got inf for 1 of them"),
-        (lambda run: run["joint_efforts"], "joint_efforts was not recorded.*add the signal"),
+        (
+            lambda run: run["joint_efforts"],
+            "recorded signal 'joint_efforts'.*add the signal",
+        ),
     ],
 )
 def test_values_that_are_no_scores_are_refused_with_the_remedy(

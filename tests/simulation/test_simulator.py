@@ -17,7 +17,7 @@ from selfmodel.simulation.requests import ClosedLoop, Ensemble, Request
 from selfmodel.simulation.rollout import batch_bytes, hypothesis_bytes, largest_batch
 from selfmodel.simulation.simulator import Run, Simulator, cached_rows
 from selfmodel.trials.signals import SIGNALS
-from selfmodel.trials.trajectory import Trajectory, collect
+from selfmodel.trials.trajectory import NotRecordedError, Trajectory, collect
 from tests.helpers.drivers import random_controllers
 from tests.helpers.hostile import exploding
 
@@ -99,7 +99,7 @@ def test_readings_are_what_the_paper_says_and_only_what_is_asked_for_is_recorded
     assert set(np.unique(touch)) == {0.0, 1.0}
     np.testing.assert_allclose(angle[0], intact, rtol=1e-6)
     assert np.abs(trajectory["commands"]).max() <= np.pi / 4
-    with pytest.raises(KeyError, match="base_position was not recorded; recorded: sensors, joint"):
+    with pytest.raises(NotRecordedError, match=r"'base_position': .* known ones are sensors, join"):
         trajectory["base_position"]
 
 
