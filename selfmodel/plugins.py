@@ -228,13 +228,18 @@ def comparator_names(source: object) -> tuple[str, ...]:
     Raises:
         InputError: An item is no comparator, or other processes do not find it by name.
     """
+    if isinstance(source, str) and "," in source:
+        names = ", ".join(f'"{name.strip()}"' for name in source.split(","))
+        raise InputError(f"expected comparators in a list, got {source!r}: give [{names}]")
     found = (one if isinstance(one, str) else as_comparator(one) for one in items_of(source))
     return tuple(name_of("comparator", one) for one in found)
 
 
 def kinds_named(source: object) -> str:
     """Returns the names of fault kinds, separated by commas; see ``comparator_names``."""
-    for one in (found := items_of(source)):
+    if not (found := items_of(source)):
+        raise InputError('expected at least one fault kind, got none: give kinds="break,jam"')
+    for one in found:
         check_type(one, str | FaultKind, "a FaultKind or its name")
     return ",".join(name_of("kinds", one) for one in found)
 

@@ -321,6 +321,11 @@ REFUSED: dict[str, tuple[Call, str]] = {
         lambda _: diagnosed(comparator=mine("Dtw")),
         "'Dtw' is no comparator: .* not a class, .* got a class: <class",
     ),
+    "comparators with commas": (
+        lambda _: planned(comparators="dtw,segment-prediction"),
+        r'comparators in a list, got .dtw,.*: give \["dtw", "segment-prediction"\]$',
+    ),
+    "no kinds of a study": (lambda _: planned(kinds=[]), "at least one fault kind, got none: give"),
     "half a check": (
         lambda p: check_comparator(SENSOR_SERIES, simulated=p.trial.trajectory),
         "expected the trial of simulations, got these alone: give both or none",
