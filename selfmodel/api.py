@@ -415,6 +415,12 @@ def set_up_diagnosis(
     Raises:
         InputError: As for ``diagnose``.
     """
+    said = [{trial.plan.stage for trial in trials} for trials in (damaged, healthy)]
+    if said[0] == {"before"} and said[1] and said[1] <= {"after", "recovery"}:
+        raise InputError(
+            f"{damaged[0].path} is to be explained and was recorded before the failure, and "
+            f"{healthy[0].path}, given as healthy, after it: swap them"
+        )
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
     on_event(chosen)
     fitted = partial(arguments.fitted, robot, threads=count, observer=on_event, known={})

@@ -41,6 +41,14 @@ def reference() -> selfmodel.Diagnosis:
     return diagnosis()
 
 
+def test_logs_whose_stages_say_the_opposite_are_refused_and_others_are_not():
+    told = f"{BEFORE.name} is to be explained and .*{AFTER.name}, given as healthy, after it: swap"
+    with pytest.raises(InputError, match=told):
+        diagnosis(BEFORE, AFTER)
+    both = diagnosis([BEFORE, AFTER], LOGS / "02-recovery.mcap")
+    assert both.trials == 2, "given as healthy, whatever the stage"
+
+
 def recovered(folder: Path, **options: object) -> selfmodel.Recovery:
     """A small recovery without a calibration."""
     healthy = selfmodel.simulated_robot("quadruped")

@@ -15,6 +15,8 @@ from selfmodel.logs.inspection import read_info
 from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.go2 import STAND, recorded
 
+OLD = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
+OLD_BEFORE, OLD_AFTER = str(OLD / "00-before.mcap"), str(OLD / "01-after.mcap")
 PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
 
 
@@ -254,6 +256,7 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
             ["diagnose", "a.mcap", "--robot", "hexapod"],
             "hexapod is another robot than that of a.mcap: it has 12 sensors, the other 8",
         ),
+        (["diagnose", OLD_BEFORE, "--healthy", OLD_AFTER], "given as healthy, after it: swap them"),
         (["diagnose", "a.mcap", "--kinds", "frction"], "'frction': did you mean friction, joint-f"),
         (["diagnose", "pipe"], "pipe: expected a log file, got a pipe or a device"),
         (["replay", "pipe"], "pipe: expected a log file, got a pipe or a device"),
