@@ -104,7 +104,10 @@ class Study:
         on_event: Callable[[GridBegins | CellEnds], None] = ignore,
         warns: bool = True,
     ) -> tuple[CellEnds, ...]:
-        """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
+        """Computes the unfinished cells, and returns the failed ones; see ``run_grid``.
+
+        A script calls it below ``if __name__ == "__main__":``, as its processes import the script.
+        """
         cells = self.cells()
         if self.definition:
             make_folder(self.folder)
