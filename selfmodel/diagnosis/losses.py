@@ -341,10 +341,7 @@ def check_limit(limit: int | None, choose: ComparatorChoice, trial: Trial, robot
 
 
 def check_steps(comparator: Comparator, trial: Trial, robot: Robot) -> None:
-    """Raises ``InputError`` if a comparator refuses a still trial, and not one of a usual length.
-
-    What it refuses in any length may be for other robots of a study.
-    """
+    """Raises ``InputError`` if a comparator refuses a still trial, and not one of usual length."""
     try:
         prepared_trial(comparator, robot, trial)
     except TrialRefusedError as error:

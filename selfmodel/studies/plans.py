@@ -31,7 +31,6 @@ from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import TRACKING, Score
-from selfmodel.robot.robot import Robot
 from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
@@ -169,7 +168,10 @@ def ablation(
     }
     for entry in entries.values():
         check_score(chosen["score"], entry)
-        _check_trials(comparators, entry.robot(), settings.steps, limit)
+        still = still_trial(entry.robot(), settings.steps)
+        for name in comparators:
+            check_steps(plugins.comparator(name), still, entry.robot())
+            check_limit(limit, comparator_choice(name), still, entry.robot())
     runs = [
         _point(models[robot], case, truth, gap, seed)
         for seed, robot in itertools.product(seeds, robots)
@@ -178,8 +180,7 @@ def ablation(
     ][share - 1 :: shares]
     # The trials of a recovery exclude the failing one.
     own = dataclasses.replace(settings, trials=trials if by_bank else trials - 1)
-    evolves = {"evolves": bank is None or not by_bank}
-    shared = {**_shared(own, kinds, chosen, next_trial), **evolves}
+    shared = {**_shared(own, kinds, chosen, next_trial), "evolves": bank is None or not by_bank}
 
     @cache
     def gait(robot: str, number: int) -> Cell:
@@ -213,14 +214,6 @@ def ablation(
     ]
     function = "diagnose" if by_bank else "recover"
     return _study("ablate", folder, points, shared, needs, function=function)
-
-
-def _check_trials(comparators: Iterable[str], robot: Robot, steps: int, limit: int) -> None:
-    """Refuses trials that are too short for a comparator, and too low a limit."""
-    still = still_trial(robot, steps)
-    for name in comparators:
-        check_steps(plugins.comparator(name), still, robot)
-        check_limit(limit, comparator_choice(name), still, robot)
 
 
 def suite(

@@ -104,10 +104,7 @@ class Study:
         on_event: Callable[[GridBegins | CellEnds], None] = ignore,
         warns: bool = True,
     ) -> tuple[CellEnds, ...]:
-        """Computes the unfinished cells, and returns the failed ones; see ``run_grid``.
-
-        A script calls it below ``if __name__ == "__main__":``, as its processes import the script.
-        """
+        """Computes the unfinished cells, and returns the failed ones; see ``run_grid``."""
         cells = self.cells()
         if self.definition:
             make_folder(self.folder)

@@ -1,15 +1,12 @@
 """Breaches of the contracts of plug-ins, as errors that name the rule."""
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
-
-Given = TypeVar("Given")
-Returned = TypeVar("Returned")
 
 
 class ContractError(ValueError):
@@ -33,7 +30,7 @@ def require_alone(what: str, alone: FloatArray, together: FloatArray) -> None:
         )
 
 
-def called(what: str, method: Callable[[Given], Returned], given: Given) -> Returned:
+def called(what: str, method: Callable[[Any], Any], given: object) -> Any:  # noqa: ANN401
     """Returns what a method of a plug-in returns; its errors are breaches of the contract."""
     try:
         return method(given)

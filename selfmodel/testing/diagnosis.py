@@ -156,7 +156,7 @@ def _simulated(comparator: Comparator, trial: Trial) -> Trajectory:
 
 
 def _prepared(comparator: Comparator, trial: Trial) -> PreparedTrial | PiecewiseTrial:
-    prepared = called("prepare", comparator.prepare, trial)
+    prepared: PreparedTrial | PiecewiseTrial = called("prepare", comparator.prepare, trial)
     require(
         isinstance(prepared, PreparedTrial | PiecewiseTrial),
         f"prepare must return an object with request and losses or distances, got {prepared!r}",
