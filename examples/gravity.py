@@ -10,7 +10,7 @@ from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.robot.anatomy import Anatomy
 
 if TYPE_CHECKING:
-    from selfmodel.robot.model_variant import ModelVariant
+    from selfmodel.robot import ModelVariant
 
 
 class Gravity(FaultKind):

@@ -317,6 +317,8 @@ def kind_of(columns: Collection[str]) -> str:
 def _rows_of_file(path: Path) -> pd.DataFrame:
     """Returns the rows in a CSV file, or in lines of JSON; numbers are exact."""
     what = "the folder of a study, its results.csv or its results.jsonl"
+    if path.suffix not in (".csv", ".jsonl"):
+        raise InputError(f"{path}: expected {what}, got a file with another ending")
     data = read_file(path, what, MAX_BYTES)
     try:
         text = data.decode("utf-8-sig")
