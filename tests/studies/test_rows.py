@@ -83,7 +83,7 @@ def test_a_file_that_is_no_table_of_a_study_is_refused(
     with pytest.raises(InputError, match=f"{path}: .*{words}"):
         load(path)
     renamed = path.rename(path.with_suffix(".mcap"))
-    with pytest.raises(InputError, match="results.csv or its results.jsonl, got .* another ending"):
+    with pytest.raises(InputError, match="another ending"):
         load(renamed)
 
 
