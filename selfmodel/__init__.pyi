@@ -32,7 +32,6 @@ from .simulation.simulator import Simulator as Simulator
 from .studies.rows import load as load
 from .studies.study import Study as Study
 from .testing import (
-    ContractError as ContractError,
     check_comparator as check_comparator,
     check_design as check_design,
     check_fault_kind as check_fault_kind,
@@ -40,6 +39,7 @@ from .testing import (
     check_score as check_score,
     check_search as check_search,
 )
+from .testing.contract import ContractError as ContractError
 from .trials.trajectory import Trajectory as Trajectory
 from .trials.trial import Trial as Trial
 from .version import __version__ as __version__

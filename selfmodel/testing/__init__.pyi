@@ -1,4 +1,3 @@
-from .contract import ContractError as ContractError
 from .diagnosis import (
     check_comparator as check_comparator,
     check_fault_kind as check_fault_kind,
