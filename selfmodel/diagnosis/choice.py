@@ -113,7 +113,7 @@ def chosen_comparator(
             reason = "; ".join(reasons) or "the logs have all signals"
             return ChosenComparator(comparator, reason if given is None else "given")
         reasons += refused
-    problems = "; ".join(refused)
+    problems = "; ".join(dict.fromkeys(refused))
     if given is None:
         raise InputError(
             f"no comparator of selfmodel can judge these trials: {problems}: leave these trials out"
