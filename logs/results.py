@@ -7,6 +7,7 @@ canonical form. The digest detects damage and changes by hand; it is no signatur
 0.1 have neither key.
 """
 
+import dataclasses
 import hashlib
 import json
 import math
@@ -26,7 +27,7 @@ from selfmodel.diagnosis.diagnosis import renamed
 from selfmodel.errors import InputError
 from selfmodel.files import file_digest, read_file
 from selfmodel.logs.files import replace_file
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 
 MAX_BYTES = 16 * 2**20
 """Largest JSON file that is written and read, bytes."""
@@ -228,7 +229,9 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
     settings: dict[str, Any] | UnsetType = UNSET
     repair_settings: dict[str, Any] | UnsetType = UNSET
 
-    def write(self, folder: Path, settings: Settings, of_repair: Settings | None = None) -> None:
+    def write(
+        self, folder: Path, settings: Settings, of_repair: RepairSettings | None = None
+    ) -> None:
         """Writes ``result.json``, with settings and digests; its paths are relative to its folder.
 
         Args:
@@ -241,7 +244,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
             self,
             trials=tuple(trials),
             settings=settings.as_json(),
-            repair_settings=UNSET if of_repair is None else of_repair.as_json(),
+            repair_settings=UNSET if of_repair is None else dataclasses.asdict(of_repair),
             files={one.log: file_digest(folder / one.log) for one in trials},
         )
         replace_file(folder / RESULT, result_bytes(as_json(content)))

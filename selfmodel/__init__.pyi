@@ -1,7 +1,7 @@
 from .api import (
     calibrate as calibrate,
     diagnose as diagnose,
-    evolve_controller as evolve_controller,
+    evolve as evolve,
     export_diagnosis as export_diagnosis,
     recover as recover,
     replay as replay,
@@ -27,7 +27,7 @@ from .recording import (
 )
 from .recovery.result import Recovery as Recovery
 from .robot.robot import Robot as Robot
-from .settings import Settings as Settings
+from .settings import RepairSettings as RepairSettings, Settings as Settings
 from .simulation.simulator import Simulator as Simulator
 from .studies.rows import load as load
 from .studies.study import Study as Study

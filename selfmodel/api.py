@@ -28,7 +28,7 @@ from selfmodel.recovery.result import Event, Recovery
 from selfmodel.recovery.scores import Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.simulation import calibration, trial_replay
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.simulator import Simulator, thread_count
@@ -36,7 +36,7 @@ from selfmodel.studies.experiment import Experiment, choose_score, run_recovery
 from selfmodel.trials.trial import Trial, by_stage
 
 
-def evolve_controller(
+def evolve(
     robot: RobotSource,
     hypothesis: Hypothesis | str = INTACT,
     *,
@@ -56,7 +56,7 @@ def evolve_controller(
     Example:
         >>> import selfmodel
         >>> settings = selfmodel.Settings(steps=20, generations=2).scaled(4)
-        >>> selfmodel.evolve_controller("quadruped", settings=settings)
+        >>> selfmodel.evolve("quadruped", settings=settings)
         <Controller: a network of 3 hidden neurons>
 
     Args:
@@ -260,7 +260,7 @@ def recover(
     repair: str | None = None,
     search: str | MakeSearch | None = None,
     repertoire: Repertoire | str | Path | None = None,
-    repair_settings: Settings | None = None,
+    repair_settings: RepairSettings | None = None,
     seed: int = 0,
     threads: int = 0,
     on_event: Callable[[Event], None] = ignore,
@@ -313,7 +313,7 @@ def recover(
         TrialError: A physical robot could not finish a trial.
     """
     arguments.check_options(on_event, calibrate=calibrate)
-    check_type(repair_settings, Settings | None, arguments.REPAIR_SETTINGS)
+    check_type(repair_settings, RepairSettings | None, arguments.REPAIR_SETTINGS)
     folder, on_event = path_of(folder, "a new or empty folder"), timed(on_event)
     robot = (entry := arguments.entry_of(robot)).robot()
     arguments.check_physical(robot, healthy, damaged)

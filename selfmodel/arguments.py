@@ -52,7 +52,7 @@ KindSource = str | FaultKind | Sequence[str | FaultKind]
 NOTATION = tuple(KINDS.values())
 """The built-in kinds that a notation may name."""
 
-REPAIR_SETTINGS = "settings of the repair such as selfmodel.Settings(generations=60)"
+REPAIR_SETTINGS = "settings of the repair such as selfmodel.RepairSettings(generations=60)"
 """What is expected as settings of the repair."""
 
 _ROBOT = 'a Robot, a name such as "quadruped" or the path of an MJCF or URDF file'

@@ -47,7 +47,7 @@ def run_trial(
     Example:
         >>> import selfmodel
         >>> settings = selfmodel.Settings(steps=20, generations=2).scaled(4)
-        >>> walk = selfmodel.evolve_controller("quadruped", settings=settings)
+        >>> walk = selfmodel.evolve("quadruped", settings=settings)
         >>> physical = selfmodel.simulated_robot("quadruped")
         >>> selfmodel.run_trial(physical, walk, "walk.mcap", robot="quadruped", steps=20)
         <Trial walk of quadruped: stage single, 20 of 20 steps

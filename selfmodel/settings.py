@@ -1,4 +1,4 @@
-"""The parameters of the paper: run length, both EAs, number of trials."""
+"""The parameters of the paper: run length, number of trials, both EAs; those of a repair apart."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -32,7 +32,9 @@ set."""
 
 @dataclass(frozen=True)
 class Settings:
-    """Run length, parameters of both EAs, the search of a diagnosis, and the number of trials.
+    """Run length, number of trials, and the search of a diagnosis.
+
+    The parameters of the EA are those of the repair too, unless it has ``RepairSettings``.
 
     Source: the paper, sections III and IV. Its surviving text has lost digits; the values of
     ``steps``, ``population``, ``generations`` and ``survivors`` are reconstructed.
@@ -126,9 +128,9 @@ class Settings:
         """Genomes that one EA evaluates: a population, then its children."""
         return self.population + (self.generations - 1) * (self.population - self.survivors)
 
-    def of_repair(self, given: "Settings | None") -> "Settings":
-        """Returns the parameters of the repair: those given for it, in runs of this length."""
-        return self if given is None else dataclasses.replace(given, steps=self.steps)
+    def of_repair(self, given: "RepairSettings | None") -> "Settings":
+        """Returns the settings of the repair: these, with the parameters given for it."""
+        return self if given is None else dataclasses.replace(self, **dataclasses.asdict(given))
 
     def scaled(self, population: int) -> "Settings":
         """Returns these settings for another population size, in the paper's proportions.
@@ -146,3 +148,39 @@ class Settings:
             survivors=survivors,
             crossovers=round((population - survivors) // 2 * 12 / 25),
         )
+
+
+@dataclass(frozen=True)
+class RepairSettings:
+    """Parameters of the search of a repair, where they are not those of the diagnosis.
+
+    The length of a run is of ``Settings`` alone.
+
+    Example:
+        >>> import selfmodel
+        >>> print(selfmodel.RepairSettings(generations=60).scaled(20).survivors)
+        10
+
+    Attributes:
+        population, generations, survivors, tournament, mutation, crossovers: As of ``Settings``.
+
+    Raises:
+        InputError: As for ``Settings``.
+    """
+
+    population: int = Settings.population
+    generations: int = Settings.generations
+    survivors: int = Settings.survivors
+    tournament: int = Settings.tournament
+    mutation: float = Settings.mutation
+    crossovers: int = Settings.crossovers
+
+    def __post_init__(self) -> None:
+        checked = Settings().of_repair(self)
+        for name in dataclasses.asdict(self):
+            object.__setattr__(self, name, getattr(checked, name))
+
+    def scaled(self, population: int) -> "RepairSettings":
+        """Returns these settings for another population size; see ``Settings.scaled``."""
+        whole = Settings().of_repair(self).scaled(population)
+        return RepairSettings(**{name: getattr(whole, name) for name in dataclasses.asdict(self)})

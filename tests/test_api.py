@@ -1,6 +1,5 @@
 """Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
 
-import dataclasses
 import json
 from pathlib import Path
 
@@ -134,7 +133,7 @@ def test_results_have_figures_of_their_tables(
 
 
 def test_a_trial_runs_and_replays_to_the_bit(tmp_path: Path):
-    walk = selfmodel.evolve_controller("quadruped", KNEE, settings=SMALL)
+    walk = selfmodel.evolve("quadruped", KNEE, settings=SMALL)
     physical = selfmodel.simulated_robot("quadruped", KNEE)
     path = tmp_path / "walk.mcap"
     trial = selfmodel.run_trial(physical, walk, path, robot="quadruped", steps=60)
@@ -149,10 +148,10 @@ def test_a_controller_evolves_equally_from_names_and_objects():
     robot = selfmodel.load_robot("quadruped")
     knee = selfmodel.parse_hypothesis(KNEE, robot)
 
-    named = selfmodel.evolve_controller("quadruped", KNEE, design="cpg", settings=SMALL, seed=1)
+    named = selfmodel.evolve("quadruped", KNEE, design="cpg", settings=SMALL, seed=1)
 
     assert named.design.name == "cpg"
-    assert named == selfmodel.evolve_controller(
+    assert named == selfmodel.evolve(
         robot, knee, design=named.design, settings=SMALL, seed=1, threads=1
     )
 
@@ -161,20 +160,17 @@ def test_a_controller_evolves_equally_from_names_and_objects():
 def test_a_controller_evolves_as_the_first_gait_of_a_recovery(tmp_path: Path, options: dict):
     first = recovered(tmp_path / "run", kinds="jam", **options).trials[0].plan.controller
 
-    assert first == selfmodel.evolve_controller("quadruped", settings=SMALL, **options)
+    assert first == selfmodel.evolve("quadruped", settings=SMALL, **options)
 
 
 def test_a_repair_may_have_another_budget_than_the_diagnosis(tmp_path: Path):
-    larger = selfmodel.Settings(generations=2).scaled(
-        6
-    )  # of another length: that of the run counts
+    larger = selfmodel.RepairSettings(generations=2).scaled(6)
     same, other = (
         recovered(tmp_path / str(number), kinds="jam", repair="paper", repair_settings=given)
         for number, given in enumerate((None, larger))
     )
-    gait = selfmodel.evolve_controller(
-        "quadruped", settings=dataclasses.replace(larger, steps=60), repair="paper"
-    )
+    whole = selfmodel.Settings(generations=2, steps=60).scaled(6)
+    gait = selfmodel.evolve("quadruped", settings=whole, repair="paper")
 
     assert other.trials[0].plan.controller == gait
     assert (same.repair_evaluations, other.repair_evaluations) == (2 * 4, 2 * 9)
@@ -225,9 +221,9 @@ def test_a_trial_without_a_log_requires_a_robot():
 
 def test_an_unknown_design_and_a_negative_seed_are_refused():
     with pytest.raises(InputError, match="unknown kind of controller 'net'"):
-        selfmodel.evolve_controller("quadruped", design="net", settings=SMALL)
+        selfmodel.evolve("quadruped", design="net", settings=SMALL)
     with pytest.raises(InputError, match="expected a whole number of 0 or above as seed, got -1"):
-        selfmodel.evolve_controller("quadruped", settings=SMALL, seed=-1)
+        selfmodel.evolve("quadruped", settings=SMALL, seed=-1)
 
 
 def test_a_replay_of_wrong_notation_is_refused():

@@ -19,7 +19,8 @@ FACES = [folder for folder in FACES if "lazy_loader" in (folder / "__init__.py")
 PUBLIC = {
     *("load_robot", "Robot", "Hypothesis", "FaultKind", "ALL_KINDS", "PAPER_KINDS"),
     *("parse_hypothesis", "Simulator", "simulated_robot", "EnvironmentRobot", "PhysicalRobot"),
-    *("Controller", "Trial", "Trajectory", "evolve_controller", "run_trial", "read_log"),
+    *("Controller", "Trial", "Trajectory", "evolve", "run_trial", "read_log"),
+    "RepairSettings",
     *("write_log", "record", "evaluate", "Episode", "Study", "load"),
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "check_score", "check_next_trial"),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import selfmodel
-from selfmodel import Settings, studies
+from selfmodel import RepairSettings, Settings, studies
 from selfmodel.comparators import FORWARD_DISPLACEMENT, SENSOR_SERIES
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
@@ -107,7 +107,7 @@ def ran(place: Place, **options: object) -> tuple[object, ...]:
 
 
 def evolved(place: Place, **options: object) -> bytes:
-    found = selfmodel.evolve_controller(place.robot, **{"settings": SMALL, **options})
+    found = selfmodel.evolve(place.robot, **{"settings": SMALL, **options})
     return found.genome.tobytes()
 
 
@@ -357,11 +357,19 @@ REFUSED: dict[str, tuple[Call, str]] = {
     "a share of three": (lambda _: planned(only=3), "such as 2/8, in Python .* got 3"),
     "settings of a repair": (
         lambda _: planned(repair_settings=60),
-        r"settings of the repair such as selfmodel.Settings\(generations=60\), got .* int",
+        r"settings of the repair such as selfmodel.RepairSettings\(generations=60\), got .* int",
     ),
     "the budget of a repair": (
         lambda p: recovered(p, repair_settings={"generations": 60}),
         "settings of the repair such as .* dict",
+    ),
+    "settings of a run": (
+        lambda p: recovered(p, repair_settings=Settings(steps=99)),
+        "settings of the repair such as selfmodel.RepairSettings.*, got .* Settings",
+    ),
+    "a repair in numbers": (
+        lambda _: RepairSettings(population=10),
+        r"population must exceed the 50 survivors.*scaled\(10\)",
     ),
     "a repair": (lambda p: evolved(p, repair="robst"), "unknown repair 'robst': did you mean"),
     "a layer around nothing": (lambda p: evolved(p, repair="compensate"), "needs a controller"),

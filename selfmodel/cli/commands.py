@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, dataclass_transform
 
-from selfmodel.settings import STEPWISE, Settings
+from selfmodel.settings import STEPWISE, RepairSettings, Settings
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
@@ -422,10 +422,10 @@ def settings_of(options: Study | Recover, score: str | None = None) -> Settings:
     return small.scaled(options.population)
 
 
-def repair_settings_of(options: Repair | Recover, settings: Settings) -> Settings | None:
+def repair_settings_of(options: Repair | Recover, settings: Settings) -> RepairSettings | None:
     """Returns the parameters of the repair; None for those of the diagnosis."""
     population, generations = options.repair_population, options.repair_generations
     if population is None and generations is None:
         return None
-    own = replace(settings, generations=generations or settings.generations)
+    own = RepairSettings(generations=generations or settings.generations)
     return own.scaled(population or settings.population)

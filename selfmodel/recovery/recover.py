@@ -28,7 +28,7 @@ from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
 from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in, scores_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Simulator
@@ -89,7 +89,7 @@ class RecoveryLoop:
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
     make_repair: repairs.MakeRepair = repairs.RobustRepair
-    repair_settings: Settings | None = None
+    repair_settings: RepairSettings | None = None
     trials: tuple[Trial, ...] = field(default=(), init=False)
     diagnoses: tuple[Diagnosis, ...] = field(default=(), init=False)
     trials_left: int = field(default=0, init=False)

@@ -10,7 +10,7 @@ from typing import Any
 from selfmodel.errors import InputError, check_type
 from selfmodel.files import load_toml, path_of, read_file
 from selfmodel.plugins import check_known
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.studies import plans
 from selfmodel.studies.study import Study
 
@@ -19,8 +19,10 @@ PLANS: Mapping[str, Callable[..., Study]] = MappingProxyType(
 )
 """Functions that plan a study, by the value of the key ``study``."""
 
-TABLES = ("settings", "repair_settings")
-"""Keys with a table of ``Settings``."""
+TABLES: Mapping[str, type[Settings | RepairSettings]] = MappingProxyType(
+    {"settings": Settings, "repair_settings": RepairSettings}
+)
+"""Keys with a table, and what it gives."""
 
 MAX_BYTES = 2**20
 """Largest size of a file that is read, bytes."""
@@ -67,13 +69,14 @@ def _planned(keys: dict[str, Any]) -> Study:
     return PLANS[name](**keys | {key: _settings(key, keys[key]) for key in TABLES if key in keys})
 
 
-def _settings(key: str, table: Any) -> Settings:  # noqa: ANN401  # of any TOML type
+def _settings(key: str, table: Any) -> Settings | RepairSettings:  # noqa: ANN401  # of any TOML type
     """Returns the settings of a table, as ``--population`` scales them."""
-    check_type(table, dict, f"a table [{key}] with keys such as steps = 500")
-    names = [field.name for field in dataclasses.fields(Settings)]
+    check_type(table, dict, f"a table [{key}] with keys such as population = 60")
+    made = TABLES[key]
+    names = [field.name for field in dataclasses.fields(made)]
     for name in table:
         check_known(f"key of [{key}]", name, names)
     if table.keys() & {"survivors", "crossovers"} or "population" not in table:
-        return Settings(**table)
+        return made(**table)
     rest = {name: value for name, value in table.items() if name != "population"}
-    return Settings(**rest).scaled(table["population"])
+    return made(**rest).scaled(table["population"])

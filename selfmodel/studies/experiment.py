@@ -46,7 +46,7 @@ from selfmodel.recovery.scores import (
 from selfmodel.recovery.tracking import Reference, following, tracking
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.simulation.reality_gap import RealityGap
 from selfmodel.simulation.rollout import SimulationStats
 from selfmodel.simulation.simulator import Simulator
@@ -102,7 +102,7 @@ class Experiment:
     repair: str = plugins.ROBUST
     search: MakeSearch | str | None = None
     repertoire: Repertoire | None = None
-    repair_settings: Settings | None = None
+    repair_settings: RepairSettings | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from selfmodel.files import path_of
 from selfmodel.recovery.recover import NextTrial
 from selfmodel.recovery.repair import MakeSearch
 from selfmodel.recovery.scores import TRACKING, Score
-from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, Settings
+from selfmodel.settings import DIAGNOSTIC_SEARCHES, EA, STEPWISE, RepairSettings, Settings
 from selfmodel.simulation.reality_gap import MAX_GAP_LEVEL
 from selfmodel.studies import recoveries
 from selfmodel.studies.bodies import (
@@ -96,7 +96,7 @@ def ablation(
     score: str | Score | None = None,
     repair: str | None = None,
     search: str | MakeSearch | None = None,
-    repair_settings: Settings | None = None,
+    repair_settings: RepairSettings | None = None,
     only: Share | str = ALL,
 ) -> Study:
     """Returns a study in which every comparator diagnoses the same trials at equal cost.
@@ -232,7 +232,7 @@ def suite(
     score: str | Score | None = None,
     repair: str | None = None,
     search: str | MakeSearch | None = None,
-    repair_settings: Settings | None = None,
+    repair_settings: RepairSettings | None = None,
     only: Share | str = ALL,
 ) -> Study:
     """Returns a study of recoveries of many bodies with one comparator; see ``ablation``.

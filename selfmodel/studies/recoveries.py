@@ -47,7 +47,7 @@ from selfmodel.recovery.result import Event, SearchBegins
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot
-from selfmodel.settings import ADDED, Settings
+from selfmodel.settings import ADDED, RepairSettings, Settings
 from selfmodel.simulation.calibration import calibrate
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies import experiment as experiments
@@ -127,7 +127,7 @@ def repair_parameters(
     repair: str | None,
     search: str | MakeSearch | None,
     score: Score | str | None,
-    settings: Settings | None = None,
+    settings: RepairSettings | None = None,
     *,
     known: bool = False,
 ) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def repair_parameters(
     It is the robust one by default, or with a known controller a layer around that. Its settings
     are left out unless they are given.
     """
-    check_type(settings, Settings | None, REPAIR_SETTINGS)
+    check_type(settings, RepairSettings | None, REPAIR_SETTINGS)
     repair = repair or (plugins.COMPENSATE if known else plugins.ROBUST)
     if search == plugins.REPERTOIRE:
         raise InputError(
@@ -155,17 +155,17 @@ def repair_parameters(
         "repair": repair,
         "search": plugins.search_name(repair, search, None),
         "score": plugins.score_named(score) or plugins.DEFAULT_SCORES[repair],
-        **({} if settings is None else {REPAIR: settings.as_json()}),
+        **({} if settings is None else {REPAIR: dataclasses.asdict(settings)}),
     }
 
 
-def settings_of(parameters: Parameters) -> tuple[Settings, Settings | None]:
+def settings_of(parameters: Parameters) -> tuple[Settings, RepairSettings | None]:
     """Returns the settings of a point, and those of its repair; None for the same."""
     shared = parameters["shared"]
     settings, own = Settings(**shared["settings"]), shared.get(REPAIR)
     search = parameters.get("diagnostic_search", settings.diagnostic_search)
     settings = dataclasses.replace(settings, diagnostic_search=search)
-    return settings, None if own is None else Settings(**own)
+    return settings, None if own is None else RepairSettings(**own)
 
 
 def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:

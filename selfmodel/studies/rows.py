@@ -48,7 +48,8 @@ FORMER = {
 }
 """Names of columns of a study of bodies by those that they had in version 0.1."""
 
-AT_ENDS = tuple(f"{it}_{end}" for it in ("upright", "displacement", RETURN) for end in ENDS)
+UPRIGHT_AT_ENDS = tuple(f"upright_{end}" for end in ENDS)
+MEASURED_AT_ENDS = tuple(f"{it}_{end}" for it in ("displacement", RETURN) for end in ENDS)
 """What is reported at these ends beside the score; the return of a robot with a task."""
 
 OutcomeRows = Iterator[tuple[Any, ...]]
@@ -171,10 +172,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "suite": Kind(
             "recoveries",
             "robot case truth seed best correct verdict trials score unit control_steps "
-            f"{' '.join(ENDS)} regained outcome {' '.join(AT_ENDS)} return_most diverged "
-            "simulated_steps seconds repair search reason",
-            f"score unit control_steps regained outcome {' '.join(AT_ENDS)} return_most "
-            "simulated_steps repair search reason",
+            f"{' '.join((*ENDS, 'regained', 'outcome', *UPRIGHT_AT_ENDS, *MEASURED_AT_ENDS))} "
+            "return_most diverged simulated_steps seconds repair search reason",
+            "score unit control_steps return_most simulated_steps repair search reason regained "
+            f"outcome {' '.join((*UPRIGHT_AT_ENDS, *MEASURED_AT_ENDS))}",
             "robot case truth seed",
             lambda _rows: iter(()),  # its bodies have one comparator, and are no pairs
         ),

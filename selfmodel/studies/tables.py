@@ -23,9 +23,10 @@ from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
 from selfmodel.studies.recoveries import ENDS, RULE
 from selfmodel.studies.rows import (
-    AT_ENDS,
     KINDS,
+    MEASURED_AT_ENDS,
     REFERENCE,
+    UPRIGHT_AT_ENDS,
     ablation_notes,
     frame_of,
     methods_of,
@@ -119,14 +120,14 @@ def suite_summaries(rows: Sequence[Row]) -> list[Row]:
 
 def _summary(rows: Sequence[Row]) -> Row:
     runs, first = [row for row in rows if not row.get("reason")], rows[0]
-    up = {name: [row[name] for row in runs if row.get(name) is not None] for name in AT_ENDS[:3]}
+    up = {end: [row[end] for row in runs if row.get(end) is not None] for end in UPRIGHT_AT_ENDS}
     return {
         **_right(runs),
         **{name: first.get(name) for name in ("score", "unit", "control_steps")},
         **medians(runs, *ENDS, "regained"),
         "outcomes": outcomes_text(runs),
         **{name: sum(stayed) if stayed else None for name, stayed in up.items()},
-        **medians(runs, *AT_ENDS[3:]),
+        **medians(runs, *MEASURED_AT_ENDS),
         "return_most": first.get("return_most"),
         "trials": fmean(row["trials"] for row in runs) if runs else None,
         **medians(runs, "simulated_steps", "seconds"),

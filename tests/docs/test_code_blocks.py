@@ -38,7 +38,7 @@ TIME = re.compile(r"\d+(?=/s\b)|[\d.]+(?= s\b)")
 
 SEARCH = re.compile(
     r"selfmodel (recover|diagnose|calibrate|ablate|suite run|paper|render)"
-    r"|\b(recover|diagnose|evolve_controller)\("
+    r"|\b(recover|diagnose|evolve)\("
 )
 """Commands and calls that run an evolutionary algorithm, a calibration or that draw for seconds."""
 

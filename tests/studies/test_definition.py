@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from selfmodel.errors import InputError
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.studies import plans, read_study
 from selfmodel.studies.study import Study
 
@@ -41,7 +41,7 @@ def test_a_file_is_the_call_with_its_keys_and_a_population_has_the_papers_propor
         seeds=(0, 2),
         only="1/2",
         settings=Settings(steps=200).scaled(20),
-        repair_settings=Settings(population=60, survivors=40, crossovers=2),
+        repair_settings=RepairSettings(population=60, survivors=40, crossovers=2),
     )
     found = read(tmp_path, MINE)
 

@@ -96,7 +96,7 @@ def test_a_score_in_python_is_refused_by_what_it_needs_and_not_by_its_name(
     with pytest.raises(InputError, match=rf"base of robot is fixed, and the score {score.name}"):
         selfmodel.recover(physical, physical, arm(), tmp_path / "run", score=score)
     with pytest.raises(InputError, match="give --score tracking"):
-        selfmodel.evolve_controller(arm(), score=score)
+        selfmodel.evolve(arm(), score=score)
     check_measurable(dataclasses.replace(score, needs_free_base=False), arm())
     assert not (tmp_path / "run").exists()
 

@@ -8,7 +8,7 @@ import pytest
 
 from selfmodel.arguments import robot_entry
 from selfmodel.errors import InputError
-from selfmodel.settings import Settings
+from selfmodel.settings import RepairSettings, Settings
 from selfmodel.studies.bodies import bodies_of, known_cases
 from selfmodel.studies.plans import ablation, paper, suite
 from selfmodel.studies.recoveries import ON_ROBOT, planned
@@ -130,7 +130,7 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         **dict(zip(names, ("paper", "ea", "displacement"), strict=True)),
     }
     assert plain.place == same.place != papers.place
-    (larger,) = made(tmp_path, repair_settings=Settings(generations=9)).cells()
+    (larger,) = made(tmp_path, repair_settings=RepairSettings(generations=9)).cells()
     (gait, *_), (own, *_) = (
         list((one.needs.get("trials") or one).needs.values()) for one in (plain, larger)
     )
@@ -159,7 +159,11 @@ def test_the_repair_is_that_of_a_recovery_unless_another_is_given_which_has_its_
         (ablated, {"settings": Settings(trials=7)}, "at most 6 trials, got 7"),
         (ablated, {"repair": "papers"}, "unknown repair 'papers'"),
         (ablated, {"repair": "robust", "bank": Path("gaits")}, "nothing is evolved"),
-        (ablated, {"repair_settings": Settings(), "bank": Path("gaits")}, "nothing is evolved"),
+        (
+            ablated,
+            {"repair_settings": RepairSettings(), "bank": Path("gaits")},
+            "nothing is evolved",
+        ),
         (ablated, {"bank": Path("gaits")}, "quadruped-5.npz: expected a controller file"),
         (ablated, {"robots": ["a.xml", "./a.xml"], "cases": [9]}, "would have the same file names"),
         (ablated, {"only": (0, 1)}, r"only=\(2, 8\), got \(0, 1\)"),
