@@ -27,15 +27,11 @@ from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.next_trial import by_disagreement
 from selfmodel.recovery.recover import NextTrial, by_repair
 from selfmodel.recovery.repair import (
-    LAYER_CONDITIONS,
-    LAYER_COST,
     MakeRepair,
     MakeSearch,
     RepairSearch,
     RobustRepair,
-    around_identity,
     from_repertoire,
-    layered,
 )
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import (
@@ -299,12 +295,9 @@ def repair(
                 f"the repair {COMPENSATE} has CMA-ES from the known controller, got the search "
                 f"{chosen}: leave search and repertoire out, or give the repair {ROBUST}"
             )
-        return partial(
-            RobustRepair,
-            make_search=around_identity,
-            conditions=LAYER_CONDITIONS,
-            cost=LAYER_COST,
-        )
+        from selfmodel.recovery.layers import LayerRepair  # noqa: PLC0415  # few robots have one
+
+        return LayerRepair  # type: ignore[return-value]  # of the design of ``repaired_around``
     if repertoire is not None:
         make_search = from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
@@ -337,6 +330,8 @@ def repaired_around(
             f"the repair {name} needs a controller that walks, got the design {design.name}: give "
             f"--controller FILE, a policy file, a .npz or a log; in Python gait="
         )
+    from selfmodel.recovery.layers import layered  # noqa: PLC0415  # few robots have one
+
     inner = layered(gait)
     return name, inner.design, inner
 

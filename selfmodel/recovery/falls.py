@@ -1,5 +1,7 @@
 """Falls of a robot: the first step at which its base lies or is turned over, and stays so."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -8,6 +10,7 @@ from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.robot import Robot
 from selfmodel.rotation import directions
+from selfmodel.simulation.simulator import Until
 from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import Trial
 
@@ -29,10 +32,35 @@ def falls_of(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> In
     The hypothesis matters because a slope tilts the ground. A robot without gravity, as a fish of
     dm_control, turns over and does not fall.
     """
-    options = robot.model.opt
-    if options.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY or not options.gravity.any():
+    if not _has_gravity(robot):
         return np.full(trajectory["base_position"].shape[:-2], trajectory.steps)
     return first_falls(trajectory, build(robot, hypothesis).normal, robot.standing_height)
+
+
+def _has_gravity(robot: Robot) -> bool:
+    options = robot.model.opt
+    disabled = options.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    return bool(not disabled and options.gravity.any())
+
+
+def fallen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> Until | None:
+    """Returns the function that tells which runs have fallen, whatever follows; None if none can.
+
+    The window of a fall is over: the rest of the run does not change the step of the fall.
+
+    Args:
+        robot: The robot.
+        hypotheses: The faults of the robot in each run.
+    """
+    if not _has_gravity(robot):
+        return None
+    normals = np.array([build(robot, hypothesis).normal for hypothesis in hypotheses])
+
+    def have_fallen(begun: Trajectory) -> BoolArray:
+        falls = first_falls(begun, normals, robot.standing_height)
+        return np.asarray(falls + steps_in(FALLEN_TIME, begun) <= begun.steps)
+
+    return have_fallen
 
 
 def first_falls(trajectory: Trajectory, normals: FloatArray, standing_height: float) -> IndexArray:

@@ -39,11 +39,9 @@ RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 
 
 def by_repair(loop: "RecoveryLoop") -> Controller:
-    """Returns the best candidate of the repair that was not tried yet, or a mutant of the best."""
-    candidates, tried = [each.controller for each in loop.repaired()], loop.controllers
-    untried = [controller for controller in candidates if controller not in tried]
-    settings = loop.settings.of_repair(loop.repair_settings)
-    return (untried or repairs.untried_mutants(candidates[:1], tried, settings, loop.rng))[0]
+    """Returns the best candidate of the repair that was not tried yet, or else the best one."""
+    candidates = [each.controller for each in loop.repaired()]
+    return next((one for one in candidates if one not in loop.controllers), candidates[0])
 
 
 @dataclass(kw_only=True, eq=False)

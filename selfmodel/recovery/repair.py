@@ -11,7 +11,6 @@ transfer).
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +22,7 @@ from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, GenomeSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.cma_es import SEED_DEVIATION, CmaEs
+from selfmodel.recovery.falls import fallen
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, scores_of
 from selfmodel.robot.designs import network_for
@@ -44,16 +44,6 @@ SHORT_STEPS = 200
 REPERTOIRE_COST = 1 / 8
 """Control steps of a first generation of a repertoire's gaits, relative to those of the paper's
 repair EA."""
-
-LAYER_COST = 0.26
-"""Rollouts of a repair of a compensating layer, relative to the evaluations of the paper's EA: its
-search begins at a controller that walks."""
-
-LAYER_DEVIATION, LAYER_POPULATION, LAYER_CONDITIONS = 0.1, 10, 4
-"""Standard deviation, genomes and conditions of a generation of a layer's search. With a deviation
-of 0.3, nearly all layers of a Go1 fell; 0.1 is 0.05 of a command's half range, and a gain of 7 %.
-With 16 genomes under one condition each, 9 of 16 robots across a gap fell, and with 4 conditions 4.
-"""
 
 HALVED = 0.4
 """Share of a search's control steps in which its rollouts have half of the steps of a trial, with
@@ -203,10 +193,12 @@ class RobustFitness:
     ) -> FloatArray:
         """Returns scores, ``(controllers, count)``; negative infinity for a diverged rollout."""
         conditions = draw_samples(self.hypotheses, self.uncertainty, count, rng)
-        outcome = self.simulator.run_under(
-            conditions, self.uncertainty, controllers, steps, self.score.record
-        )
         faults = [condition.hypothesis for condition in conditions]
+        ends = self.score.ends_at_fall
+        until = fallen(self.simulator.robot, faults * len(controllers)) if ends else None
+        outcome = self.simulator.run_under(
+            conditions, self.uncertainty, controllers, steps, self.score.record, until=until
+        )
         return scores_of(self.score, self.simulator.robot, faults, outcome)
 
 
@@ -216,8 +208,6 @@ class RobustRepair:
 
     Attributes:
         make_search: Makes the search for genomes.
-        conditions: Number of conditions under which the search evaluates a genome.
-        cost: Rollouts relative to the evaluations of the paper's EA; None for ``rollouts_of``.
     """
 
     simulator: Simulator
@@ -225,8 +215,6 @@ class RobustRepair:
     design: Design
     score: Score = UPRIGHT
     make_search: MakeSearch = CmaEs
-    conditions: int = 1
-    cost: float | None = None
     evaluations: int = field(default=0, init=False)
 
     def __call__(
@@ -243,14 +231,19 @@ class RobustRepair:
         not. A candidate whose rollouts diverged under most conditions is left out.
         """
         fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
-        comparisons = _comparisons(self.settings)
+        comparisons = comparisons_of(self.settings)
         compared = sum(candidates * conditions for candidates, conditions in comparisons)
         known = [controller for controller in seeds if controller.design == self.design]
-        afforded = rollouts_of(self.settings, known=bool(known))
-        if self.cost is not None:
-            afforded = compared + round(self.cost * self.settings.evaluations)
-        rollouts = afforded - compared
-        search = self._searched(fitness, seeds, rollouts, rng, on_generation)
+        rollouts = rollouts_of(self.settings, known=bool(known)) - compared
+        genomes = [controller.genome for controller in known]
+        search = self.make_search(self.design.weights, self.settings, rng, genomes)
+        run_search(
+            *(search, fitness, self.design),
+            rollouts=rollouts,
+            steps=self.settings.steps,
+            rng=rng,
+            on_generation=on_generation,
+        )
         self.evaluations += search.evaluations
         count = comparisons[0][0]
         near = mutants(known, count // 3, self.settings, rng) if known else []
@@ -262,46 +255,82 @@ class RobustRepair:
             scores = fitness(candidates[:count], conditions, self.settings.steps, rng)
             best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
             candidates, scores = [candidates[i] for i in best], scores[best]
-        finite = np.isfinite(scores)
-        viable = np.flatnonzero(finite.mean(axis=1) >= VIABLE)
-        if not len(viable):
-            share = f"{np.count_nonzero(finite)} of {finite.size}"
-            best_of = f"with the best {len(finite)} of {search.evaluations} controllers"
-            raise _divergence(self.simulator, hypotheses[0], f"{share} {best_of}")
-        return tuple(CandidateController(candidates[i], scores[i]) for i in viable)
+        return viable(candidates, scores, fitness, search.evaluations)
 
-    def _searched(
-        self,
-        fitness: RobustFitness,
-        seeds: Sequence[Controller],
-        rollouts: int,
-        rng: np.random.Generator,
-        on_generation: GenerationCallback,
-    ) -> GenomeSearch:
-        """Returns a search that has simulated as many control steps as whole rollouts have.
 
-        The random genomes of the first generation need few steps. Where short rollouts rank
-        controllers as whole ones do, the first part of a search affords twice as many of them.
-        """
-        design, stats, whole = self.design, self.simulator.stats, self.settings.steps
-        known = _genomes_of(design, seeds)
-        search = self.make_search(design.weights, self.settings, rng, known)
-        total, begin = rollouts * whole, stats.steps
-        halved = HALVED * total if self.score.grows_with_time else 0.0
-        short, half = min(SHORT_STEPS, whole), min(whole, max(SHORT_STEPS, whole // 2))
+def run_search(
+    search: GenomeSearch,
+    fitness: RobustFitness,
+    design: Design,
+    *,
+    rollouts: int,
+    steps: int,
+    rng: np.random.Generator,
+    on_generation: GenerationCallback,
+    conditions: int = 1,
+    count_ended: bool = True,
+) -> None:
+    """Runs a search for as many control steps as whole rollouts have.
 
-        def scores(asked: FloatArray) -> FloatArray:
-            controllers, spent = [Controller(design, one) for one in asked], stats.steps - begin
-            steps = short if not spent else half if spent < halved else whole
-            return robust(fitness(controllers, self.conditions, steps, rng))
+    The first generation needs few steps: its genomes are random. Where short rollouts rank
+    controllers as whole ones do, the first part of a search affords twice as many of them.
 
-        def generations_left() -> int:
-            size, spent = len(search.ask()) * self.conditions, stats.steps - begin
-            halves = math.ceil(max(0.0, halved - spent) / (size * half))
-            return halves + math.ceil(max(0.0, total - max(spent, halved)) / (size * whole))
+    Args:
+        search: The search; its fitness is maximised.
+        fitness: Scores of controllers.
+        design: Design of the genomes.
+        rollouts: Whole rollouts that the search may cost.
+        steps: Control steps of a whole rollout.
+        rng: Random number generator of the conditions.
+        on_generation: Callback, called after each generation.
+        conditions: Conditions under which each genome is evaluated.
+        count_ended: Whether the steps count that a rollout did not simulate because it ended, as by
+            a fall. If not, a search in which most fall has more generations.
+    """
+    stats, begin = fitness.simulator.stats, fitness.simulator.stats.steps
+    total, spent = rollouts * steps, 0
+    halved = HALVED * total if fitness.score.grows_with_time else 0.0
+    short, half = min(SHORT_STEPS, steps), min(steps, max(SHORT_STEPS, steps // 2))
 
-        evolution.evolve(search, scores, on_generation, generations_left, noisy=True)
-        return search
+    def scores(asked: FloatArray) -> FloatArray:
+        nonlocal spent
+        now = short if not spent else half if spent < halved else steps
+        found = robust(fitness([Controller(design, one) for one in asked], conditions, now, rng))
+        spent = spent + len(asked) * conditions * now if count_ended else stats.steps - begin
+        return found
+
+    def generations_left() -> int:
+        size = len(search.ask()) * conditions
+        halves = math.ceil(max(0.0, halved - spent) / (size * half))
+        return halves + math.ceil(max(0.0, total - max(spent, halved)) / (size * steps))
+
+    evolution.evolve(search, scores, on_generation, generations_left, noisy=True)
+
+
+def viable(
+    controllers: Sequence[Controller],
+    scores: FloatArray,
+    fitness: RobustFitness,
+    evaluations: int,
+) -> tuple[CandidateController, ...]:
+    """Returns the candidates whose rollouts remained finite under most conditions.
+
+    Args:
+        controllers: Controllers, best first.
+        scores: Their scores, ``(controllers, conditions)``.
+        fitness: What scored them.
+        evaluations: Number of controllers evaluated by the search, for the error.
+
+    Raises:
+        WorkError: None did.
+    """
+    finite = np.isfinite(scores)
+    rows = np.flatnonzero(finite.mean(axis=1) >= VIABLE).tolist()
+    if not rows:
+        share = f"{np.count_nonzero(finite)} of {finite.size}"
+        best_of = f"with the best {len(finite)} of {evaluations} controllers"
+        raise _divergence(fitness.simulator, fitness.hypotheses[0], f"{share} {best_of}")
+    return tuple(CandidateController(controllers[i], scores[i]) for i in rows)
 
 
 def robust(scores: FloatArray) -> FloatArray:
@@ -325,7 +354,7 @@ def rollouts_of(settings: Settings, *, known: bool) -> int:
     return round(min(most, max(COST * settings.evaluations, ENOUGH)) if known else most)
 
 
-def _comparisons(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
+def comparisons_of(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]]:
     """Returns the number of candidates and of conditions of both comparisons."""
     finalists = min(FINALISTS, settings.population)
     rollouts = JUDGING * settings.evaluations / 2
@@ -391,35 +420,6 @@ def from_repertoire(repertoire: Repertoire) -> MakeSearch:
         )
 
     return make
-
-
-def _near_identity(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
-    return np.clip(LAYER_DEVIATION * rng.standard_normal(shape), -1, 1)
-
-
-around_identity: MakeSearch = partial(
-    CmaEs,
-    draw=_near_identity,
-    random=LAYER_POPULATION,
-    deviation=LAYER_DEVIATION,
-    seed_deviation=LAYER_DEVIATION,
-    starts=1,
-    population=LAYER_POPULATION,
-)
-"""Makes a run of CMA-ES from the best known layer, or else near that which changes nothing."""
-
-
-def layered(controller: Controller) -> Controller:
-    """Returns a controller within a compensating layer that changes nothing.
-
-    A controller that has a layer is returned as it is.
-    """
-    from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few robots have one
-
-    if isinstance(controller.design, Compensated):
-        return controller
-    design = Compensated.around(controller)
-    return Controller(design, np.zeros(design.weights))
 
 
 def _divergence(simulator: Simulator, hypothesis: Hypothesis, finite: str) -> WorkError:

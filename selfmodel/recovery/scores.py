@@ -70,6 +70,7 @@ class Score:
             displacement.
         needs_touch: Whether only a robot with touch sensors has the score.
         optional: Signals of ``record`` without which a trial has a score all the same.
+        ends_at_fall: Whether nothing counts from a fall on, so that a rollout may end there.
         episode: Rewards in an episode of the dm_control task of which the score is the return, of 1
             at most each; None for any other score.
     """
@@ -82,6 +83,7 @@ class Score:
     needs_free_base: bool = False
     needs_touch: bool = False
     optional: tuple[Signal, ...] = ()
+    ends_at_fall: bool = False
     episode: int | None = None
 
     def most(self, steps: int) -> int | None:
@@ -188,7 +190,11 @@ DISPLACEMENT = _metres(
 """Forward displacement, m. Source: the paper, section III."""
 
 UPRIGHT = _metres(
-    "upright", ("base_position", "base_orientation"), _upright, optional=("base_orientation",)
+    "upright",
+    ("base_position", "base_orientation"),
+    _upright,
+    optional=("base_orientation",),
+    ends_at_fall=True,
 )
 """Forward displacement up to the last step before the robot falls, m.
 
@@ -220,6 +226,7 @@ STEPS = Score(
     needs_free_base=True,
     needs_touch=True,
     optional=UPRIGHT.record,
+    ends_at_fall=True,
 )
 """Number of times that feet come down before the robot falls, for a robot without odometry.
 
@@ -286,7 +293,7 @@ def upright_within(
     name = f"{UPRIGHT.name} within {' and '.join(texts)}" if texts else UPRIGHT.name
     record = (*UPRIGHT.record, "joint_velocities", "joint_efforts")
     signals = (*record, "joint_positions") if compares_bodies else record
-    return _metres(name, signals, of, optional=signals[1:])
+    return _metres(name, signals, of, optional=signals[1:], ends_at_fall=True)
 
 
 def _depths(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:

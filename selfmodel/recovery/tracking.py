@@ -129,6 +129,7 @@ def following(velocity: Sequence[float]) -> Score:
         grows_with_time=True,
         needs_free_base=True,
         optional=("base_position",),
+        ends_at_fall=True,
     )
 
 

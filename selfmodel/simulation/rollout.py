@@ -107,12 +107,18 @@ class RobotBatch:
             self._batch.set_models([variant.model for variant in variants])
         self.bind: Bind = self._batch.bind
         self._ids: IndexArray | None = None
-        self._failed = np.zeros(len(variants), dtype=bool)
+        self._failed, self._ended = np.zeros((2, len(variants)), dtype=bool)
 
     @property
     def running(self) -> IndexArray:
         """Indices of the simulations that are stepped."""
-        return np.flatnonzero(~self._failed)
+        return np.flatnonzero(~(self._failed | self._ended))
+
+    def end(self, ended: BoolArray) -> None:
+        """Steps some simulations no longer, by their mask, ``(n,)``; they keep their states."""
+        if (ended & ~self._ended).any():
+            self._ended |= ended
+            self._ids = self.running
 
     def reset(self, stage: mujoco.mjtStage) -> None:
         """Resets all simulations to the reference pose, and computes up to a stage of a step."""
@@ -273,6 +279,14 @@ class Rollout:
         """Sends the motors the commands that reach them at a step, by the delay of each run."""
         rows = (step - self._delays) % len(self._sent)
         self._motors[:] = self._sent[rows, np.arange(len(rows))]
+
+    def end(self, ended: BoolArray) -> int:
+        """Ends some rollouts, by their mask, ``(n,)``; returns how many go on.
+
+        The state of a rollout that has ended does not change.
+        """
+        self._batch.end(ended)
+        return len(self._batch.running)
 
     def diverged(self) -> BoolArray:
         """Returns a mask of the rollouts that have diverged or had a MuJoCo warning, ``(n,)``."""

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
-from selfmodel.arrays import FloatArray
+from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.errors import check_type, typed, unknown_name, whole_number
 from selfmodel.faults.build import apply_faults, build
@@ -31,6 +31,12 @@ from selfmodel.trials.trajectory import Trajectory
 
 Run = tuple[Hypothesis, CommandSource]
 """A simulation: faults of the robot, and the source of its commands."""
+
+Until = Callable[[Trajectory], BoolArray]
+"""Function of the signals so far, ``(n, steps, width)``; tells which runs may end, ``(n,)``."""
+
+UNTIL_EVERY = 10
+"""Control steps between two calls of an ``Until``."""
 
 MAX_CACHED_VARIANTS, MAX_CACHED_ENSEMBLES = 1024, 16
 """Largest numbers of cached models, and of cached ensembles of about 8 models, if the memory does
@@ -159,8 +165,12 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
+        *,
+        until: Until | None = None,
     ) -> SimulationResult:
         """Simulates each driver under each condition.
+
+        A run that may end by ``until`` has its last state from then on.
 
         Returns:
             Signals of ``(drivers, conditions, steps, width)``, and a mask of
@@ -176,6 +186,7 @@ class Simulator:
             record,
             start=np.tile(start, (count, 1)),
             disturb=domain.measurement_noise(robot, variants, conditions, uncertainty),
+            until=until,
         )
         return flat.grouped(count, len(conditions))
 
@@ -186,6 +197,8 @@ class Simulator:
         drivers: Sequence[CommandSource],
         steps: int,
         record: Sequence[Signal],
+        *,
+        until: Until | None = None,
         **changes: Any,  # noqa: ANN401  # ``start``, ``speeds`` and ``disturb`` of a rollout
     ) -> SimulationResult:
         names, n = self.robot.anatomy.names, len(variants)
@@ -197,15 +210,21 @@ class Simulator:
         )
         # Steps first during the run, so that each step is written to contiguous memory.
         kept = {signal: np.empty((steps, n, names.width(signal))) for signal in record}
+        time = np.arange(steps, dtype=np.float64) * self.robot.control_timestep
         for k in rollout.steps(steps):
             for signal, rows in kept.items():
                 rows[k] = rollout.live[signal]()
+            if until and k % UNTIL_EVERY == UNTIL_EVERY - 1:
+                begun = {signal: rows[: k + 1].swapaxes(0, 1) for signal, rows in kept.items()}
+                if not rollout.end(until(Trajectory(names, time[: k + 1], begun))):
+                    for rows in kept.values():
+                        rows[k + 1 :] = rows[k]
+                    break
         diverged = rollout.diverged()
         self.stats.count(n, 0, diverged)
         signals = {
             signal: np.ascontiguousarray(rows.swapaxes(0, 1)) for signal, rows in kept.items()
         }
-        time = np.arange(steps, dtype=np.float64) * self.robot.control_timestep
         return SimulationResult(Trajectory(names, time, signals), diverged)
 
 

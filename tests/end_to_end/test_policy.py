@@ -18,7 +18,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
-from selfmodel.recovery.repair import layered
+from selfmodel.recovery.layers import layered
 from selfmodel.recovery.tracking import following
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.domain import (
@@ -365,10 +365,9 @@ def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     assert found["repair"] == "compensate"
     assert found["controller"] == "compensation"
     assert [trial["stage"] for trial in found["trials"]] == ["before", "after", "recovery"]
-    assert len({driver.design for driver in drivers}) == 1
-    assert isinstance(drivers[0].design, Compensated)
-    assert drivers[0].design.base == policy
-    assert [bool(driver.genome.any()) for driver in drivers] == [False, False, True]
+    assert all(isinstance(driver.design, Compensated) for driver in drivers)
+    assert {driver.design.base for driver in drivers} == {policy}
+    assert not any(driver.genome.any() for driver in drivers[:2]), "the policy as it is"
 
     repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
     (again, *_) = printed(*RECOVER, *repaired, cwd=tmp_path)["trials"]

@@ -28,12 +28,14 @@ from selfmodel.recovery.repair import (
     robust,
     rollouts_of,
 )
-from selfmodel.recovery.scores import DISPLACEMENT, Score
+from selfmodel.recovery.scores import DISPLACEMENT, SCORES, Score, upright_within
+from selfmodel.recovery.tracking import following
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.designs import DESIGNS, network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import suite_bodies
 from selfmodel.trials.trajectory import forward_displacement
 from tests.helpers.drivers import random_controllers, random_cpgs, random_repertoire
 from tests.helpers.hostile import unstable
@@ -137,6 +139,27 @@ def test_scores_are_those_of_each_condition_and_minus_infinity_of_a_divergence(q
     np.testing.assert_array_equal(alone, scores[1:2])
     assert np.isneginf(diverged).all()
     assert np.isneginf(robust(diverged)).all()
+
+
+ENDING = [*(one for one in SCORES.values() if one.ends_at_fall)]
+ENDING += [upright_within(max_speed=8.0), following((0.3, 0.0, 0.0))]
+
+
+@pytest.mark.parametrize("score", ENDING, ids=lambda one: one.name)
+def test_a_rollout_ends_at_a_fall_where_nothing_counts_after_it_to_the_same_bits(score: Score):
+    hopper = suite_bodies.robot("hopper", "hop")
+    drivers = [*random_controllers(hopper, 6), *random_controllers(hopper, 1, seed=9)]
+    certain = assumed_uncertainty(hopper)
+    steps, found = list[int](), list[np.ndarray]()
+    for ends in (True, False):
+        own = dataclasses.replace(score, ends_at_fall=ends)
+        simulator = Simulator(hopper, 1)
+        fitness = RobustFitness(simulator, own, (INTACT,), certain)
+        found.append(fitness(drivers, 3, 250, np.random.default_rng(0)))
+        steps.append(simulator.stats.steps)
+
+    assert found[0].tobytes() == found[1].tobytes()
+    assert steps[0] < steps[1], "some have fallen"
 
 
 @pytest.mark.search

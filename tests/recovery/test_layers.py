@@ -1,0 +1,90 @@
+"""Promises of the repair by layers: never worse than none, and the smallest that regains enough."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from selfmodel.controllers.compensation import Compensated
+from selfmodel.controllers.controller import Controller
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
+from selfmodel.progress import ignore
+from selfmodel.recovery.layers import LayerRepair, layered
+from selfmodel.recovery.repair import CandidateController, RobustFitness
+from selfmodel.recovery.scores import DISPLACEMENT
+from selfmodel.recovery.uncertainty import assumed_uncertainty
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.simulation.simulator import Simulator
+from tests.helpers.drivers import random_cpgs
+
+TINY = dataclasses.replace(Settings().scaled(60), steps=20)
+SOUND = 1.0
+"""Score of the intact robot, whose layer of zeros scores 0 after the failure."""
+
+
+@pytest.fixture
+def none(quadruped: Robot) -> Controller:
+    """A CPG within a layer that changes nothing."""
+    return layered(random_cpgs(quadruped, 1)[0])
+
+
+def found_by(
+    robot: Robot,
+    none: Controller,
+    value: Callable[[np.ndarray], float],
+    tried: Sequence[Controller] = (),
+) -> tuple[CandidateController, ...]:
+    """The candidates of a repair, in a world in which a layer has a value by its genome."""
+
+    def scored(
+        fitness: RobustFitness, layers: Sequence[Controller], count: int, *_: object
+    ) -> np.ndarray:
+        intact = fitness.hypotheses == (INTACT,)
+        values = [SOUND if intact else value(one.genome) for one in layers]
+        fitness.simulator.stats.steps += len(layers) * count * TINY.steps
+        return np.repeat(values, count).reshape(len(layers), count)
+
+    repair = LayerRepair(Simulator(robot, 1), TINY, none.design, DISPLACEMENT)
+    damage = parse("motor:front_left_knee=0", robot.anatomy)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RobustFitness, "__call__", scored)
+        rng = np.random.default_rng(0)
+        uncertainty = assumed_uncertainty(robot)
+        return repair((damage,), lambda: uncertainty, [none, *tried], rng, ignore)
+
+
+def test_where_every_change_is_worse_the_robot_is_not_changed(quadruped: Robot, none: Controller):
+    (found,) = found_by(quadruped, none, lambda genome: -np.abs(genome).sum())
+    assert not found.controller.genome.any()
+    assert found.mean == 0
+
+
+def test_the_smallest_layer_that_regains_enough_is_the_repair(quadruped: Robot, none: Controller):
+    found = found_by(quadruped, none, lambda genome: 5 * genome[0])
+    assert {one.controller.design for one in found} == {none.design}
+    values = [one.mean for one in found]
+    assert values == sorted(values, reverse=True)
+    assert values[0] >= 0.8 * SOUND
+    assert values[-1] > 0
+
+
+def test_a_search_that_stalls_goes_on_with_the_larger_layer(quadruped: Robot, none: Controller):
+    small = none.design.weights
+    found = found_by(quadruped, none, lambda genome: 0.1 * genome[0] + genome[small:].sum())
+    best = found[0].controller
+    assert best.design == dataclasses.replace(none.design, feedback=True)
+    assert best.genome[small:].any()
+
+
+def test_a_layer_that_was_tried_is_begun_at_and_not_handed_out_again(
+    quadruped: Robot, none: Controller
+):
+    large = Compensated.around(none, feedback=True)
+    tried = Controller(large, np.full(large.weights, 0.3))
+    found = found_by(quadruped, none, lambda genome: genome.mean(), [tried])
+    assert tried not in [one.controller for one in found]
+    assert found[0].mean > 0.3, "the search goes on from what was tried"
+    assert {one.controller.design for one in found} == {large}
