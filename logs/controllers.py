@@ -6,8 +6,8 @@ design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``,
 (float64, centre and half width per motor).
 
 In place of a number, a policy has ``content`` (its operators, terms and action, as JSON) and the
-tensors of its network, and a compensating layer ``base`` (the bytes of the controller within) and
-``feedback``.
+tensors of its network, a fine-tuned one also ``features`` and ``driven``, and a compensating layer
+``base`` (the bytes of the controller within) and ``feedback``.
 """
 
 import io
@@ -46,8 +46,8 @@ KINDS: Mapping[str, tuple[Callable[..., Design], str, str]] = {
 }
 """Class of each kind of design, by its name, with the name and type code of its own number."""
 
-POLICY, LAYER = "policy", "compensation"
-"""Names of the two designs without a number of their own."""
+POLICY, FINETUNED, LAYER = "policy", "finetuned", "compensation"
+"""Names of the designs without a number of their own."""
 
 NPZ_FAILURES = (
     ValueError,  # numpy's headers
@@ -105,7 +105,7 @@ def controller_bytes(controller: Controller) -> bytes:
 
 def parse_controller(data: bytes, source: str) -> Controller:
     """Returns the controller of bytes that ``controller_bytes`` made; errors name the source."""
-    return _parsed(data, source, (*KINDS, POLICY, LAYER))
+    return _parsed(data, source, (*KINDS, POLICY, FINETUNED, LAYER))
 
 
 def _parsed(data: bytes, source: str, known: Sequence[str]) -> Controller:
@@ -136,6 +136,10 @@ _GRAPH = ("input", "output", "inputs", "outputs", "nodes")
 """Attributes of a network beside its tensors."""
 
 
+_CHANGE = {"features": "f2", "driven": "i1"}
+"""Arrays of a fine-tuned policy beside those of the policy, with their types and ranks."""
+
+
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     if design.name in KINDS:
         number = KINDS[design.name][1]
@@ -144,7 +148,7 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     from selfmodel.controllers.graph import Graph  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
 
-    if isinstance(design, Policy) and design.name == POLICY:
+    if isinstance(design, Policy) and design.name in (POLICY, FINETUNED):
         graph = design.graph
         if not isinstance(graph, Graph):
             raise InputError(f"no file holds the function {graph.name}: give its policy file again")
@@ -152,7 +156,9 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
         of_graph |= {"states": graph.states} if graph.states else {}
         content = msgspec.json.encode({**of_graph, "interface": design.interface})
         tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
-        return {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
+        arrays = {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
+        own = _CHANGE if design.name == FINETUNED else {}
+        return arrays | {name: np.array(getattr(design, name)) for name in own}
     if isinstance(design, Compensated):
         base = np.frombuffer(controller_bytes(design.base), dtype=np.uint8)
         return {"base": base, "feedback": np.array(design.feedback)}
@@ -168,11 +174,11 @@ def _narrow(tensor: FloatArray) -> NDArray[Any]:
 
 def _own_types(kind: str, arrays: Arrays) -> dict[str, str]:
     """Returns the types and ranks of these arrays, for ``check_types``."""
-    if kind == POLICY:
+    if kind in (POLICY, FINETUNED):
         tensors = {
             name: f"f{each.ndim}" for name, each in arrays.items() if name.startswith(_TENSOR)
         }
-        return {"content": "u1", **tensors}
+        return {"content": "u1", **tensors, **(_CHANGE if kind == FINETUNED else {})}
     if kind == LAYER:
         return {"base": "u1", "feedback": "b0"}
     _, number, code = KINDS[kind]
@@ -193,7 +199,7 @@ def _design(
     from selfmodel.controllers.graph import Graph, Node, State  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Interface, Policy  # noqa: PLC0415  # few controllers are one
 
-    if kind == POLICY:
+    if kind in (POLICY, FINETUNED):
         types = (str, str, int, int, tuple[Node, ...], Interface)
         fields = list(zip((*_GRAPH, "interface"), types, strict=True))
         states = ("states", tuple[State, ...], ())  # absent of a feed-forward network
@@ -207,9 +213,16 @@ def _design(
             if name.startswith(_TENSOR)
         }
         graph = Graph(**of_graph, tensors=tensors)
-        return Policy(*ends, ranges=ranges, graph=graph, interface=interface)
+        policy = Policy(*ends, ranges=ranges, graph=graph, interface=interface)
+        if kind == POLICY:
+            return policy
+        from selfmodel.controllers.trained import Finetuned  # noqa: PLC0415  # few controllers are one
+
+        rows, driven = arrays["features"].tolist(), tuple(arrays["driven"].tolist())
+        change: Any = {"features": tuple(map(tuple, rows)), "driven": driven}
+        return Finetuned(**vars(policy), **change)
     # Without a layer, which could have another within, and so on.
-    base = _parsed(arrays["base"].tobytes(), source, (*KINDS, POLICY))
+    base = _parsed(arrays["base"].tobytes(), source, (*KINDS, POLICY, FINETUNED))
     feedback = bool(arrays["feedback"])
     return Compensated(*ends, ranges=ranges, base=base, feedback=feedback)
 

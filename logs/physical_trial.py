@@ -6,7 +6,6 @@ from pathlib import Path
 
 from selfmodel.controllers.controller import Controller
 from selfmodel.errors import TrialError
-from selfmodel.logs.controllers import LAYER
 from selfmodel.logs.files import replace_file
 from selfmodel.logs.reader import read_log
 from selfmodel.logs.records import TrialHeader, checked_name
@@ -75,12 +74,11 @@ class TrialRunner:
         as it went.
         """
         path, driver = self.folder / f"{checked_name(plan.name)}.mcap", plan.controller
-        if isinstance(driver, Controller) and driver.design.name == LAYER and driver.genome.any():
-            from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few have one
-
-            if isinstance(driver.design, Compensated):
-                numbers = driver.design.layer_file(driver.genome)
-                replace_file(path.with_suffix(".toml"), numbers.encode())
+        numbers = ""
+        if isinstance(driver, Controller) and driver.genome.any():
+            numbers = driver.design.layer_file(driver.genome)
+        if numbers:
+            replace_file(path.with_suffix(".toml"), numbers.encode())
         header = TrialHeader(self.settings, hidden=self.hidden.get(plan.stage), gap=self.gap)
         try:
             return run_trial(physical, plan, path, self.robot, header)

@@ -297,7 +297,8 @@ def recover(
         score: Fitness of the repair, its name, or ``package.module:object``; by default the forward
             displacement until the first fall, or the whole displacement for the paper's repair.
         repair: ``robust``, on rollouts under random conditions; ``paper``, in one exact
-            simulation; or ``compensate``, of a layer around ``gait``, the default with one.
+            simulation; ``compensate``, of a layer around ``gait``, the default with one; or
+            ``finetune``, of the last layer of the network of ``gait``.
         search: ``cma-es``, ``ea``, ``repertoire`` or a function that makes one; by default that of
             the repair, CMA-ES or the paper's EA, or the repertoire if one is given.
         repertoire: Gaits from which the search begins, or the path of their file.

@@ -56,12 +56,15 @@ NEXT_TRIAL: Mapping[str, NextTrial] = MappingProxyType(
 )
 """Choices of the next trial of a recovery, by name."""
 
-ROBUST, PAPER, COMPENSATE = "robust", "paper", "compensate"
-"""Names of the repairs: on rollouts under random conditions, in one exact simulation, and of a
-layer around a known controller on rollouts under random conditions."""
+ROBUST, PAPER, COMPENSATE, FINETUNE = "robust", "paper", "compensate", "finetune"
+"""Names of the repairs: on rollouts under random conditions; in one exact simulation; and, under
+random conditions, of a layer around a known controller, or of the last layer of a policy."""
+
+AROUND = (COMPENSATE, FINETUNE)
+"""Repairs that begin at a known controller, and change it."""
 
 DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
-    {ROBUST: UPRIGHT.name, COMPENSATE: UPRIGHT.name, PAPER: DISPLACEMENT.name}
+    {**dict.fromkeys((ROBUST, COMPENSATE, FINETUNE), UPRIGHT.name), PAPER: DISPLACEMENT.name}
 )
 """Name of the score of each repair, unless another is given."""
 
@@ -262,7 +265,7 @@ def repair(
     """Returns a function that makes a repair.
 
     Args:
-        name: ``robust``, ``paper`` or ``compensate``.
+        name: ``robust``, ``paper``, ``compensate`` or ``finetune``.
         search: A ``MakeSearch``, or the name of one: of ``SEARCHES``, ``repertoire``, of an entry
             point in the group ``selfmodel.searches``, or ``package.module:object``; None as for
             ``search_name``.
@@ -289,15 +292,15 @@ def repair(
                 f"repertoire out, or give the repair {ROBUST}"
             )
         return RepairSearch
-    if name == COMPENSATE:
+    if name in AROUND:
         if chosen != "cma-es":
             raise InputError(
-                f"the repair {COMPENSATE} has CMA-ES from the known controller, got the search "
+                f"the repair {name} has CMA-ES from the known controller, got the search "
                 f"{chosen}: leave search and repertoire out, or give the repair {ROBUST}"
             )
         from selfmodel.recovery.layers import LayerRepair  # noqa: PLC0415  # few robots have one
 
-        return LayerRepair  # type: ignore[return-value]  # of the design of ``repaired_around``
+        return LayerRepair
     if repertoire is not None:
         make_search = from_repertoire(repertoire)
     return partial(RobustRepair, make_search=make_search)
@@ -318,7 +321,7 @@ def repaired_around(
     """
     name = repair or (ROBUST if gait is None else COMPENSATE)
     check_known("repair", name, DEFAULT_SCORES)
-    if name != COMPENSATE:
+    if name not in AROUND:
         if not design.weights:
             raise InputError(
                 f"the repair {name} evolves the weights of a controller, got "
@@ -330,10 +333,16 @@ def repaired_around(
             f"the repair {name} needs a controller that walks, got the design {design.name}: give "
             f"--controller FILE, a policy file, a .npz or a log; in Python gait="
         )
-    from selfmodel.recovery.layers import layered  # noqa: PLC0415  # few robots have one
+    from selfmodel.recovery.layers import has_last_layer, layered  # noqa: PLC0415  # few robots have one
 
-    inner = layered(gait)
-    return name, inner.design, inner
+    if name == COMPENSATE:
+        gait = layered(gait)
+    elif not has_last_layer(gait.design):
+        raise InputError(
+            f"the repair {name} changes the last layer of a policy's network, got "
+            f"{gait.design.description}: give the repair {COMPENSATE}"
+        )
+    return name, gait.design, gait
 
 
 def search_name(repair: str, search: MakeSearch | str | None, repertoire: Repertoire | None) -> str:

@@ -1,7 +1,7 @@
 """Controllers: a design, such as a network or a CPG, with the genome that sets its weights.
 
-Each design is one file: ``network.py``, ``cpg.py``, ``policy.py``, and ``compensation.py`` around
-another. A further design needs four changes: its file
+Each design is one file: ``network.py``, ``cpg.py``, ``policy.py``, ``compensation.py`` around
+another, and ``trained.py``, of changed policies. A further design needs four changes: its file
 with a ``Design`` and a ``ControllerBatch``, its row in ``selfmodel.robot.designs.DESIGNS`` (the
 names on the command line), its row in ``selfmodel.logs.controllers.KINDS`` (the arrays of its
 ``.npz`` file: one number of its own), and its name on the help page, ``cli/options.toml``.
@@ -129,6 +129,10 @@ class Design(ABC):
     @abstractmethod
     def summary(self, genome: FloatArray, /) -> str:
         """Returns a short description of the controller with that genome, ``(weights,)``."""
+
+    def layer_file(self, _genome: FloatArray, /) -> str:
+        """Returns what a genome changes of a controller within as TOML; "" if there is none."""
+        return ""
 
     @abstractmethod
     def batch(self, genomes: FloatArray, silent: Sequence[AbstractSet[int]], /) -> ControllerBatch:

@@ -31,18 +31,24 @@ def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     return np.asarray(np.einsum(of_row, np.ascontiguousarray(rows), matrix))
 
 
+def _turned(matrix: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(np.swapaxes(matrix, -1, -2))
+
+
 def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix, *bias = arguments
     if attributes.get("transA"):
         raise ValueError("a transposed first factor is not supported")
-    turned = matrix if attributes.get("transB") else np.ascontiguousarray(matrix.T)
+    turned = (
+        matrix if attributes.get("transB") else np.ascontiguousarray(np.swapaxes(matrix, -1, -2))
+    )
     result = attributes.get("alpha", 1.0) * _matmul(rows, turned)
     return [result + attributes.get("beta", 1.0) * bias[0] if bias else result]
 
 
 def _product(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix = arguments
-    return [_matmul(rows, np.ascontiguousarray(matrix.T))]
+    return [_matmul(rows, _turned(matrix))]
 
 
 def _elu(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:

@@ -273,6 +273,7 @@ class PolicyBatch:
 
     Attributes:
         velocity: Commanded velocity of each robot, ``(n, 3)``.
+        input: Last input of the network, ``(n, inputs)``.
     """
 
     def __init__(
@@ -299,6 +300,7 @@ class PolicyBatch:
         self._numbers = [(np.array(term.offset), np.array(term.scale)) for term in own.terms]
         self._pose = np.array(own.pose)
         self._scale, self._offset = np.array(action.scale), np.array(action.offset)
+        self.input = np.zeros((count, policy.inputs))
         self._output = np.zeros((count, policy.graph.outputs))
         self._states = policy.graph.initial(count)
         self._tensors = tensors or {}
@@ -309,7 +311,8 @@ class PolicyBatch:
         """Writes the commands of the next control step; see ``ControllerBatch``."""
         own = self._interface
         if self._step % own.decimation == 0:
-            output, self._states = self._graph.step(self.observation(), self._states, self._tensors)
+            self.input = self.observation()
+            output, self._states = self._graph.step(self.input, self._states, self._tensors)
             most = math.inf if own.action.clip is None else own.action.clip
             self._output = np.clip(output, -most, most)
         targets[:] = own.holding

@@ -1,4 +1,4 @@
-"""A repair around a controller that is known to walk: a layer, the smallest first.
+"""Repairs of a controller that is known to walk: layers around it, or a fine-tuned last layer.
 
 The search begins at what changes nothing, under the conditions of the robust repair. A layer that
 regains too little of what the failure took is followed by a larger one.
@@ -12,8 +12,12 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.compensation import Compensated
-from selfmodel.controllers.controller import Controller
+from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.graph import Graph
+from selfmodel.controllers.policy import Policy, PolicyBatch
+from selfmodel.controllers.trained import Finetuned, last_layer
 from selfmodel.evolution import GenerationCallback
+from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.recovery.cma_es import CmaEs
 from selfmodel.recovery.repair import (
@@ -30,11 +34,12 @@ from selfmodel.recovery.repair import (
 from selfmodel.recovery.scores import UPRIGHT, Score
 from selfmodel.settings import Settings
 from selfmodel.simulation.domain import DomainDistribution
+from selfmodel.simulation.rollout import Rollout
 from selfmodel.simulation.simulator import Simulator
 
 COST = 0.26
 """Rollouts of the search of a layer, relative to the evaluations of the paper's EA: it begins at a
-controller that walks."""
+controller that walks. There are at least two generations."""
 
 DEVIATION, POPULATION, CONDITIONS = 0.1, 10, 4
 """Standard deviation, genomes and conditions of a generation of a layer's search. With a deviation
@@ -47,19 +52,25 @@ STALLED = 0.8
 regains less has stalled, and goes on with the next larger layer."""
 
 
+RANK, OBSERVED = 8, 200
+"""Features of a fine-tuned policy, and control steps of the walks that they are the features of."""
+
+
 @dataclass(eq=False)
 class LayerRepair:
-    """Repair by a layer around a controller; a ``Repair``.
+    """Repair by a change of a controller that is known to walk; a ``Repair``.
 
     Attributes:
-        design: The smallest layer.
+        design: A layer, from which on larger ones are searched; or a policy with a network, whose
+            last layer is fine-tuned.
     """
 
     simulator: Simulator
     settings: Settings
-    design: Compensated
+    design: Design
     score: Score = UPRIGHT
     evaluations: int = field(default=0, init=False)
+    _sizes: Sequence[Design] = field(default=(), init=False)
 
     def __call__(
         self,
@@ -71,10 +82,10 @@ class LayerRepair:
     ) -> tuple[CandidateController, ...]:
         """Returns untried layers that are better than none, best first, or else that of zeros."""
         fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
-        known = tried = [one for one in seeds if isinstance(one.design, Compensated)]
-        large = replace(self.design, feedback=True)
-        begin = large if any(one.design == large for one in tried) else self.design
-        for design in dict.fromkeys([begin, large]):
+        self._sizes = self._sizes or self._smallest_first(hypotheses[0])
+        known = tried = [one for one in seeds if one.design in self._sizes]
+        begin = max([self._sizes.index(one.design) for one in tried], default=0)
+        for design in self._sizes[begin:]:
             none = Controller(design, np.zeros(design.weights))
             known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
             known += self._evolved(fitness, known, rng, on_generation)
@@ -87,6 +98,16 @@ class LayerRepair:
         better = [k for k in order if values[k] > values[-1] and known[k] not in old]
         rows = better or [len(known) - 1]
         return viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
+
+    def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
+        """Returns the designs of changes of the controller, by their size."""
+        own = self.design
+        if isinstance(own, Compensated):
+            return list(dict.fromkeys([own, replace(own, feedback=True)]))
+        if not isinstance(own, Policy) or not isinstance(own.graph, Graph):
+            return [own]
+        features = features_of(own, own.graph, self.simulator, [INTACT, hypothesis])
+        return [own if isinstance(own, Finetuned) else Finetuned.of(own, features)]
 
     def _evolved(
         self,
@@ -101,7 +122,7 @@ class LayerRepair:
         search = around_identity(design.weights, settings, rng, genomes)
         run_search(
             *(search, fitness, design),
-            rollouts=round(COST * settings.evaluations),
+            rollouts=max(round(COST * settings.evaluations), 2 * POPULATION * CONDITIONS),
             steps=settings.steps,
             rng=rng,
             on_generation=on_generation,
@@ -128,7 +149,48 @@ class LayerRepair:
         return [*best, none], fitness([*best, none], conditions, steps, rng), float(whole)
 
 
-def widened(controller: Controller, design: Compensated) -> Controller:
+def features_of(
+    policy: Policy, graph: Graph, simulator: Simulator, hypotheses: Sequence[Hypothesis]
+) -> FloatArray:
+    """Returns the features of the last layer of a policy's network, ``(rank, inputs)``.
+
+    They are the principal directions of its inputs while a robot with each hypothesis walks, each
+    divided by the root mean square of the inputs along it; the first is nearly their mean.
+    """
+    robot, layer = simulator.robot, last_layer(graph)
+    drivers = [Controller(policy, np.zeros(0))] * len(hypotheses)
+    variants = [build(robot, hypothesis) for hypothesis in hypotheses]
+    rollout = Rollout(robot, variants, drivers, (), stats=simulator.stats)
+    part = replace(graph, output=layer.input, outputs=0)
+    states, seen = part.initial(len(drivers)), list[FloatArray]()
+    batch = PolicyBatch(policy, len(drivers))
+    for _ in rollout.steps(OBSERVED):
+        batch.readings[:] = rollout.live["sensors"]()
+        for signal, values in rollout.observed.items():
+            batch.observed[signal][:] = values
+        batch.step(np.empty((len(drivers), len(policy.motors))))
+        inputs, states = part.step(batch.input, states)
+        seen.append(inputs)
+    rows = np.concatenate(seen)
+    _, sizes, directions = np.linalg.svd(rows[np.isfinite(rows).all(axis=1)], full_matrices=False)
+    kept = sizes[:RANK] > sizes[0] * 1e-6
+    scale = sizes[:RANK][kept, np.newaxis] / np.sqrt(len(rows))
+    return np.asarray(directions[:RANK][kept] / scale)
+
+
+def has_last_layer(design: Design) -> bool:
+    """Returns whether a controller is a policy whose network has a layer to fine-tune."""
+    graph = design.graph if isinstance(design, Policy) else None
+    if not isinstance(graph, Graph):
+        return False
+    try:
+        last_layer(graph)
+    except ValueError:
+        return False
+    return True
+
+
+def widened(controller: Controller, design: Design) -> Controller:
     """Returns a layer as one of at least as many numbers, the others 0."""
     more = design.weights - controller.design.weights
     return Controller(design, np.pad(controller.genome, (0, more)))

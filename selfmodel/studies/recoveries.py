@@ -144,10 +144,10 @@ def repair_parameters(
             f"give {' or '.join(plugins.SEARCHES)}, or recover one robot with `selfmodel "
             f"recover --repertoire FILE`"
         )
-    if repair == plugins.COMPENSATE and not known:
+    if repair == plugins.FINETUNE and not known:
         raise InputError(
-            f"the repair {repair} needs a controller that walks, and this study evolves its gaits: "
-            f"give {plugins.ROBUST} or {plugins.PAPER}, or `selfmodel suite run --controller FILE`"
+            f"the repair {repair} needs a policy, and this study evolves its gaits: give "
+            f"{plugins.COMPENSATE}, or `selfmodel suite run --controller FILE`"
         )
     search = None if search is None else plugins.name_of("search", search)
     plugins.repair(repair, search)
@@ -178,6 +178,8 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
     """
     own, of_repair = settings_of({"shared": shared})
     settings = dataclasses.asdict(own.of_repair(of_repair)).items()
+    if shared["repair"] in plugins.AROUND:  # a gait is evolved before anything is around it
+        shared = {**shared, "repair": plugins.ROBUST}
     parameters = {
         **robot,
         "seed": seed,

@@ -1,5 +1,6 @@
 """Journeys of a robot with a policy of its own: trials, logs, replays, hardware, and recoveries."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, make_batch
 from selfmodel.controllers.graph import Graph
 from selfmodel.controllers.policy import Policy
+from selfmodel.controllers.trained import Finetuned
 from selfmodel.errors import InputError, TrialError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
@@ -372,3 +374,28 @@ def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
     (again, *_) = printed(*RECOVER, *repaired, cwd=tmp_path)["trials"]
     assert read_log(tmp_path / again["log"]).trial.plan.controller == drivers[2]
+
+
+def test_a_recovery_fine_tunes_the_last_layer_of_a_policy(tmp_path: Path, quadruped: Robot):
+    policy = policy_of(tmp_path, quadruped)
+    options = ("--controller", "policy.toml", "--repair", "finetune", "--seed", "1")
+    found = printed(*RECOVER, *options, cwd=tmp_path)
+    logs = [tmp_path / trial["log"] for trial in found["trials"]]
+    before, _, last = (read_log(path).trial.plan.controller for path in logs)
+
+    assert (found["repair"], found["controller"]) == ("finetune", "policy")
+    assert before == policy
+    assert isinstance(last.design, Finetuned)
+    assert last.design.graph == policy.design.graph
+    assert last.genome.any()
+    numbers = tomllib.loads(logs[2].with_suffix(".toml").read_text())
+    changed = last.design.policy(last.genome).graph.tensors[numbers["tensor"]]
+    change = changed - policy.design.graph.tensors[numbers["tensor"]]
+    np.testing.assert_allclose(numbers["change"], change)
+    said = succeeds("replay", logs[2].relative_to(tmp_path), cwd=tmp_path).stdout
+    assert "identical" in said or "largest" in said
+
+    repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
+    (again, *_) = printed(*RECOVER, *repaired, "--repair", "finetune", cwd=tmp_path)["trials"]
+    assert read_log(tmp_path / again["log"]).trial.plan.controller == last
+    refused(*RECOVER, "--repair", "finetune", "--controller", "cpg", said="needs a controller")

@@ -112,5 +112,20 @@ def test_a_study_recovers_bodies_around_the_controller_of_a_file(tmp_path: Path)
 
     with pytest.raises(InputError, match="repair robust evolves the weights"):
         plans.suite(tmp_path / "no", **given, controller=policy, repair="robust")
-    with pytest.raises(InputError, match=r"needs a controller that walks.*--controller FILE"):
-        plans.suite(tmp_path / "no", **given, repair="compensate")
+    with pytest.raises(InputError, match=r"needs a policy, .*: give compensate, or .*FILE"):
+        plans.suite(tmp_path / "no", **given, repair="finetune")
+
+
+@pytest.mark.search
+def test_a_study_recovers_around_the_gaits_that_it_evolves(tmp_path: Path):
+    given = {"bodies": HOPPER, "cases": (), "damages": "jam:knee", "controller": "cpg"}
+    small = selfmodel.Settings(steps=60, trials=1, generations=2).scaled(4)
+    around, robust = (
+        plans.suite(tmp_path / name, **given, settings=small, repair=name)
+        for name in ("compensate", "robust")
+    )
+    assert not around.run()
+    (row,) = around.rows("recoveries")
+    assert (row["repair"], row["controller"]) == ("compensate", "cpg")
+    gaits = [study.cells()[0].needs["gait"] for study in (around, robust)]
+    assert gaits[0] == gaits[1], "the same gait, evolved by the robust repair"
