@@ -333,15 +333,18 @@ def repaired_around(
             f"the repair {name} needs a controller that walks, got the design {design.name}: give "
             f"--controller FILE, a policy file, a .npz or a log; in Python gait="
         )
-    from selfmodel.recovery.layers import has_last_layer, layered  # noqa: PLC0415  # few robots have one
+    if name == FINETUNE:
+        from selfmodel.controllers.trained import network_of  # noqa: PLC0415  # few robots have one
 
-    if name == COMPENSATE:
+        try:
+            network_of(gait.design)
+        except ValueError as error:
+            advice = f"give the repair {COMPENSATE}"
+            raise InputError(f"the repair {name} changes a network: {error}: {advice}") from error
+    else:
+        from selfmodel.recovery.layers import layered  # noqa: PLC0415  # few robots have one
+
         gait = layered(gait)
-    elif not has_last_layer(gait.design):
-        raise InputError(
-            f"the repair {name} changes the last layer of a policy's network, got "
-            f"{gait.design.description}: give the repair {COMPENSATE}"
-        )
     return name, gait.design, gait
 
 

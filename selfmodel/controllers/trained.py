@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Design
 from selfmodel.controllers.graph import Graph
 from selfmodel.controllers.policy import Policy, PolicyBatch
 
@@ -118,7 +119,7 @@ class Finetuned(Evolved):
         """
         own = {each.name: getattr(policy, each.name) for each in fields(Policy)}
         rows = tuple(map(tuple, features.tolist()))
-        return cls(**own, features=rows, driven=_driven(own["graph"]))
+        return cls(**own, features=rows, driven=_driven(network_of(policy)))
 
     @property
     def _matrix(self) -> FloatArray:
@@ -155,6 +156,19 @@ class Finetuned(Evolved):
         rows = "".join(f"    {row},\n" for row in (changed - own).tolist())
         head = LAYER_HEADER.format(within=" ".join(super().summary(genome).split()))
         return f"{head}\ntensor = {json.dumps(layer.weight)}\nchange = [\n{rows}]\n"
+
+
+def network_of(design: Design) -> Graph:
+    """Returns the network of a policy, with a layer of weights.
+
+    Raises:
+        ValueError: It is another design, or has a function or no such layer.
+    """
+    graph = design.graph if isinstance(design, Policy) else None
+    if not isinstance(graph, Graph):
+        raise ValueError(f"expected a policy with a network, got {design.description}")  # noqa: TRY004
+    last_layer(graph)
+    return graph
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,8 @@ import numpy as np
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design
-from selfmodel.controllers.graph import Graph
 from selfmodel.controllers.policy import Policy, PolicyBatch
-from selfmodel.controllers.trained import Finetuned, last_layer
+from selfmodel.controllers.trained import Finetuned, last_layer, network_of
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -104,10 +103,9 @@ class LayerRepair:
         own = self.design
         if isinstance(own, Compensated):
             return list(dict.fromkeys([own, replace(own, feedback=True)]))
-        if not isinstance(own, Policy) or not isinstance(own.graph, Graph):
+        if not isinstance(own, Policy) or isinstance(own, Finetuned):
             return [own]
-        features = features_of(own, own.graph, self.simulator, [INTACT, hypothesis])
-        return [own if isinstance(own, Finetuned) else Finetuned.of(own, features)]
+        return [Finetuned.of(own, features_of(own, self.simulator, [INTACT, hypothesis]))]
 
     def _evolved(
         self,
@@ -150,13 +148,14 @@ class LayerRepair:
 
 
 def features_of(
-    policy: Policy, graph: Graph, simulator: Simulator, hypotheses: Sequence[Hypothesis]
+    policy: Policy, simulator: Simulator, hypotheses: Sequence[Hypothesis]
 ) -> FloatArray:
     """Returns the features of the last layer of a policy's network, ``(rank, inputs)``.
 
     They are the principal directions of its inputs while a robot with each hypothesis walks, each
     divided by the root mean square of the inputs along it; the first is nearly their mean.
     """
+    graph = network_of(policy)
     robot, layer = simulator.robot, last_layer(graph)
     drivers = [Controller(policy, np.zeros(0))] * len(hypotheses)
     variants = [build(robot, hypothesis) for hypothesis in hypotheses]
@@ -176,18 +175,6 @@ def features_of(
     kept = sizes[:RANK] > sizes[0] * 1e-6
     scale = sizes[:RANK][kept, np.newaxis] / np.sqrt(len(rows))
     return np.asarray(directions[:RANK][kept] / scale)
-
-
-def has_last_layer(design: Design) -> bool:
-    """Returns whether a controller is a policy whose network has a layer to fine-tune."""
-    graph = design.graph if isinstance(design, Policy) else None
-    if not isinstance(graph, Graph):
-        return False
-    try:
-        last_layer(graph)
-    except ValueError:
-        return False
-    return True
 
 
 def widened(controller: Controller, design: Design) -> Controller:

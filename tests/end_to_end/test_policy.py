@@ -399,4 +399,4 @@ def test_a_recovery_fine_tunes_the_last_layer_of_a_policy(tmp_path: Path, quadru
     repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
     (again, *_) = printed(*RECOVER, *repaired, "--repair", "finetune", cwd=tmp_path)["trials"]
     assert read_log(tmp_path / again["log"]).trial.plan.controller == last
-    refused(*RECOVER, "--repair", "finetune", "--controller", "cpg", said="needs a controller")
+    refused(*RECOVER, "--repair", "finetune", said="needs a controller", cwd=tmp_path)
