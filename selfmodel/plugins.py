@@ -333,18 +333,9 @@ def repaired_around(
             f"the repair {name} needs a controller that walks, got the design {design.name}: give "
             f"--controller FILE, a policy file, a .npz or a log; in Python gait="
         )
-    if name == FINETUNE:
-        from selfmodel.controllers.trained import network_of  # noqa: PLC0415  # few robots have one
+    from selfmodel.recovery.layers import finetunable, layered  # noqa: PLC0415  # few robots have one
 
-        try:
-            network_of(gait.design)
-        except ValueError as error:
-            advice = f"give the repair {COMPENSATE}"
-            raise InputError(f"the repair {name} changes a network: {error}: {advice}") from error
-    else:
-        from selfmodel.recovery.layers import layered  # noqa: PLC0415  # few robots have one
-
-        gait = layered(gait)
+    gait = finetunable(gait) if name == FINETUNE else layered(gait)
     return name, gait.design, gait
 
 

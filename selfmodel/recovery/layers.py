@@ -15,6 +15,7 @@ from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.controllers.policy import Policy, PolicyBatch
 from selfmodel.controllers.trained import Finetuned, last_layer, network_of
+from selfmodel.errors import InputError
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -208,3 +209,18 @@ def layered(controller: Controller) -> Controller:
         return controller
     design = Compensated.around(controller)
     return Controller(design, np.zeros(design.weights))
+
+
+def finetunable(controller: Controller) -> Controller:
+    """Returns a controller, if it is a policy whose network has a last layer of weights.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        network_of(controller.design)
+    except ValueError as error:
+        raise InputError(
+            f"the repair finetune changes a network: {error}: give the repair compensate"
+        ) from error
+    return controller
