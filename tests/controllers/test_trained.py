@@ -26,7 +26,7 @@ def commands(design: Policy, genomes: np.ndarray, rows: slice = slice(None)) -> 
     return found
 
 
-@pytest.mark.parametrize("hidden", [0, 7])
+@pytest.mark.parametrize("hidden", [0, 7, 450])  # by einsum, and by BLAS
 def test_each_row_has_the_commands_of_its_own_policy_to_the_bit(hidden: int):
     design = trained(hidden)
     genomes = np.random.default_rng(1).uniform(-1, 1, (5, design.weights))
