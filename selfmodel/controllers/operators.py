@@ -20,15 +20,31 @@ Operator = Callable[[Arguments, Attributes], Sequence[FloatArray]]
 """Function from the inputs and the attributes of a node to its outputs."""
 
 
+LARGE, BLOCK, MAX_PRODUCTS = 2**12, 8, 2**18
+"""Weights from which on BLAS is faster than einsum, by five times for a layer of 512 and 256
+neurons; rows that it multiplies at a time, with zeros after the last; and most products of a call,
+for which OpenBLAS starts no threads. The order of its sums depends on both, that of einsum does
+not."""
+
+
 def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Returns ``rows @ matrix.T``; BLAS sums in an order that depends on the number of rows.
+    """Returns ``rows @ matrix.T``, whose bits do not depend on the number of rows.
 
     The matrix may be one for all rows, or of each row.
     """
-    if np.shape(rows)[-1] != np.shape(matrix)[-1]:  # einsum would repeat a single number
+    (outputs, width), is_own = np.shape(matrix)[-2:], np.ndim(matrix) == 3
+    if np.shape(rows)[-1] != width:  # einsum would repeat a single number
         raise ValueError("a product of other sizes")
-    of_row = "ni,nji->nj" if np.ndim(matrix) == 3 else "ni,ji->nj"
-    return np.asarray(np.einsum(of_row, np.ascontiguousarray(rows), matrix))
+    if outputs * width < LARGE:
+        of_row = "ni,nji->nj" if is_own else "ni,ji->nj"
+        return np.asarray(np.einsum(of_row, np.ascontiguousarray(rows), matrix))
+    # The own matrix of a row multiplies a block of it and zeros, as one for all does.
+    blocks = np.zeros((len(rows) if is_own else -(-len(rows) // BLOCK), BLOCK, width))
+    (blocks[:, 0] if is_own else blocks.reshape(-1, width))[: len(rows)] = rows
+    turned, most = np.swapaxes(matrix, -1, -2), max(1, MAX_PRODUCTS // (BLOCK * width))
+    parts = [blocks @ turned[..., first : first + most] for first in range(0, outputs, most)]
+    products = np.concatenate(parts, axis=2)
+    return products[:, 0] if is_own else products.reshape(-1, outputs)[: len(rows)]
 
 
 def _turned(matrix: FloatArray) -> FloatArray:

@@ -145,10 +145,15 @@ MIXED = Graph(
         "w": random_layers(78, 12)[0][0],
     },
 )
-NETWORKS = [random_network(48, 64, 32, 12, activation="Elu"), random_network(1, 3, 1), MIXED]
+NETWORKS = [
+    random_network(48, 64, 32, 12, activation="Elu"),
+    random_network(48, 520, 100, 12, activation="Elu"),  # by BLAS, the second layer in two parts
+    random_network(1, 3, 1),
+    MIXED,
+]
 
 
-@pytest.mark.parametrize("network", NETWORKS, ids=["layers", "narrow", "mixed"])
+@pytest.mark.parametrize("network", NETWORKS, ids=["layers", "large", "narrow", "mixed"])
 @settings(max_examples=25)
 @given(rows=st.integers(1, 130), place=st.integers(0, 129), seed=st.integers(0, 99))
 def test_a_row_is_the_same_to_the_bit_in_any_batch_and_place(

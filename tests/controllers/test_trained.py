@@ -56,6 +56,7 @@ def finetuned(hidden: int, *, transposed: bool = True) -> Finetuned:
 
 DESIGNS = {
     "trained": trained(7),
+    "trained, by BLAS": trained(450),
     "linear": trained(0),
     "finetuned": finetuned(7),
     "finetuned, turned": finetuned(7, transposed=False),
