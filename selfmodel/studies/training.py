@@ -1,8 +1,10 @@
 """Policies evolved for a task of dm_control's suite: its own observation, return and episodes.
 
-The search is ``EvolutionStrategy``. The observation is normalised by its mean and its deviation in
-all episodes so far (Mania et al., arXiv:1803.07055). The state of a training is one file, written
-after each generation, from which the same training goes on to the bit.
+The search is ``EvolutionStrategy``. Its episodes are shorter than those of the task: every other
+one begins where one of the last generation ended, so that all of an episode is seen (after Vicol et
+al., arXiv:2112.13835). The observation is normalised by its mean and its deviation in all episodes
+so far (Mania et al., arXiv:1803.07055). The state of a training is one file, written after each
+generation, from which the same training goes on to the bit.
 """
 
 import io
@@ -62,6 +64,7 @@ class TrainingSettings:
         pairs: Pairs of opposite policies of a generation, each with one episode.
         deviation: Standard deviation of the weights of a generation about their mean.
         rate: Largest step of the mean of the weights.
+        steps: Control steps of an episode of the training.
         seed: Seed of all random numbers.
     """
 
@@ -69,6 +72,7 @@ class TrainingSettings:
     pairs: int = 16
     deviation: float = 0.1
     rate: float = 0.05
+    steps: int = 250
     seed: int = 0
 
 
@@ -114,6 +118,7 @@ class Training:
         self._observation = f"{TASK_PREFIX}{key}"
         width = observation_width(key, self._robot.model)
         self._moments = Moments(0.0, np.zeros(width), np.ones(width))
+        self._ends = self._draw(2 * settings.pairs)
         motors = len(self._robot.anatomy.motors)
         self._first = layers(
             initial_layers(width, settings.hidden, motors, self._rng), "Tanh", "Tanh"
@@ -164,32 +169,51 @@ class Training:
             loop = (self._search, self._fitness, after, lambda: end - self.generation)
             evolution.evolve(*loop, noisy=True)
 
+    def _draw(self, count: int) -> list[FloatArray]:
+        """Draws initial states of the task, ``(count, nq)`` and ``(count, nv)``."""
+        return list(self._starts.draw(self._rng.integers(2**32, size=count)))
+
     def _fitness(self, genomes: FloatArray) -> FloatArray:
         """Returns the returns of genomes; the two of a pair have the same initial state."""
-        seeds = np.tile(self._rng.integers(2**32, size=len(genomes) // 2), 2)
-        design = self.design
-        found = self.returns([Controller(design, one) for one in genomes], seeds, learn=True)
+        pairs, design = len(genomes) // 2, self.design
+        ended = self._rng.integers(len(genomes), size=pairs // 2)
+        starts = self._draw(pairs - len(ended))
+        both = zip(starts, self._ends, strict=True)
+        states = [np.tile(np.concatenate([own, ends[ended]]), (2, 1)) for own, ends in both]
+        found = self._episodes([Controller(design, one) for one in genomes], states, learn=True)
         finite = found[np.isfinite(found)]
         now = process_time()
         self._seconds, self._clock = self._seconds + now - self._clock, now
-        count = self._search.generation + 1
-        steps = count * len(genomes) * EPISODE
-        mean, most = (float(finite.mean()), float(finite.max())) if len(finite) else (math.nan,) * 2
-        self.rows.append((count, steps, self._seconds, mean, most))
+        count, own = self._search.generation + 1, self.settings.steps
+        steps, scale = count * len(genomes) * own, EPISODE / own
+        mean, most = (finite.mean(), finite.max()) if len(finite) else (math.nan,) * 2
+        self.rows.append((count, steps, self._seconds, float(scale * mean), float(scale * most)))
         return found
 
-    def returns(
-        self, controllers: Sequence[Controller], seeds: IndexArray, *, learn: bool = False
-    ) -> FloatArray:
+    def returns(self, controllers: Sequence[Controller], seeds: IndexArray) -> FloatArray:
         """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
 
         Args:
             controllers: Policies of the task, of one design.
             seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
-            learn: Whether the observations count in the normalisation.
+        """
+        return self._episodes(controllers, self._starts.draw(seeds))
+
+    def _episodes(
+        self,
+        controllers: Sequence[Controller],
+        states: Sequence[FloatArray],
+        *,
+        learn: bool = False,
+    ) -> FloatArray:
+        """Returns the returns of episodes from initial positions and velocities.
+
+        To ``learn``, they have the length of those of the training, their observations count in the
+        normalisation, and their last states are kept.
         """
         robot, count = self._robot, len(controllers)
-        start, speeds = self._starts.draw(seeds)
+        steps = self.settings.steps if learn else EPISODE
+        start, speeds = states
         variants = [build(robot, INTACT)] * count
         rollout = Rollout(
             robot, variants, controllers, (), threads=self._threads, start=start, speeds=speeds
@@ -197,9 +221,10 @@ class Training:
         fields = Fields(robot.model, rollout.bind)
         commands = np.zeros((count, len(robot.anatomy.motors)))
         self._reward(fields, commands)  # binds its fields before the first step
+        reached = fields.positions, fields.velocities
         total, own = np.zeros(count), self._moments
         shifted, squares = np.zeros((2, count, len(own.mean)))
-        for k in rollout.steps(EPISODE + 1):
+        for k in rollout.steps(steps + 1):
             if k:
                 total += self._reward(fields, commands)
             commands[:] = rollout.live["commands"]()
@@ -208,8 +233,10 @@ class Training:
             squares += difference**2
         finite = np.isfinite(total) & ~rollout.diverged()
         if learn and finite.any():
-            rows = int(finite.sum()) * (EPISODE + 1)
+            rows = int(finite.sum()) * (steps + 1)
             own.add(rows, shifted[finite].sum(axis=0), squares[finite].sum(axis=0))
+            for ends, values in zip(self._ends, reached, strict=True):
+                ends[finite] = values[finite]
         return np.where(finite, total, -math.inf)
 
     def judged(self, episodes: int) -> FloatArray:
@@ -244,7 +271,8 @@ class Training:
         """Arrays of the state, besides the progress; their shapes are those of the task."""
         own = self._moments
         average = {"count": np.array(own.count), "average": own.mean, "square": own.square}
-        return {**self._search.state(), **average}
+        ends = dict(zip(("positions", "velocities"), self._ends, strict=True))
+        return {**self._search.state(), **average, **ends}
 
     def resume(self, path: Path) -> None:
         """Continues from a state file.
@@ -277,6 +305,7 @@ class Training:
         self._rng.bit_generator.state = about["rng"]
         self._seconds = float(about["seconds"])
         self._moments = Moments(float(found["count"]), found["average"], found["square"])
+        self._ends = [found["positions"], found["velocities"]]
         self._search.resume(found)
 
 

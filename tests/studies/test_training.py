@@ -12,7 +12,8 @@ from selfmodel.errors import InputError
 from selfmodel.studies import plans, training
 from selfmodel.studies.training import Training, TrainingSettings, evolve_policy
 
-SMALL = TrainingSettings(pairs=3, seed=4)
+SMALL = TrainingSettings(pairs=3, steps=20, seed=4)
+NAMES = ("mean", "moments", "count", "average", "square", "positions", "velocities")
 HOPPER, CHEETAH = "suite-hopper-stand", "suite-cheetah-run"
 
 
@@ -23,11 +24,11 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def numbers(folder: Path) -> dict[str, np.ndarray]:
     with np.load(folder / training.STATE) as file:
-        return {name: file[name] for name in ("mean", "moments", "count", "average", "square")}
+        return {name: file[name] for name in NAMES}
 
 
 def test_a_training_that_goes_on_has_the_bits_of_a_whole_one(tmp_path: Path):
-    settings = TrainingSettings(hidden=3, pairs=3, seed=4)
+    settings = TrainingSettings(hidden=3, pairs=3, steps=30, seed=4)
     whole = evolve_policy(HOPPER, tmp_path / "a", settings, generations=4, threads=2)
     evolve_policy(HOPPER, tmp_path / "b", settings, generations=2, threads=1)
     parts = evolve_policy(HOPPER, tmp_path / "b", settings, generations=4, threads=1)
@@ -44,12 +45,32 @@ def test_a_training_that_goes_on_has_the_bits_of_a_whole_one(tmp_path: Path):
 
 def test_a_folder_of_another_training_is_refused(tmp_path: Path):
     evolve_policy(HOPPER, tmp_path, SMALL, generations=1, threads=1)
-    other = TrainingSettings(hidden=2, pairs=3, seed=5)
+    other = TrainingSettings(hidden=2, pairs=3, steps=20, seed=5)
     with pytest.raises(InputError, match="of a training with another neurons, seed: give its opt"):
         evolve_policy(HOPPER, tmp_path, other, generations=2, threads=1)
     (tmp_path / training.STATE).write_bytes(b"PK")
     with pytest.raises(InputError, match=r"state.npz: expected the state of a training"):
         evolve_policy(HOPPER, tmp_path, SMALL, generations=2, threads=1)
+
+
+def test_every_other_pair_begins_where_an_episode_of_the_last_generation_ended(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    own = Training(HOPPER, TrainingSettings(pairs=4, steps=20, seed=4))
+    states: list[tuple[np.ndarray, np.ndarray]] = []
+
+    class Seen(training.Rollout):
+        def __init__(self, *given: object, start: np.ndarray, **named: object) -> None:
+            super().__init__(*given, start=start, **named)
+            states.append((start, self.bind("qpos")))
+
+    monkeypatch.setattr(training, "Rollout", Seen)
+    own.run(2)
+    (_, ended), (start, _) = states
+    first, second = np.split(start, 2)
+    np.testing.assert_array_equal(first, second)
+    continued = [any(np.array_equal(one, end) for end in ended) for one in first]
+    assert continued == [False, False, True, True]
 
 
 @pytest.mark.parametrize("body", ["quadruped", "suite-dog-walk", "suite-walker-wlak"])
@@ -59,9 +80,8 @@ def test_a_task_without_reward_or_observation_is_refused(body: str):
 
 
 @pytest.mark.search
-def test_a_training_learns(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(training, "EPISODE", 100)
-    own = Training(CHEETAH, TrainingSettings(pairs=8, seed=1))
+def test_a_training_learns():
+    own = Training(CHEETAH, TrainingSettings(pairs=8, steps=100, seed=1))
     own.run(12)
     means = [row[3] for row in own.rows]
     assert np.mean(means[-3:]) > 2 * np.mean(means[:3])
