@@ -29,6 +29,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.joints import excesses, joints_of
@@ -184,7 +185,7 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
             reason = refit_reason(accused, problem)
         return Doubt(reason, LONGER) if reason else None
     loss = fit.intact_loss if accused else fit.loss
-    has_one_gait = all(have_one_gait([one.rows], [healthy[0].rows]) for one in healthy)
+    has_one_gait = _have_one_gait(healthy)
     ratio = significance.LOSS_RATIO ** (2 if has_one_gait else 1)
     is_small = loss <= ratio * worst + significance.LOSS_FLOOR
     faster = faster_joints(problem.trials, problem)
@@ -212,6 +213,17 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
         else:
             reason = refit_reason(accused, problem)
     return _doubt(reason, faster, problem) if reason else None
+
+
+def _have_one_gait(trials: Sequence[TrialPart]) -> bool:
+    """Returns whether trials have one gait, and the velocity that is asked for in it is the same.
+
+    A policy has much the same commands straight on and in a turn, and other motions.
+    """
+    drivers = [part.trial.plan.controller for part in trials]
+    asked = {one.design.velocity for one in drivers if isinstance(one, Controller)}
+    first = [trials[0].rows]
+    return len(asked) <= 1 and all(have_one_gait([one.rows], first) for one in trials)
 
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Problem) -> Doubt:

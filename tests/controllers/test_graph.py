@@ -76,7 +76,9 @@ def test_an_operator_is_that_of_onnx(tmp_path: Path, code: str, outputs: int):
     rows = np.abs(rows) if "Sqrt" in code else rows
     (expected,) = onnxruntime.InferenceSession(path).run(None, {"x": rows})
 
-    np.testing.assert_allclose(read_network(path)(rows.astype(float)), expected, atol=1e-5)
+    np.testing.assert_allclose(
+        read_network(path)(rows.astype(float)), expected, rtol=1e-6, atol=1e-6
+    )
 
 
 def test_every_operator_is_compared_with_onnx():

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from selfmodel import load_robot
+from selfmodel import load_policy, load_robot
 from selfmodel.comparators import SEGMENT_PREDICTION
 from selfmodel.controllers.playback import played_back
 from selfmodel.diagnosis.adequacy import (
@@ -210,6 +210,25 @@ def test_one_healthy_gait_does_not_tell_how_well_another_is_predicted(
     assert doubt is not None
     assert "one gait" in doubt.reason
     assert doubted(problem, WEAK, 1.5 * LOSS_RATIO**2) is None
+
+
+@pytest.mark.parametrize(("faster", "doubts"), [(0.5, ["one gait"]), (1.0, [])])
+def test_velocities_that_a_policy_is_asked_for_are_gaits_of_their_own(
+    table: LossTable, healthy: list[Trial], weak: Trial, faster: float, doubts: list[str]
+):
+    names = iter(("slow", "other"))
+
+    def asked_for(velocity: float) -> Trial:
+        terms = [{"term": "gravity"}, {"term": "velocity"}]
+        file = {"observation": terms, "velocity": [velocity, 0, 0]}
+        driver = load_policy(file, "quadruped", lambda _: np.zeros(8))
+        plan = dataclasses.replace(healthy[0].plan, controller=driver)
+        return dataclasses.replace(healthy[0], plan=plan, path=f"{next(names)}.mcap")
+
+    problem = problem_of(table, weak, [asked_for(0.5), asked_for(faster)])
+    doubt = doubted(problem, WEAK, 1.5 * LOSS_RATIO)
+
+    assert re.findall("one gait", doubt.reason if doubt else "") == doubts
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Unitree Go1 that walks by a public policy: diagnosis, false alarms, recovery; its network."""

@@ -1,0 +1,142 @@
+"""``python -m benchmarks.go1 COMMAND``: a Go1 under its policy, diagnosed and recovered.
+
+The folder FILES has the files of others, see ``docs/results/policies.md``. A command appends a row
+for each case to ROWS, and skips the cases that are there. The order of the cases is random, so the
+rows of a command that was stopped are a random sample.
+"""
+
+import argparse
+import json
+import random
+import tempfile
+import time
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import selfmodel
+from benchmarks.foreign.scoring import read_rows
+from benchmarks.go1 import robots
+from benchmarks.go1.robots import OTHERS, WALK, Go1
+from benchmarks.go1.tables import table
+from selfmodel import Diagnosis, Hypothesis, Robot, Settings
+from selfmodel.faults.joints import SERVO_GAIN, WEAK_MOTOR
+from selfmodel.studies.study import Row
+
+SEEDS = {"diagnose": 3, "healthy": 20, "recover": 3}
+CASES = {"diagnose": robots.faults, "healthy": robots.commands, "recover": robots.damages}
+"""Physical robots of each command, and their cases."""
+
+
+def main() -> None:
+    """Runs a command."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.go1", description=__doc__)
+    commands = parser.add_subparsers(required=True, dest="command")
+    for name, seeds in SEEDS.items():
+        command = commands.add_parser(name)
+        command.add_argument("files", type=Path, help="folder of the files of others")
+        command.add_argument("--seeds", type=int, default=seeds, help="physical robots")
+        command.add_argument("--limit", type=int, help="number of new rows")
+        command.add_argument("--cases", default="", help="only those whose name has this text")
+        command.add_argument("--population", type=int, default=Settings.population)
+        command.add_argument("--generations", type=int, default=Settings.generations)
+    commands.add_parser("table", help="print tables of the rows")
+    for command in commands.choices.values():
+        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
+    given = parser.parse_args()
+    if given.command == "table":
+        print(table(read_rows(given.rows)))
+        return
+    settings = Settings(steps=robots.STEPS, generations=given.generations).scaled(given.population)
+    robot = selfmodel.load_robot(given.files / robots.SCENE, robots.SETTINGS)
+    new, done = cases(robot, given), read_rows(given.rows)
+    new = (key for key in new if not any(key.items() <= row.items() for row in done))
+    for key in islice(new, given.limit):
+        start = time.process_time()
+        with tempfile.TemporaryDirectory() as work:
+            go1 = Go1(given.files, Path(work), key["seed"], robot)
+            values = (recovered if given.command == "recover" else diagnosed)(go1, key, settings)
+        row = {**key, **values, "seconds": round(time.process_time() - start)}
+        with given.rows.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps(row)}\n")
+        print(json.dumps(row), flush=True)
+
+
+def cases(robot: Robot, given: argparse.Namespace) -> Iterator[Row]:
+    """Yields what names each row of a command, in a random order."""
+    rows = [
+        {"command": given.command, "group": group, "truth": truth, "seed": seed}
+        for seed in range(given.seeds)
+        for group, truth in CASES[given.command](robot, seed)
+    ]
+    random.Random(0).shuffle(rows)  # noqa: S311  # an order
+    return (row for row in rows if given.cases in f"{row['group']} {row['truth']}")
+
+
+def diagnosed(go1: Go1, key: Row, settings: Settings) -> Row:
+    """Returns the diagnosis of a log by healthy logs of other commands."""
+    before, truth = go1.physical("intact", 0), key["truth"]
+    healthy = [go1.logged(before, each, f"healthy-{k}") for k, each in enumerate(robots.HEALTHY)]
+    log = go1.logged(go1.physical(truth, 1), OTHERS.get(key["group"], WALK), "diagnosed")
+    found = selfmodel.diagnose(
+        log, healthy=healthy, robot=go1.robot, settings=settings, seed=go1.seed, threads=1
+    )
+    return {**_facts(found, truth, go1.robot), "displacement": round(log.displacement, 2)}
+
+
+def recovered(go1: Go1, key: Row, settings: Settings) -> Row:
+    """Returns the recovery of a robot by three trials, with the defaults."""
+    found = selfmodel.recover(
+        go1.physical("intact", 0),
+        go1.physical(key["truth"], 1),
+        go1.robot,
+        go1.work / "run",
+        gait=go1.policy(WALK),
+        settings=settings,
+        seed=go1.seed,
+        threads=1,
+    )
+    before, unadapted, *scores = (round(value, 2) for value in found.scores)
+    return {
+        **_facts(found.diagnosis, key["truth"], go1.robot),
+        "before": before,
+        "unadapted": unadapted,
+        "scores": scores,
+        "falls": [fall is not None for fall in found.falls[2:]],
+        "tried": [str(one) for one in found.tried[2:]],
+    }
+
+
+def _facts(found: Diagnosis, truth: str, robot: Robot) -> Row:
+    return {
+        "answer": answer(found, selfmodel.parse_hypothesis(truth, robot)),
+        "best": str(found.best),
+        "verdict": found.verdict,
+        "alike": [str(one) for one in found.indistinguishable],
+        "unsearched": [str(one) for one in found.unsearched.named] if found.unsearched else [],
+        "since": found.change.time if found.change else None,
+        "reason": found.doubt.reason if found.doubt else found.reason,
+    }
+
+
+def answer(found: Diagnosis, truth: Hypothesis) -> str:
+    """Returns whether kinds and parts are right, or how they are not."""
+
+    def parts(one: Hypothesis) -> frozenset[tuple[str, str]]:
+        same = {SERVO_GAIN.name: WEAK_MOTOR.name}  # up to a limit of the torque
+        named = ((kind.name, part) for kind, part in one.without_severities)
+        return frozenset((same.get(kind, kind), part) for kind, part in named)
+
+    if found.verdict == "not judged":
+        return found.verdict
+    if parts(found.best) == parts(truth):
+        return "right"
+    if parts(truth) in map(parts, found.indistinguishable):
+        return "among those alike"
+    if found.unsearched and parts(truth) in map(parts, found.unsearched.named):
+        return "right, of an unsearched kind"
+    return "wrong" if found.best.faults else "missed"
+
+
+if __name__ == "__main__":
+    main()
