@@ -68,6 +68,7 @@ class SegmentPrediction:
         horizon: Control steps of a segment.
         max_segments: Segments of a short trial, at most, evenly spread over it.
         density: Segments per control step of a longer trial.
+        share: Largest share of a trial that its segments cover.
     """
 
     name: str
@@ -75,12 +76,13 @@ class SegmentPrediction:
     horizon: int = 12
     max_segments: int = 80
     density: float = 0.08
+    share: float = 1.0
 
     @property
     def surrogate(self) -> "SegmentPrediction":
         """The same comparator with a third of the segments of a short trial, for any trial."""
-        fewer = max(self.max_segments // 3, MIN_SEGMENTS)
-        return dataclasses.replace(self, max_segments=fewer, density=0.0)
+        fewer, share = max(self.max_segments // 3, MIN_SEGMENTS), self.share / 3
+        return dataclasses.replace(self, max_segments=fewer, density=0.0, share=share)
 
     def prepare(self, trial: Trial) -> Prepared:
         """Returns the segments of the trial and the logged values to compare them with.
@@ -159,6 +161,7 @@ class SegmentPrediction:
             )
         fitting = (trajectory.steps - 1) // horizon
         most = max(self.max_segments, round(self.density * trajectory.steps))
+        most = min(most, max(round(self.share * fitting), MIN_SEGMENTS))
         follow = not set(BASE) <= states.keys() or any(
             np.isnan(states[signal][known_steps(states)]).any() for signal in JOINTS
         )

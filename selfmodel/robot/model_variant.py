@@ -34,6 +34,13 @@ its geoms is below the margin."""
 _MIN_MIX = 1e-15
 """Smallest weight of a geom in the mean of contact parameters (MuJoCo's ``mjMINVAL``)."""
 
+_UNREAD = [
+    int(kind)
+    for name, kind in mujoco.mjtSensor.__members__.items()
+    if any(part in name for part in ("FRAME", "JOINTPOS", "CONTACT"))
+]
+"""Sensors that nothing reads from a simulation: 8 % of the time of a Go1 of mujoco_playground."""
+
 _EQ_JOINT, _EQ_TENDON = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 _SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 
@@ -79,8 +86,10 @@ class ModelVariant:
         gain, offset, bias, noise = np.array([[1.0], [0.0], [0.0], [0.0]]).repeat(
             len(anatomy.sensors), axis=1
         )
+        own = copy.copy(model)
+        own.sensor_needstage[np.isin(own.sensor_type, _UNREAD)] = 0  # of no stage of a step
         return cls(
-            *(copy.copy(model), gain, offset, bias, noise, np.zeros(1)),
+            *(own, gain, offset, bias, noise, np.zeros(1)),
             encoder_offset=np.zeros(len(anatomy.hinges)),
             seed=seed,
         )

@@ -6,9 +6,9 @@ approximately.
 Source of the idea: Jakobi, Husbands and Harvey, "Noise and the reality gap" (ECAL 1995).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -213,15 +213,13 @@ def measurement_noise(
     variants: Sequence[ModelVariant],
     conditions: Sequence[DomainSample],
     uncertainty: DomainDistribution,
-    *,
-    is_read: bool = True,
 ) -> Callable[[FloatArray, Mapping[str, FloatArray]], None]:
     """Returns a function that adds the noise of the next step to what controllers observe.
 
-    These are readings, ``(runs, sensors)``, if they are read at all, and other signals,
-    ``(runs, width)`` each, whose level of noise is the largest of the readings'. The noise of a
-    condition is the same in all its runs (common random numbers); dead sensors have none. The runs
-    of the conditions are in turn in each group of adjacent rows.
+    These are readings, ``(runs, sensors)``, and other signals, ``(runs, width)`` each, whose level
+    of noise is the largest of the readings'. The noise of a condition is the same in all its runs
+    (common random numbers); dead sensors have none. The runs of the conditions are in turn in each
+    group of adjacent rows.
     """
     anatomy = robot.anatomy
     silent = np.array([dead_sensors(anatomy, variant) for variant in variants])
@@ -236,27 +234,23 @@ def measurement_noise(
     half_ranges = joint_half_ranges(robot)
     # The pose of a fixed base is known, so no sensor measures it.
     known = BASE_SIGNALS if robot.has_fixed_base else ()
-
-    @cache
-    def drawn(widths: tuple[int, ...]) -> Iterator[list[FloatArray]]:
-        """Yields standard noise of each step, ``(count, width)`` each, drawn for many at once."""
-        while True:
-            shape = (DRAWN_STEPS, sum(widths))
-            steps = np.array([rng.standard_normal(shape) for rng in of_signals]).swapaxes(0, 1)
-            yield from (np.split(step, np.cumsum(widths)[:-1], axis=1) for step in steps)
+    drawn: list[FloatArray] = []  # standard noise of the next steps, the next one last
 
     def add(readings: FloatArray, observed: Mapping[str, FloatArray]) -> None:
-        if is_read:
-            by_condition = readings.reshape(len(readings) // count, count, sensors)
-            uniform = np.array([rng.random(sensors) for rng in generators])
-            normal = np.array([rng.standard_normal(sensors) for rng in generators])
-            by_condition += deviations * normal
-            wrong = uniform < wrong_touches
-            by_condition[:, wrong] = 1 - by_condition[:, wrong]
+        by_condition = readings.reshape(len(readings) // count, count, sensors)
+        uniform = np.array([rng.random(sensors) for rng in generators])
+        normal = np.array([rng.standard_normal(sensors) for rng in generators])
+        by_condition += deviations * normal
+        wrong = uniform < wrong_touches
+        by_condition[:, wrong] = 1 - by_condition[:, wrong]
         noisy = [one for one in SIGNALS if level and one in observed and one not in known]
         turned = "base_orientation"
-        widths = tuple(3 if one == turned else observed[one].shape[1] for one in noisy)
-        for signal, own in zip(noisy, next(drawn(widths)) if noisy else (), strict=True):
+        widths = [3 if one == turned else observed[one].shape[1] for one in noisy]
+        if noisy and not drawn:
+            shape = (DRAWN_STEPS, sum(widths))
+            drawn.extend(np.stack([rng.standard_normal(shape) for rng in of_signals], axis=1)[::-1])
+        parts = np.split(drawn.pop(), np.cumsum(widths)[:-1], axis=1) if noisy else []
+        for signal, own in zip(noisy, parts, strict=True):
             rows, joints = observed[signal], signal == "joint_positions"
             scale = level * (half_ranges if joints else MEASUREMENT_FULL_SCALES[signal])
             noise = np.tile(scale * own, (len(rows) // count, 1))

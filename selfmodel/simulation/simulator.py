@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.controllers.controller import CommandSource, Controller
+from selfmodel.controllers.controller import CommandSource
 from selfmodel.errors import check_type, typed, unknown_name, whole_number
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
@@ -179,16 +179,13 @@ class Simulator:
         robot, count = self.robot, len(drivers)
         variants = [condition.variant(robot) for condition in conditions]
         start = domain.initial_positions(robot, variants, conditions, uncertainty.start)
-        reads = any(isinstance(one, Controller) and one.design.reads for one in drivers)
         flat = self._run(
             [*variants] * count,
             [driver for driver in drivers for _ in conditions],
             steps,
             record,
             start=np.tile(start, (count, 1)),
-            disturb=domain.measurement_noise(
-                *(robot, variants, conditions, uncertainty), is_read=reads or "sensors" in record
-            ),
+            disturb=domain.measurement_noise(robot, variants, conditions, uncertainty),
             until=until,
         )
         return flat.grouped(count, len(conditions))
