@@ -20,7 +20,6 @@ from benchmarks.go1 import robots
 from benchmarks.go1.robots import OTHERS, WALK, Go1
 from benchmarks.go1.tables import table
 from selfmodel import Diagnosis, Hypothesis, Robot, Settings
-from selfmodel.faults.joints import SERVO_GAIN, WEAK_MOTOR
 from selfmodel.studies.study import Row
 
 SEEDS = {"diagnose": 3, "healthy": 20, "recover": 3}
@@ -107,9 +106,11 @@ def recovered(go1: Go1, key: Row, settings: Settings) -> Row:
     }
 
 
-def _facts(found: Diagnosis, truth: str, robot: Robot) -> Row:
+def _facts(found: Diagnosis, notation: str, robot: Robot) -> Row:
+    truth = parts(selfmodel.parse_hypothesis(notation, robot))
     return {
-        "answer": answer(found, selfmodel.parse_hypothesis(truth, robot)),
+        "first": parts(found.best) == truth,
+        "answer": answer(found, truth),
         "best": str(found.best),
         "verdict": found.verdict,
         "alike": [str(one) for one in found.indistinguishable],
@@ -119,21 +120,21 @@ def _facts(found: Diagnosis, truth: str, robot: Robot) -> Row:
     }
 
 
-def answer(found: Diagnosis, truth: Hypothesis) -> str:
-    """Returns whether kinds and parts are right, or how they are not."""
+def parts(one: Hypothesis) -> frozenset[tuple[str, str]]:
+    """Returns kinds and parts; half the gain of a servo is half its torque, up to a limit."""
+    pairs = one.without_severities
+    return frozenset((kind.name.replace("servo-gain", "motor"), part) for kind, part in pairs)
 
-    def parts(one: Hypothesis) -> frozenset[tuple[str, str]]:
-        same = {SERVO_GAIN.name: WEAK_MOTOR.name}  # up to a limit of the torque
-        named = ((kind.name, part) for kind, part in one.without_severities)
-        return frozenset((same.get(kind, kind), part) for kind, part in named)
 
+def answer(found: Diagnosis, truth: frozenset[tuple[str, str]]) -> str:
+    """Returns whether kinds and parts are right by the verdict, or how they are not."""
     if found.verdict == "not judged":
         return found.verdict
-    if parts(found.best) == parts(truth):
+    if parts(found.best) == truth:
         return "right"
-    if parts(truth) in map(parts, found.indistinguishable):
+    if truth in map(parts, found.indistinguishable):
         return "among those alike"
-    if found.unsearched and parts(truth) in map(parts, found.unsearched.named):
+    if found.unsearched and truth in map(parts, found.unsearched.named):
         return "right, of an unsearched kind"
     return "wrong" if found.best.faults else "missed"
 

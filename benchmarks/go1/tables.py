@@ -35,7 +35,8 @@ def table(rows: Sequence[Row]) -> str:
 def _rates(rows: Sequence[Row], answers: Sequence[str]) -> dict[str, str]:
     given = [row["answer"] for row in rows]
     counts = {each: str(given.count(each)) for each in answers if each != "right"}
-    return {"right": rate([each == "right" for each in given]), **counts, **_seconds(rows)}
+    first, right = [row["first"] for row in rows], [each == "right" for each in given]
+    return {"right first": rate(first), "right": rate(right), **counts, **_seconds(rows)}
 
 
 def _scores(rows: Sequence[Row]) -> dict[str, str]:
