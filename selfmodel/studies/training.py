@@ -159,8 +159,8 @@ class Training:
 
     @property
     def policy(self) -> Policy:
-        """The policy of the mean of the search."""
-        return self.design.policy(self._search.mean)
+        """The policy of the average of the search."""
+        return self.design.policy(self._search.average)
 
     def run(self, generations: int, after: Callable[[Generation], None] = ignore) -> None:
         """Runs further generations, and calls ``after`` with each."""
@@ -249,7 +249,7 @@ class Training:
     def save(self, folder: Path) -> None:
         """Writes the policy, the progress and the state; each file is whole at any time."""
         design = self.design
-        tensors = {name: one[0] for name, one in design.tensors(self._search.mean[None]).items()}
+        tensors = {name: one[0] for name, one in design.tensors(self._search.average[None]).items()}
         about = {"robot": self.name, **asdict(self.settings), "seconds": self._seconds}
         about |= {"rng": self._rng.bit_generator.state}
         state = {
@@ -270,9 +270,9 @@ class Training:
     def _arrays(self) -> dict[str, FloatArray]:
         """Arrays of the state, besides the progress; their shapes are those of the task."""
         own = self._moments
-        average = {"count": np.array(own.count), "average": own.mean, "square": own.square}
+        seen = {"count": np.array(own.count), "centre": own.mean, "square": own.square}
         ends = dict(zip(("positions", "velocities"), self._ends, strict=True))
-        return {**self._search.state(), **average, **ends}
+        return {**self._search.state(), **seen, **ends}
 
     def resume(self, path: Path) -> None:
         """Continues from a state file.
@@ -304,7 +304,7 @@ class Training:
         self.rows = [(int(k), int(steps), *own) for k, steps, *own in found["rows"].tolist()]
         self._rng.bit_generator.state = about["rng"]
         self._seconds = float(about["seconds"])
-        self._moments = Moments(float(found["count"]), found["average"], found["square"])
+        self._moments = Moments(float(found["count"]), found["centre"], found["square"])
         self._ends = [found["positions"], found["velocities"]]
         self._search.resume(found)
 

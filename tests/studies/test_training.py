@@ -13,7 +13,7 @@ from selfmodel.studies import plans, training
 from selfmodel.studies.training import Training, TrainingSettings, evolve_policy
 
 SMALL = TrainingSettings(pairs=3, steps=20, seed=4)
-NAMES = ("mean", "moments", "count", "average", "square", "positions", "velocities")
+NAMES = ("mean", "average", "moments", "count", "centre", "square", "positions", "velocities")
 HOPPER, CHEETAH = "suite-hopper-stand", "suite-cheetah-run"
 
 
