@@ -373,6 +373,7 @@ class EvolvePolicy(Command):
     deviation: float = 0.1
     rate: float = 0.05
     steps: int = 250
+    damage: str = "intact"
     seed: int = 0
     threads: int = 0
 

@@ -19,6 +19,7 @@ def evolve(options: EvolvePolicy) -> None:
         deviation=options.deviation,
         rate=options.rate,
         steps=options.steps,
+        damage=options.damage,
         seed=options.seed,
     )
     with display() as show:

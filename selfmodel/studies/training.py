@@ -27,7 +27,7 @@ from selfmodel.controllers.trained import Trained, initial_layers
 from selfmodel.errors import InputError, typed, unknown_name
 from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
-from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.notation import parse
 from selfmodel.files import path_of, read_file
 from selfmodel.logs.controllers import NPZ_FAILURES, read_arrays
 from selfmodel.logs.files import make_folder, refuse_existing, replace_file
@@ -65,6 +65,7 @@ class TrainingSettings:
         deviation: Standard deviation of the weights of a generation about their mean.
         rate: Largest step of the mean of the weights.
         steps: Control steps of an episode of the training.
+        damage: Faults of the body, in notation.
         seed: Seed of all random numbers.
     """
 
@@ -73,6 +74,7 @@ class TrainingSettings:
     deviation: float = 0.1
     rate: float = 0.05
     steps: int = 250
+    damage: str = "intact"
     seed: int = 0
 
 
@@ -105,13 +107,16 @@ class Training:
         threads: Threads of the physics.
 
     Raises:
-        InputError: The task has no observation or reward that a policy is evolved for.
+        InputError: The task has no observation or reward that a policy is evolved for, or the body
+            cannot have the damage.
     """
 
     def __init__(self, robot: str, settings: TrainingSettings, threads: int = 1) -> None:
         self.name, self.settings = robot, settings
         self._robot, parts = _body(robot)
         self._threads = threads
+        damage = parse(settings.damage, self._robot.anatomy)
+        self._variant = build(self._robot, damage)
         self._reward, self._starts = reward_of(*parts), Starts(*parts)
         self._rng = np.random.default_rng(settings.seed)
         key = observation_of(robot)
@@ -214,7 +219,7 @@ class Training:
         robot, count = self._robot, len(controllers)
         steps = self.settings.steps if learn else EPISODE
         start, speeds = states
-        variants = [build(robot, INTACT)] * count
+        variants = [self._variant] * count
         rollout = Rollout(
             robot, variants, controllers, (), threads=self._threads, start=start, speeds=speeds
         )

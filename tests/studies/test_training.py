@@ -1,5 +1,6 @@
 """Promises of trainings: they learn, go on to the bit, and write policies that others read."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,18 @@ def test_a_folder_of_another_training_is_refused(tmp_path: Path):
     (tmp_path / training.STATE).write_bytes(b"PK")
     with pytest.raises(InputError, match=r"state.npz: expected the state of a training"):
         evolve_policy(HOPPER, tmp_path, SMALL, generations=2, threads=1)
+
+
+def test_a_policy_may_be_evolved_for_a_damaged_body(tmp_path: Path):
+    own = evolve_policy(HOPPER, tmp_path / "intact", SMALL, generations=1, threads=1)
+    jammed = replace(SMALL, damage="jam:knee")
+    other = evolve_policy(HOPPER, tmp_path / "jammed", jammed, generations=1, threads=1)
+
+    assert own.rows[0][3] != other.rows[0][3]
+    with pytest.raises(InputError, match="another damage: give its options"):
+        evolve_policy(HOPPER, tmp_path / "jammed", SMALL, generations=2, threads=1)
+    with pytest.raises(InputError, match="hand"):
+        Training(HOPPER, replace(SMALL, damage="jam:hand"))
 
 
 def test_every_other_pair_begins_where_an_episode_of_the_last_generation_ended(
