@@ -31,6 +31,9 @@ MIN_SEGMENTS = 4
 MIN_COVER = 0.9
 """Share of a trial that segments cover without gaps that matter."""
 
+LEAST = 12
+"""Segments, at least, that a surrogate simulates of a trial that has more than its most."""
+
 COMPARISONS = 4
 """Steps within a segment at which prediction and log are compared, evenly spread to its end."""
 
@@ -68,7 +71,6 @@ class SegmentPrediction:
         horizon: Control steps of a segment.
         max_segments: Segments of a short trial, at most, evenly spread over it.
         density: Segments per control step of a longer trial.
-        share: Largest share of a trial that its segments cover.
     """
 
     name: str
@@ -76,13 +78,12 @@ class SegmentPrediction:
     horizon: int = 12
     max_segments: int = 80
     density: float = 0.08
-    share: float = 1.0
 
     @property
     def surrogate(self) -> "SegmentPrediction":
-        """The same comparator with a third of the segments of a short trial, for any trial."""
-        fewer, share = max(self.max_segments // 3, MIN_SEGMENTS), self.share / 3
-        return dataclasses.replace(self, max_segments=fewer, density=0.0, share=share)
+        """The same comparator with a third of the segments, at most those of a short trial."""
+        fewer = max(self.max_segments // 3, MIN_SEGMENTS)
+        return dataclasses.replace(self, max_segments=fewer, density=0.0)
 
     def prepare(self, trial: Trial) -> Prepared:
         """Returns the segments of the trial and the logged values to compare them with.
@@ -161,7 +162,8 @@ class SegmentPrediction:
             )
         fitting = (trajectory.steps - 1) // horizon
         most = max(self.max_segments, round(self.density * trajectory.steps))
-        most = min(most, max(round(self.share * fitting), MIN_SEGMENTS))
+        if not self.density and fitting > most:  # a surrogate: of a trial of middle length, too
+            most = min(most, max(round(fitting / 3), LEAST))
         follow = not set(BASE) <= states.keys() or any(
             np.isnan(states[signal][known_steps(states)]).any() for signal in JOINTS
         )

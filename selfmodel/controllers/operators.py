@@ -21,10 +21,9 @@ Operator = Callable[[Arguments, Attributes], Sequence[FloatArray]]
 
 
 LARGE, BLOCK, MAX_PRODUCTS = 2**12, 8, 2**18
-"""Weights from which on BLAS is faster than einsum, by five times for a layer of 512 and 256
-neurons; rows that it multiplies at a time, with zeros after the last; and most products of a call,
-for which OpenBLAS starts no threads. The order of its sums depends on both, that of einsum does
-not."""
+"""Weights from which on BLAS is faster than einsum; rows that it multiplies at a time, zeros after
+the last; and most products of a call, for which OpenBLAS starts no threads. The order of its sums
+depends on both."""
 
 
 def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
@@ -43,8 +42,8 @@ def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     (blocks[:, 0] if is_own else blocks.reshape(-1, width))[: len(rows)] = rows
     turned, most = np.swapaxes(matrix, -1, -2), max(1, MAX_PRODUCTS // (BLOCK * width))
     parts = [blocks @ turned[..., first : first + most] for first in range(0, outputs, most)]
-    products = np.concatenate(parts, axis=2)
-    return products[:, 0] if is_own else products.reshape(-1, outputs)[: len(rows)]
+    whole = np.concatenate(parts, axis=2)
+    return whole[:, 0] if is_own else whole.reshape(-1, outputs)[: len(rows)]
 
 
 def _turned(matrix: FloatArray) -> FloatArray:

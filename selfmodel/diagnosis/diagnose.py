@@ -142,7 +142,8 @@ class DiagnosticSearch:
             observer=observer,
         )
         ranked = [one for one in seeds if problem.space.has(one)]
-        if how != STEPWISE:
+        # With many losses, the refinement from the last hypotheses needs no start of the EA.
+        if how == EA or (how != STEPWISE and not (ranked and self.losses.is_piecewise(trials))):
             table, of_trials = (self.losses, trials) if how == EA else surrogate
             distances = partial(table.distances, trials=of_trials)
             ranked, evaluations = evolved(

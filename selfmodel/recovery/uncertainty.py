@@ -67,9 +67,9 @@ NOISY: tuple[Signal, ...] = ("sensors", "joint_positions", "base_orientation")
 """Signals of a trial whose noise is estimated."""
 
 MODELS = 64
-"""Largest number of models of the sample. Each trial is simulated once per model. In nine steps of
-recoveries of a Go1 and of quadrupeds across gaps, the weighted paths of 128 predicted the next
-trial as well: with a mean log likelihood of -1.82, that of 64 with -1.83."""
+"""Largest number of models of the sample. Each trial is simulated once per model. Nine times, 64
+weighted models predicted the next trial of a robot across a gap as 128 did: with a mean log
+likelihood of -1.83, and -1.82."""
 
 SAMPLE_COST = 1 / 24
 """Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
