@@ -39,6 +39,7 @@ def main() -> None:
         command.add_argument("--cases", default="", help="only those whose name has this text")
         command.add_argument("--population", type=int, default=Settings.population)
         command.add_argument("--generations", type=int, default=Settings.generations)
+        command.add_argument("--healthy", type=float, default=1.2, help="command of a log, m/s")
     commands.add_parser("table", help="print tables of the rows")
     for command in commands.choices.values():
         command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
@@ -63,8 +64,9 @@ def main() -> None:
 
 def cases(robot: Robot, given: argparse.Namespace) -> Iterator[Row]:
     """Yields what names each row of a command, in a random order."""
+    healthy = {} if given.command == "recover" else {"healthy": given.healthy}
     rows = [
-        {"command": given.command, "group": group, "truth": truth, "seed": seed}
+        {"command": given.command, "group": group, "truth": truth, "seed": seed, **healthy}
         for seed in range(given.seeds)
         for group, truth in CASES[given.command](robot, seed)
     ]
@@ -74,8 +76,8 @@ def cases(robot: Robot, given: argparse.Namespace) -> Iterator[Row]:
 
 def diagnosed(go1: Go1, key: Row, settings: Settings) -> Row:
     """Returns the diagnosis of a log by healthy logs of other commands."""
-    before, truth = go1.physical("intact", 0), key["truth"]
-    healthy = [go1.logged(before, each, f"healthy-{k}") for k, each in enumerate(robots.HEALTHY)]
+    before, truth, forward = go1.physical("intact", 0), key["truth"], (key["healthy"], 0.0, 0.0)
+    healthy = [go1.logged(before, *one) for one in ((forward, "forward"), (robots.TURN, "turn"))]
     log = go1.logged(go1.physical(truth, 1), OTHERS.get(key["group"], WALK), "diagnosed")
     found = selfmodel.diagnose(
         log, healthy=healthy, robot=go1.robot, settings=settings, seed=go1.seed, threads=1

@@ -18,14 +18,13 @@ NETWORK = "go1_policy.onnx"
 SETTINGS, STEPS = MjcfSettings(control_timestep=0.02), 500
 """Settings of the model, and control steps of a trial."""
 GAP, DELAY, FRICTION = 0.05, 1, (0.6, 1.2)
-"""Level of the gap, added control delay, steps, and coefficients of friction of the physical robots
-and their grounds; the model's friction is the first."""
+"""Level of the gap, added delay, steps, and friction of the grounds; the model's is the first."""
 
 Velocity = tuple[float, float, float]
 """Forward and to the left, m/s, and the turn to the left, rad/s."""
 WALK: Velocity = (1.0, 0.0, 0.0)
-HEALTHY: tuple[Velocity, ...] = ((0.6, 0.0, 0.0), (0.5, 0.0, 0.8))
-"""Commands of the healthy logs beside each diagnosis."""
+TURN: Velocity = (0.5, 0.0, 0.8)
+"""Command of one of the healthy logs beside a diagnosis; that of the other is straight on."""
 OTHERS: dict[str, Velocity] = {"0.5 m/s": (0.5, 0.0, 0.0), "turning right": (0.6, 0.0, -0.7)}
 OTHERS |= {"standing": (0.0, 0.0, 0.0), "1 m/s": WALK}
 """Commands of the healthy logs that are diagnosed."""
@@ -51,8 +50,7 @@ class Go1:
     def physical(self, truth: str, stream: int) -> SimulatedRobot:
         """Returns the physical robot with a fault; see ``SimulatedRobot`` for streams."""
         friction = np.random.default_rng(self.seed).uniform(*FRICTION) / FRICTION[0]
-        gap = draw_reality(self.robot, self.seed, GAP)
-        gap = replace(gap, friction=float(friction), delay=DELAY)
+        gap = replace(draw_reality(self.robot, self.seed, GAP), friction=friction, delay=DELAY)
         hidden = selfmodel.parse_hypothesis(truth, self.robot)
         return SimulatedRobot(self.robot, hidden, gap, stream)
 
