@@ -18,6 +18,7 @@ def evolve(options: EvolvePolicy) -> None:
         pairs=options.population // 2,
         deviation=options.deviation,
         rate=options.rate,
+        steps=options.steps,
         seed=options.seed,
     )
     with display() as show:

@@ -1,8 +1,9 @@
 """Policies evolved for a task of dm_control's suite: its own observation, return and episodes.
 
-The search is ``EvolutionStrategy``. The observation is normalised by its mean and its deviation in
-all episodes so far (Mania et al., arXiv:1803.07055). The state of a training is one file, written
-after each generation, from which the same training goes on to the bit.
+The search is ``EvolutionStrategy``, over episodes that are shorter than those of the task. The
+observation is normalised by its mean and its deviation in all episodes so far (Mania et al.,
+arXiv:1803.07055). The state of a training is one file, written after each generation, from which
+the same training goes on to the bit.
 """
 
 import io
@@ -62,6 +63,7 @@ class TrainingSettings:
         pairs: Pairs of opposite policies of a generation, each with one episode.
         deviation: Standard deviation of the weights of a generation about their mean.
         rate: Largest step of the mean of the weights.
+        steps: Control steps of an episode of the training.
         seed: Seed of all random numbers.
     """
 
@@ -69,6 +71,7 @@ class TrainingSettings:
     pairs: int = 16
     deviation: float = 0.1
     rate: float = 0.05
+    steps: int = 500
     seed: int = 0
 
 
@@ -168,24 +171,31 @@ class Training:
         """Returns the returns of genomes; the two of a pair have the same initial state."""
         seeds = np.tile(self._rng.integers(2**32, size=len(genomes) // 2), 2)
         design = self.design
-        found = self.returns([Controller(design, one) for one in genomes], seeds, learn=True)
+        controllers = [Controller(design, one) for one in genomes]
+        found = self.returns(controllers, seeds, self.settings.steps, learn=True)
         finite = found[np.isfinite(found)]
         now = process_time()
         self._seconds, self._clock = self._seconds + now - self._clock, now
-        count = self._search.generation + 1
-        steps = count * len(genomes) * EPISODE
-        mean, most = (float(finite.mean()), float(finite.max())) if len(finite) else (math.nan,) * 2
-        self.rows.append((count, steps, self._seconds, mean, most))
+        count, own = self._search.generation + 1, self.settings.steps
+        steps, scale = count * len(genomes) * own, EPISODE / own
+        mean, most = (finite.mean(), finite.max()) if len(finite) else (math.nan,) * 2
+        self.rows.append((count, steps, self._seconds, float(scale * mean), float(scale * most)))
         return found
 
     def returns(
-        self, controllers: Sequence[Controller], seeds: IndexArray, *, learn: bool = False
+        self,
+        controllers: Sequence[Controller],
+        seeds: IndexArray,
+        steps: int | None = None,
+        *,
+        learn: bool = False,
     ) -> FloatArray:
         """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
 
         Args:
             controllers: Policies of the task, of one design.
             seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
+            steps: Control steps of the episode; None for those of the task's.
             learn: Whether the observations count in the normalisation.
         """
         robot, count = self._robot, len(controllers)
@@ -199,7 +209,8 @@ class Training:
         self._reward(fields, commands)  # binds its fields before the first step
         total, own = np.zeros(count), self._moments
         shifted, squares = np.zeros((2, count, len(own.mean)))
-        for k in rollout.steps(EPISODE + 1):
+        steps = EPISODE if steps is None else steps
+        for k in rollout.steps(steps + 1):
             if k:
                 total += self._reward(fields, commands)
             commands[:] = rollout.live["commands"]()
@@ -208,7 +219,7 @@ class Training:
             squares += difference**2
         finite = np.isfinite(total) & ~rollout.diverged()
         if learn and finite.any():
-            rows = int(finite.sum()) * (EPISODE + 1)
+            rows = int(finite.sum()) * (steps + 1)
             own.add(rows, shifted[finite].sum(axis=0), squares[finite].sum(axis=0))
         return np.where(finite, total, -math.inf)
 

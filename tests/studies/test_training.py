@@ -8,11 +8,12 @@ from dm_control import suite
 
 import selfmodel
 from selfmodel.arguments import read_controller
+from selfmodel.controllers.controller import Controller
 from selfmodel.errors import InputError
 from selfmodel.studies import plans, training
 from selfmodel.studies.training import Training, TrainingSettings, evolve_policy
 
-SMALL = TrainingSettings(pairs=3, seed=4)
+SMALL = TrainingSettings(pairs=3, steps=20, seed=4)
 HOPPER, CHEETAH = "suite-hopper-stand", "suite-cheetah-run"
 
 
@@ -27,7 +28,7 @@ def numbers(folder: Path) -> dict[str, np.ndarray]:
 
 
 def test_a_training_that_goes_on_has_the_bits_of_a_whole_one(tmp_path: Path):
-    settings = TrainingSettings(hidden=3, pairs=3, seed=4)
+    settings = TrainingSettings(hidden=3, pairs=3, steps=30, seed=4)
     whole = evolve_policy(HOPPER, tmp_path / "a", settings, generations=4, threads=2)
     evolve_policy(HOPPER, tmp_path / "b", settings, generations=2, threads=1)
     parts = evolve_policy(HOPPER, tmp_path / "b", settings, generations=4, threads=1)
@@ -44,12 +45,22 @@ def test_a_training_that_goes_on_has_the_bits_of_a_whole_one(tmp_path: Path):
 
 def test_a_folder_of_another_training_is_refused(tmp_path: Path):
     evolve_policy(HOPPER, tmp_path, SMALL, generations=1, threads=1)
-    other = TrainingSettings(hidden=2, pairs=3, seed=5)
+    other = TrainingSettings(hidden=2, pairs=3, steps=20, seed=5)
     with pytest.raises(InputError, match="of a training with another neurons, seed: give its opt"):
         evolve_policy(HOPPER, tmp_path, other, generations=2, threads=1)
     (tmp_path / training.STATE).write_bytes(b"PK")
     with pytest.raises(InputError, match=r"state.npz: expected the state of a training"):
         evolve_policy(HOPPER, tmp_path, SMALL, generations=2, threads=1)
+
+
+def test_episodes_of_the_search_may_be_shorter_than_those_of_the_task():
+    seeds = np.array([5, 6])
+    short = Training("suite-walker-walk", SMALL)
+    own = [Controller(short.policy, np.zeros(0))] * 2
+    assert (short.returns(own, seeds, 20) < short.returns(own, seeds)).all()
+    short.run(1)
+    assert short.rows[0][1] == 6 * 20
+    assert short.rows[0][3] <= short.rows[0][4] <= training.EPISODE
 
 
 @pytest.mark.parametrize("body", ["quadruped", "suite-dog-walk", "suite-walker-wlak"])
@@ -59,9 +70,8 @@ def test_a_task_without_reward_or_observation_is_refused(body: str):
 
 
 @pytest.mark.search
-def test_a_training_learns(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(training, "EPISODE", 100)
-    own = Training(CHEETAH, TrainingSettings(pairs=8, seed=1))
+def test_a_training_learns():
+    own = Training(CHEETAH, TrainingSettings(pairs=8, steps=100, seed=1))
     own.run(12)
     means = [row[3] for row in own.rows]
     assert np.mean(means[-3:]) > 2 * np.mean(means[:3])
