@@ -372,7 +372,7 @@ class EvolvePolicy(Command):
     generations: int = 100
     deviation: float = 0.1
     rate: float = 0.05
-    steps: int = 250
+    steps: int = 500
     damage: str = "intact"
     seed: int = 0
     threads: int = 0

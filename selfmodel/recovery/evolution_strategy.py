@@ -21,10 +21,6 @@ values of a genome are in [-1, 1]."""
 DECAYS, SMALL = (0.9, 0.999), 1e-8
 """Decays of Adam's moments, and what its denominator is at least (arXiv:1412.6980)."""
 
-LATEST = 0.03
-"""Least share of the last mean in the average of means, which is better than each of them, as their
-steps are mostly noise (Polyak and Juditsky, 1992)."""
-
 
 class EvolutionStrategy:
     """An evolution strategy, a ``GenomeSearch``; fitness is maximised.
@@ -36,10 +32,6 @@ class EvolutionStrategy:
         pairs: Pairs of opposite genomes of a generation; None for a population of the settings.
         deviation: Standard deviation of the genomes about the mean.
         rate: Largest step of the mean, per value.
-
-    Attributes:
-        mean: Mean of the next generation.
-        average: Moving average of the means.
     """
 
     def __init__(
@@ -62,7 +54,7 @@ class EvolutionStrategy:
         self.evaluations = 0
         self._asked = np.empty((0, length))
         self._noise = np.empty((0, length))
-        self.mean = self.average = np.zeros(length) if start is None else np.array(start)
+        self.mean = np.zeros(length) if start is None else np.array(start)
         if start is None:
             size = max(2 * self._pairs, len(seeds))
             self._asked = first_generation(size, length, draw_genomes, rng, seeds)
@@ -89,7 +81,7 @@ class EvolutionStrategy:
         self.generation += 1
         self.evaluations += len(fitness)
         if not len(self._noise):
-            self.mean = self.average = self._best[0]
+            self.mean = self._best[0]
             return
         self._updates += 1
         ranks = np.empty(len(fitness))
@@ -101,8 +93,6 @@ class EvolutionStrategy:
         self._moments = decays * self._moments + (1 - decays) * np.array([slope, slope**2])
         first, second = self._moments / (1 - decays**self._updates)
         self.mean = np.clip(self.mean + self._rate * first / (np.sqrt(second) + SMALL), -1, 1)
-        share = max(LATEST, 2 / (self._updates + 1))
-        self.average = self.average + share * (self.mean - self.average)
 
     def candidates(self, count: int) -> FloatArray:
         """Returns the mean, and the best genomes of the last generation."""
@@ -111,12 +101,10 @@ class EvolutionStrategy:
     def state(self) -> Mapping[str, FloatArray]:
         """Returns what determines the next generations besides the generator, after a ``tell``."""
         counts = np.array([self.generation, self.evaluations, self._updates], dtype=np.float64)
-        means = {"mean": self.mean, "average": self.average}
-        return {**means, "moments": self._moments, "counts": counts}
+        return {"mean": self.mean, "moments": self._moments, "counts": counts}
 
     def resume(self, state: Mapping[str, FloatArray]) -> None:
         """Continues from a ``state``."""
-        self.mean, self.average = state["mean"], state["average"]
-        self._moments = np.array(state["moments"])
+        self.mean, self._moments = state["mean"], np.array(state["moments"])
         self.generation, self.evaluations, self._updates = map(int, state["counts"])
         self._asked = np.empty((0, len(self.mean)))

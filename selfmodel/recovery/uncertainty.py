@@ -66,19 +66,17 @@ pose within the noise is not distinguished from the reference pose."""
 NOISY: tuple[Signal, ...] = ("sensors", "joint_positions", "base_orientation")
 """Signals of a trial whose noise is estimated."""
 
-MODELS = 64
-"""Largest number of models of the sample. Each trial is simulated once per model. Nine times, 64
-weighted models predicted the next trial of a robot across a gap as 128 did: with a mean log
-likelihood of -1.83, and -1.82."""
+MODELS = 128
+"""Largest number of models of the sample. Each trial is simulated once per model."""
 
-SAMPLE_COST = 1 / 24
+SAMPLE_COST = 1 / 12
 """Rollouts of a trial, one per model, relative to the evaluations of the paper's repair EA."""
 
 BATCH = 36
 """Number of models that are simulated together, unless there are more threads: as fast as all, in
 half of the memory."""
 
-REPEATS = 8
+REPEATS = 16
 """Rollouts of one model, which measure how far noise alone moves the path."""
 
 MARKS = 5

@@ -1,10 +1,9 @@
 """Policies evolved for a task of dm_control's suite: its own observation, return and episodes.
 
-The search is ``EvolutionStrategy``. Its episodes are shorter than those of the task: every other
-one begins where one of the last generation ended, so that all of an episode is seen (after Vicol et
-al., arXiv:2112.13835). The observation is normalised by its mean and its deviation in all episodes
-so far (Mania et al., arXiv:1803.07055). The state of a training is one file, written after each
-generation, from which the same training goes on to the bit.
+The search is ``EvolutionStrategy``, over episodes that are shorter than those of the task. The
+observation is normalised by its mean and its deviation in all episodes so far (Mania et al.,
+arXiv:1803.07055). The state of a training is one file, written after each generation, from which
+the same training goes on to the bit.
 """
 
 import io
@@ -73,7 +72,7 @@ class TrainingSettings:
     pairs: int = 16
     deviation: float = 0.1
     rate: float = 0.05
-    steps: int = 250
+    steps: int = 500
     damage: str = "intact"
     seed: int = 0
 
@@ -115,15 +114,13 @@ class Training:
         self.name, self.settings = robot, settings
         self._robot, parts = _body(robot)
         self._threads = threads
-        damage = parse(settings.damage, self._robot.anatomy)
-        self._variant = build(self._robot, damage)
+        self._variant = build(self._robot, parse(settings.damage, self._robot.anatomy))
         self._reward, self._starts = reward_of(*parts), Starts(*parts)
         self._rng = np.random.default_rng(settings.seed)
         key = observation_of(robot)
         self._observation = f"{TASK_PREFIX}{key}"
         width = observation_width(key, self._robot.model)
         self._moments = Moments(0.0, np.zeros(width), np.ones(width))
-        self._ends = self._draw(2 * settings.pairs)
         motors = len(self._robot.anatomy.motors)
         self._first = layers(
             initial_layers(width, settings.hidden, motors, self._rng), "Tanh", "Tanh"
@@ -164,8 +161,8 @@ class Training:
 
     @property
     def policy(self) -> Policy:
-        """The policy of the average of the search."""
-        return self.design.policy(self._search.average)
+        """The policy of the mean of the search."""
+        return self.design.policy(self._search.mean)
 
     def run(self, generations: int, after: Callable[[Generation], None] = ignore) -> None:
         """Runs further generations, and calls ``after`` with each."""
@@ -174,18 +171,12 @@ class Training:
             loop = (self._search, self._fitness, after, lambda: end - self.generation)
             evolution.evolve(*loop, noisy=True)
 
-    def _draw(self, count: int) -> list[FloatArray]:
-        """Draws initial states of the task, ``(count, nq)`` and ``(count, nv)``."""
-        return list(self._starts.draw(self._rng.integers(2**32, size=count)))
-
     def _fitness(self, genomes: FloatArray) -> FloatArray:
         """Returns the returns of genomes; the two of a pair have the same initial state."""
-        pairs, design = len(genomes) // 2, self.design
-        ended = self._rng.integers(len(genomes), size=pairs // 2)
-        starts = self._draw(pairs - len(ended))
-        both = zip(starts, self._ends, strict=True)
-        states = [np.tile(np.concatenate([own, ends[ended]]), (2, 1)) for own, ends in both]
-        found = self._episodes([Controller(design, one) for one in genomes], states, learn=True)
+        seeds = np.tile(self._rng.integers(2**32, size=len(genomes) // 2), 2)
+        design = self.design
+        controllers = [Controller(design, one) for one in genomes]
+        found = self.returns(controllers, seeds, self.settings.steps, learn=True)
         finite = found[np.isfinite(found)]
         now = process_time()
         self._seconds, self._clock = self._seconds + now - self._clock, now
@@ -195,30 +186,24 @@ class Training:
         self.rows.append((count, steps, self._seconds, float(scale * mean), float(scale * most)))
         return found
 
-    def returns(self, controllers: Sequence[Controller], seeds: IndexArray) -> FloatArray:
+    def returns(
+        self,
+        controllers: Sequence[Controller],
+        seeds: IndexArray,
+        steps: int | None = None,
+        *,
+        learn: bool = False,
+    ) -> FloatArray:
         """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
 
         Args:
             controllers: Policies of the task, of one design.
             seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
-        """
-        return self._episodes(controllers, self._starts.draw(seeds))
-
-    def _episodes(
-        self,
-        controllers: Sequence[Controller],
-        states: Sequence[FloatArray],
-        *,
-        learn: bool = False,
-    ) -> FloatArray:
-        """Returns the returns of episodes from initial positions and velocities.
-
-        To ``learn``, they have the length of those of the training, their observations count in the
-        normalisation, and their last states are kept.
+            steps: Control steps of the episode; None for those of the task's.
+            learn: Whether the observations count in the normalisation.
         """
         robot, count = self._robot, len(controllers)
-        steps = self.settings.steps if learn else EPISODE
-        start, speeds = states
+        start, speeds = self._starts.draw(seeds)
         variants = [self._variant] * count
         rollout = Rollout(
             robot, variants, controllers, (), threads=self._threads, start=start, speeds=speeds
@@ -226,9 +211,9 @@ class Training:
         fields = Fields(robot.model, rollout.bind)
         commands = np.zeros((count, len(robot.anatomy.motors)))
         self._reward(fields, commands)  # binds its fields before the first step
-        reached = fields.positions, fields.velocities
         total, own = np.zeros(count), self._moments
         shifted, squares = np.zeros((2, count, len(own.mean)))
+        steps = EPISODE if steps is None else steps
         for k in rollout.steps(steps + 1):
             if k:
                 total += self._reward(fields, commands)
@@ -240,8 +225,6 @@ class Training:
         if learn and finite.any():
             rows = int(finite.sum()) * (steps + 1)
             own.add(rows, shifted[finite].sum(axis=0), squares[finite].sum(axis=0))
-            for ends, values in zip(self._ends, reached, strict=True):
-                ends[finite] = values[finite]
         return np.where(finite, total, -math.inf)
 
     def judged(self, episodes: int) -> FloatArray:
@@ -254,7 +237,7 @@ class Training:
     def save(self, folder: Path) -> None:
         """Writes the policy, the progress and the state; each file is whole at any time."""
         design = self.design
-        tensors = {name: one[0] for name, one in design.tensors(self._search.average[None]).items()}
+        tensors = {name: one[0] for name, one in design.tensors(self._search.mean[None]).items()}
         about = {"robot": self.name, **asdict(self.settings), "seconds": self._seconds}
         about |= {"rng": self._rng.bit_generator.state}
         state = {
@@ -275,9 +258,8 @@ class Training:
     def _arrays(self) -> dict[str, FloatArray]:
         """Arrays of the state, besides the progress; their shapes are those of the task."""
         own = self._moments
-        seen = {"count": np.array(own.count), "centre": own.mean, "square": own.square}
-        ends = dict(zip(("positions", "velocities"), self._ends, strict=True))
-        return {**self._search.state(), **seen, **ends}
+        average = {"count": np.array(own.count), "average": own.mean, "square": own.square}
+        return {**self._search.state(), **average}
 
     def resume(self, path: Path) -> None:
         """Continues from a state file.
@@ -309,8 +291,7 @@ class Training:
         self.rows = [(int(k), int(steps), *own) for k, steps, *own in found["rows"].tolist()]
         self._rng.bit_generator.state = about["rng"]
         self._seconds = float(about["seconds"])
-        self._moments = Moments(float(found["count"]), found["centre"], found["square"])
-        self._ends = [found["positions"], found["velocities"]]
+        self._moments = Moments(float(found["count"]), found["average"], found["square"])
         self._search.resume(found)
 
 

@@ -61,17 +61,6 @@ def test_without_a_start_it_begins_at_the_best_of_seeds_and_random_genomes():
     assert np.linalg.norm(advance(search, 1).mean - TARGET) > 0
 
 
-def test_the_average_of_the_means_is_less_noisy_than_they_are():
-    rng, search = np.random.default_rng(3), started(rate=0.1)
-    errors = []
-    for _ in range(300):
-        asked = search.ask()
-        search.tell(-np.square(asked - TARGET).sum(axis=1) + rng.normal(0, 0.3, len(asked)))
-        errors.append([np.linalg.norm(one - TARGET) for one in (search.mean, search.average)])
-    mean, average = np.mean(errors[100:], axis=0)
-    assert average < 0.7 * mean
-
-
 def test_it_goes_on_from_its_state_to_the_bit():
     whole, half = advance(started(), 6), advance(started(), 3)
     rng = np.random.default_rng(99)
@@ -80,5 +69,4 @@ def test_it_goes_on_from_its_state_to_the_bit():
     other = EvolutionStrategy(4, Settings(), rng, **given)
     other.resume(half.state())
     np.testing.assert_array_equal(advance(other, 3).mean, whole.mean)
-    np.testing.assert_array_equal(other.average, whole.average)
     np.testing.assert_array_equal(other.ask(), whole.ask())
