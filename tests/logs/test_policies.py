@@ -378,7 +378,11 @@ OTHER_MOTORS = {"motors": np.array(["a"] * 8)}
         (False, {"content": None}, "it holds genome"),
         (False, {"content": np.zeros((2, 2), np.uint8)}, "its arrays have the types and ranks"),
         (False, {"kind": np.array("network")}, "it holds content"),
-        (False, {"kind": np.array("tree")}, "'network' or 'cpg' or 'policy' or 'compensation'"),
+        (
+            False,
+            {"kind": np.array("tree")},
+            "'network' or 'cpg' or 'policy' or 'finetuned' or 'compensation'",
+        ),
         (False, {"genome": np.zeros(1)}, "has 0 weights, got a genome of shape"),
         (False, {"tensor/bias0": None}, "bias0 is used by Gemm before it is computed"),
         (False, {"xtensor/bias0": np.zeros(1)}, "it holds content"),
