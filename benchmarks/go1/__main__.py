@@ -103,6 +103,7 @@ def recovered(go1: Go1, key: Row, settings: Settings) -> Row:
         "before": before,
         "unadapted": unadapted,
         "scores": scores,
+        "expected": [round(mean, 2) for mean in found.robust_means[2:]],
         "falls": [fall is not None for fall in found.falls[2:]],
         "tried": [str(one) for one in found.tried[2:]],
     }
