@@ -80,13 +80,19 @@ class LayerRepair:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
-        """Returns untried layers that are better than none, best first, or else that of zeros."""
+        """Returns untried layers that are better than none, best first, or else that of zeros.
+
+        So it does at once for an intact robot, which is not to be changed.
+        """
         fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
         self._sizes = self._sizes or self._smallest_first(hypotheses[0])
         known = tried = [one for one in seeds if one.design in self._sizes]
         begin = max([self._sizes.index(one.design) for one in tried], default=0)
         for design in self._sizes[begin:]:
             none = Controller(design, np.zeros(design.weights))
+            if hypotheses[0] == INTACT:
+                known, scores, _ = self._compared(fitness, [none], rng)
+                return viable(known, scores, fitness, 1)
             known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
             known += self._evolved(fitness, known, rng, on_generation)
             known, scores, intact = self._compared(fitness, known, rng)

@@ -36,6 +36,7 @@ def found_by(
     none: Controller,
     value: Callable[[np.ndarray], float],
     tried: Sequence[Controller] = (),
+    hypothesis: str = "motor:front_left_knee=0",
 ) -> tuple[CandidateController, ...]:
     """The candidates of a repair, in a world in which a layer has a value by its genome."""
 
@@ -48,7 +49,7 @@ def found_by(
         return np.repeat(values, count).reshape(len(layers), count)
 
     repair = LayerRepair(Simulator(robot, 1), TINY, none.design, DISPLACEMENT)
-    damage = parse("motor:front_left_knee=0", robot.anatomy)
+    damage = parse(hypothesis, robot.anatomy)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(RobustFitness, "__call__", scored)
         rng = np.random.default_rng(0)
@@ -60,6 +61,11 @@ def test_where_every_change_is_worse_the_robot_is_not_changed(quadruped: Robot, 
     (found,) = found_by(quadruped, none, lambda genome: -np.abs(genome).sum())
     assert not found.controller.genome.any()
     assert found.mean == 0
+
+
+def test_an_intact_robot_is_not_changed_for_a_better_score(quadruped: Robot, none: Controller):
+    (found,) = found_by(quadruped, none, lambda genome: 5 * genome[0], hypothesis="intact")
+    assert not found.controller.genome.any()
 
 
 def test_the_smallest_layer_that_regains_enough_is_the_repair(quadruped: Robot, none: Controller):
