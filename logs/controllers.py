@@ -6,7 +6,7 @@ design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``,
 (float64, centre and half width per motor).
 
 In place of a number, a policy has ``content`` (its operators, terms and action, as JSON) and the
-tensors of its network, a fine-tuned one also ``features`` and ``driven``, and a compensating layer
+tensors of its network, a fine-tuned one also ``features``, and a compensating layer
 ``base`` (the bytes of the controller within) and ``feedback``.
 """
 
@@ -136,10 +136,6 @@ _GRAPH = ("input", "output", "inputs", "outputs", "nodes")
 """Attributes of a network beside its tensors."""
 
 
-_CHANGE = {"features": "f2", "driven": "i1"}
-"""Arrays of a fine-tuned policy beside those of the policy, with their types and ranks."""
-
-
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     if design.name in KINDS:
         number = KINDS[design.name][1]
@@ -157,8 +153,8 @@ def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
         content = msgspec.json.encode({**of_graph, "interface": design.interface})
         tensors = {f"{_TENSOR}{name}": _narrow(each) for name, each in graph.tensors.items()}
         arrays = {"content": np.frombuffer(content, dtype=np.uint8), **tensors}
-        own = _CHANGE if design.name == FINETUNED else {}
-        return arrays | {name: np.array(getattr(design, name)) for name in own}
+        features = getattr(design, "features", None)  # of a fine-tuned one
+        return arrays if features is None else arrays | {"features": np.array(features)}
     if isinstance(design, Compensated):
         base = np.frombuffer(controller_bytes(design.base), dtype=np.uint8)
         return {"base": base, "feedback": np.array(design.feedback)}
@@ -178,7 +174,7 @@ def _own_types(kind: str, arrays: Arrays) -> dict[str, str]:
         tensors = {
             name: f"f{each.ndim}" for name, each in arrays.items() if name.startswith(_TENSOR)
         }
-        return {"content": "u1", **tensors, **(_CHANGE if kind == FINETUNED else {})}
+        return {"content": "u1", **tensors} | ({"features": "f2"} if kind == FINETUNED else {})
     if kind == LAYER:
         return {"base": "u1", "feedback": "b0"}
     _, number, code = KINDS[kind]
@@ -218,9 +214,8 @@ def _design(
             return policy
         from selfmodel.controllers.trained import Finetuned  # noqa: PLC0415  # few controllers are one
 
-        rows, driven = arrays["features"].tolist(), tuple(arrays["driven"].tolist())
-        change: Any = {"features": tuple(map(tuple, rows)), "driven": driven}
-        return Finetuned(**vars(policy), **change)
+        rows = tuple(map(tuple, arrays["features"].tolist()))
+        return Finetuned(**vars(policy), features=rows)
     # Without a layer, which could have another within, and so on.
     base = _parsed(arrays["base"].tobytes(), source, (*KINDS, POLICY, FINETUNED))
     feedback = bool(arrays["feedback"])

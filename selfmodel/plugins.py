@@ -60,8 +60,8 @@ ROBUST, PAPER, COMPENSATE, FINETUNE = "robust", "paper", "compensate", "finetune
 """Names of the repairs: on rollouts under random conditions; in one exact simulation; and, under
 random conditions, of a layer around a known controller, or of the last layer of a policy."""
 
-AROUND = (COMPENSATE, FINETUNE)
-"""Repairs that begin at a known controller, and change it."""
+FILES = {COMPENSATE: "a policy file, a .npz or a log", FINETUNE: "a policy file or a log of one"}
+"""Files of the known controller that a repair changes."""
 
 DEFAULT_SCORES: Mapping[str, str] = MappingProxyType(
     {**dict.fromkeys((ROBUST, COMPENSATE, FINETUNE), UPRIGHT.name), PAPER: DISPLACEMENT.name}
@@ -292,7 +292,7 @@ def repair(
                 f"repertoire out, or give the repair {ROBUST}"
             )
         return RepairSearch
-    if name in AROUND:
+    if name in FILES:
         if chosen != "cma-es":
             raise InputError(
                 f"the repair {name} has CMA-ES from the known controller, got the search "
@@ -321,7 +321,7 @@ def repaired_around(
     """
     name = repair or (ROBUST if gait is None else COMPENSATE)
     check_known("repair", name, DEFAULT_SCORES)
-    if name not in AROUND:
+    if name not in FILES:
         if not design.weights:
             raise InputError(
                 f"the repair {name} evolves the weights of a controller, got "
@@ -331,7 +331,7 @@ def repaired_around(
     if gait is None:
         raise InputError(
             f"the repair {name} needs a controller that walks, got the design {design.name}: give "
-            f"--controller FILE, a policy file, a .npz or a log; in Python gait="
+            f"--controller FILE, {FILES[name]}; in Python gait="
         )
     from selfmodel.recovery.layers import finetunable, layered  # noqa: PLC0415  # few robots have one
 

@@ -98,7 +98,7 @@ def environment(
     )
     if not reality.hypothesis.faults and gap == 0 and reality.start == 0:
         return env
-    _check_effect(f"{suite_bodies.PREFIX}{domain} {task}", reality.hypothesis)
+    check_effect(f"{suite_bodies.PREFIX}{domain} {task}", reality.hypothesis)
     variant = _variant(domain, task, own, anatomy, reality)
     delay = reality.gap.delay + added_steps(0, float(variant.added_delay[0]))
     wrapper = importlib.import_module("dm_control.mujoco.wrapper.core")
@@ -126,8 +126,12 @@ def _anatomy(domain: str, task: str, model: mujoco.MjModel) -> Anatomy:
     return suite_bodies.robot(domain, task if task in known else known[0]).anatomy
 
 
-def _check_effect(name: str, hypothesis: Hypothesis) -> None:
-    """Refuses faults of sensors and neurons, which change the controller's inputs only."""
+def check_effect(name: str, hypothesis: Hypothesis) -> None:
+    """Refuses faults of sensors and neurons, which do not change what a task observes.
+
+    Raises:
+        InputError: A fault is one.
+    """
     for fault in hypothesis.faults:
         if not fault.kind.affects_dynamics or fault.kind == SILENT_NEURON:
             raise InputError(

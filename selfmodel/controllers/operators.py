@@ -46,10 +46,6 @@ def _matmul(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     return whole[:, 0] if is_own else whole.reshape(-1, outputs)[: len(rows)]
 
 
-def _turned(matrix: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(np.swapaxes(matrix, -1, -2))
-
-
 def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix, *bias = arguments
     if attributes.get("transA"):
@@ -63,7 +59,7 @@ def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
 
 def _product(arguments: Arguments, _attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix = arguments
-    return [_matmul(rows, _turned(matrix))]
+    return [_matmul(rows, np.ascontiguousarray(matrix.T))]
 
 
 def _elu(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:

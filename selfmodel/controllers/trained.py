@@ -4,25 +4,33 @@ import json
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence, Set as AbstractSet
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Design
-from selfmodel.controllers.graph import Graph
+from selfmodel.controllers.graph import Graph, Node
 from selfmodel.controllers.policy import Policy, PolicyBatch
 
 FINETUNED_SPAN = 0.5
 """Largest change of an output of the last layer for a feature of its usual size."""
 
+MAX_FEATURE = 1e6
+"""Largest magnitude of a number of a feature."""
+
+SAMPLES = 16
+"""Inputs with which it is tried what an output depends on."""
+
+TURNED = ".T"
+"""End of the names of weights that are transposed in their ONNX file."""
+
 LAYER_HEADER = """\
 # The last layer of a policy, as selfmodel fine-tuned it:
 # {within}.
 #
-#   output = (weights + change) input + bias
-#
-# tensor: name of the weights in the network. change: rows are outputs, columns inputs.
+# Add change to the tensor of this name in the network; it has the same shape.
 """
 """Head of a layer file."""
 
@@ -90,7 +98,6 @@ class Finetuned(Evolved):
     Attributes:
         features: Directions of the inputs of the layer, ``(rank, inputs)``, of the inverse length
             of what a robot that walks has along them.
-        driven: Outputs of the layer that are changed.
 
     Raises:
         ValueError: The network has no layer of weights, or another width.
@@ -99,15 +106,14 @@ class Finetuned(Evolved):
     name: ClassVar[str] = "finetuned"
 
     features: tuple[tuple[float, ...], ...] = field(kw_only=True)
-    driven: tuple[int, ...] = field(kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        outputs, inputs = self._matrix.shape
-        if not self.features or {len(row) for row in self.features} != {inputs}:
-            raise ValueError(f"expected features of {inputs} numbers, those of its last layer")
-        if not self.driven or not {*self.driven} <= {*range(outputs)}:
-            raise ValueError(f"expected some of the {outputs} outputs of its last layer")
+        width = self.graph.tensors[last_layer(self.graph).weight].shape[1]
+        if not self.features or {len(row) for row in self.features} != {width}:
+            raise ValueError(f"expected features of {width} numbers, the inputs of its last layer")
+        if not np.all(np.abs(self.features) <= MAX_FEATURE):  # NaN is not
+            raise ValueError(f"expected features of at most {MAX_FEATURE:g}")
 
     @classmethod
     def of(cls, policy: Policy, features: FloatArray) -> "Finetuned":
@@ -118,14 +124,12 @@ class Finetuned(Evolved):
             features: Directions, ``(rank, inputs)``; see the class.
         """
         own = {each.name: getattr(policy, each.name) for each in fields(Policy)}
-        rows = tuple(map(tuple, features.tolist()))
-        return cls(**own, features=rows, driven=_driven(network_of(policy)))
+        return cls(**own, features=tuple(map(tuple, features.tolist())))
 
-    @property
-    def _matrix(self) -> FloatArray:
-        """Weights of the last layer, ``(outputs, inputs)``."""
-        layer = last_layer(self.graph)
-        return layer.rows(self.graph.tensors[layer.weight])
+    @cached_property
+    def driven(self) -> list[int]:
+        """Outputs of the last layer that those of the network depend on."""
+        return _driven(self.graph)
 
     @property
     def weights(self) -> int:
@@ -134,12 +138,13 @@ class Finetuned(Evolved):
 
     def tensors(self, genomes: FloatArray) -> Mapping[str, FloatArray]:
         """Returns the weights of the last layer of genomes; see ``Evolved``."""
-        layer, own = last_layer(self.graph), self._matrix
-        change = np.zeros((len(genomes), *own.shape))
+        weight = last_layer(self.graph).weight
+        own = self.graph.tensors[weight]
         numbers = genomes.reshape(len(genomes), len(self.driven), len(self.features))
+        change = np.zeros((len(genomes), *own.shape))
         product = np.einsum("ndr,ri->ndi", numbers, np.array(self.features))
-        change[:, list(self.driven)] = FINETUNED_SPAN * product
-        return {layer.weight: layer.rows(own + change)}
+        change[:, self.driven] = FINETUNED_SPAN * product
+        return {weight: own + change}
 
     def summary(self, genome: FloatArray) -> str:
         """Returns the description of the policy, with the size of the change."""
@@ -151,11 +156,48 @@ class Finetuned(Evolved):
 
     def layer_file(self, genome: FloatArray) -> str:
         """Returns the change of the weights of a genome as TOML, for other software."""
-        layer, own = last_layer(self.graph), self._matrix
-        changed = layer.rows(self.tensors(genome[np.newaxis])[layer.weight][0])
-        rows = "".join(f"    {row},\n" for row in (changed - own).tolist())
+        weight = last_layer(self.graph).weight
+        change = self.tensors(genome[np.newaxis])[weight][0] - self.graph.tensors[weight]
+        if weight.endswith(TURNED):  # as in the ONNX file
+            weight, change = weight.removesuffix(TURNED), change.T
+        rows = "".join(f"    {row},\n" for row in change.tolist())
         head = LAYER_HEADER.format(within=" ".join(super().summary(genome).split()))
-        return f"{head}\ntensor = {json.dumps(layer.weight)}\nchange = [\n{rows}]\n"
+        return f"{head}\ntensor = {json.dumps(weight)}\nchange = [\n{rows}]\n"
+
+
+@dataclass(frozen=True)
+class LastLayer:
+    """The last layer of weights that the output of a network depends on.
+
+    Attributes:
+        input: Name of its input.
+        weight: Name of its weights, ``(outputs, inputs)``.
+        output: Name of its output.
+        after: Operators between it and the output of the network.
+    """
+
+    input: str
+    weight: str
+    output: str
+    after: tuple[Node, ...]
+
+
+def last_layer(graph: Graph) -> LastLayer:
+    """Returns the last layer of weights of a network.
+
+    Raises:
+        ValueError: It has none.
+    """
+    needed, after = {graph.output}, list[Node]()
+    for node in reversed(graph.nodes):
+        if needed.isdisjoint(node.outputs):
+            continue
+        if node.operator == "Gemm" and dict(node.attributes).get("transB"):
+            own = node.inputs[0], node.inputs[1], node.outputs[0]
+            return LastLayer(*own, after=tuple(after[::-1]))
+        needed.update(node.inputs)
+        after.append(node)
+    raise ValueError("the network has no layer of weights to fine-tune")
 
 
 def network_of(design: Design) -> Graph:
@@ -171,53 +213,22 @@ def network_of(design: Design) -> Graph:
     return graph
 
 
-@dataclass(frozen=True)
-class LastLayer:
-    """The last layer of weights of a network.
+def _driven(graph: Graph) -> list[int]:
+    """Returns the outputs of the last layer that the output of a network depends on.
 
-    Attributes:
-        input: Name of its input.
-        weight: Name of its weights.
-        transposed: Whether these are ``(outputs, inputs)``.
+    What follows the layer is tried with small numbers, which saturate nothing; all outputs count
+    where it needs other values too.
     """
-
-    input: str
-    weight: str
-    transposed: bool
-
-    def rows(self, weights: FloatArray) -> FloatArray:
-        """Returns weights as ``(..., outputs, inputs)``, or such as they are in the network."""
-        return weights if self.transposed else np.ascontiguousarray(weights.swapaxes(-1, -2))
-
-
-def last_layer(graph: Graph) -> LastLayer:
-    """Returns the last layer of weights of a network.
-
-    Raises:
-        ValueError: It has none.
-    """
-    for node in reversed(graph.nodes):
-        if node.operator in LAYERS and np.ndim(graph.tensors.get(node.inputs[1], 0)) == 2:
-            transposed = bool(dict(node.attributes).get("transB"))
-            return LastLayer(node.inputs[0], node.inputs[1], transposed)
-    raise ValueError(f"the network has no layer of weights ({' or '.join(LAYERS)}) to fine-tune")
-
-
-LAYERS = ("Gemm", "MatMul")
-"""Operators of a layer of weights."""
-
-
-def _driven(graph: Graph) -> tuple[int, ...]:
-    """Returns the outputs of the last layer that the output of a network depends on."""
     layer = last_layer(graph)
-    own = layer.rows(graph.tensors[layer.weight])
-    changed = np.tile(own, (len(own), 1, 1))
-    changed[range(len(own)), range(len(own))] += 1.0
-    seen = np.tile(np.random.default_rng(0).standard_normal(graph.inputs), (len(own), 1))
-    first = graph.initial(len(own))
-    moved = graph.step(seen, first, {layer.weight: layer.rows(changed)})[0]
-    differs = (moved != graph.step(seen, first)[0]).any(axis=1)
-    return tuple(np.flatnonzero(differs).tolist())
+    count = len(graph.tensors[layer.weight])
+    try:
+        rest = Graph(layer.output, graph.output, count, 0, layer.after, graph.tensors)
+    except ValueError:
+        return list(range(count))
+    small = 0.1 * np.random.default_rng(0).standard_normal((SAMPLES, 1, count))
+    moved = small + 0.05 * np.eye(count)
+    differs = rest(moved.reshape(-1, count)) != np.repeat(rest(small[:, 0]), count, axis=0)
+    return np.flatnonzero(differs.any(axis=1).reshape(SAMPLES, count).any(axis=0)).tolist()
 
 
 def initial_layers(

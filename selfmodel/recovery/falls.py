@@ -46,7 +46,8 @@ def _has_gravity(robot: Robot) -> bool:
 def fallen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> Until | None:
     """Returns the function that tells which runs have fallen, whatever follows; None if none can.
 
-    The window of a fall is over: the rest of the run does not change the step of the fall.
+    The window of a fall is over: the rest of the run does not change the step of the fall. A run
+    that diverges after it is finite if it ends.
 
     Args:
         robot: The robot.
@@ -54,7 +55,8 @@ def fallen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> Until | None:
     """
     if not _has_gravity(robot):
         return None
-    normals = np.array([build(robot, hypothesis).normal for hypothesis in hypotheses])
+    known = {hypothesis: build(robot, hypothesis).normal for hypothesis in {*hypotheses}}
+    normals = np.array([known[hypothesis] for hypothesis in hypotheses])
 
     def have_fallen(begun: Trajectory) -> BoolArray:
         falls = first_falls(begun, normals, robot.standing_height)

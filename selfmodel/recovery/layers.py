@@ -7,6 +7,7 @@ regains too little of what the failure took is followed by a larger one.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -69,6 +70,7 @@ class LayerRepair:
     settings: Settings
     design: Design
     score: Score = UPRIGHT
+    keeps_intact: ClassVar[bool] = True
     evaluations: int = field(default=0, init=False)
     _sizes: Sequence[Design] = field(default=(), init=False)
 
@@ -80,30 +82,25 @@ class LayerRepair:
         rng: np.random.Generator,
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
-        """Returns untried layers that are better than none, best first, or else that of zeros.
-
-        So it does at once for an intact robot, which is not to be changed.
-        """
+        """Returns layers that are better than none, best first, or else that of zeros."""
         fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
         self._sizes = self._sizes or self._smallest_first(hypotheses[0])
         known = tried = [one for one in seeds if one.design in self._sizes]
         begin = max([self._sizes.index(one.design) for one in tried], default=0)
         for design in self._sizes[begin:]:
             none = Controller(design, np.zeros(design.weights))
-            if hypotheses[0] == INTACT:
-                known, scores, _ = self._compared(fitness, [none], rng)
-                return viable(known, scores, fitness, 1)
             known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
             known += self._evolved(fitness, known, rng, on_generation)
             known, scores, intact = self._compared(fitness, known, rng)
             values = robust(scores)
             if values.max() - values[-1] >= STALLED * (intact - values[-1]):
                 break
-        old = [widened(one, design) for one in tried]
+        small = {widened(one, known[0].design): one for one in tried}
         order = np.argsort(-values, kind="stable")
-        better = [k for k in order if values[k] > values[-1] and known[k] not in old]
-        rows = better or [len(known) - 1]
-        return viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
+        rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
+        found = [small.get(known[k], known[k]) for k in rows]
+        *better, none_at_last = viable(found, scores[rows], fitness, self.evaluations)
+        return tuple(better) or (none_at_last,)
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
         """Returns the designs of changes of the controller, by their size."""
@@ -170,15 +167,17 @@ def features_of(
     part = replace(graph, output=layer.input, outputs=0)
     states, seen = part.initial(len(drivers)), list[FloatArray]()
     batch = PolicyBatch(policy, len(drivers))
-    for _ in rollout.steps(OBSERVED):
+    for k in rollout.steps(OBSERVED):
         batch.readings[:] = rollout.live["sensors"]()
         for signal, values in rollout.observed.items():
             batch.observed[signal][:] = values
         batch.step(np.empty((len(drivers), len(policy.motors))))
-        inputs, states = part.step(batch.input, states)
-        seen.append(inputs)
+        if k % policy.interface.decimation == 0:
+            inputs, states = part.step(batch.input, states)
+            seen.append(inputs)
     rows = np.concatenate(seen)
-    _, sizes, directions = np.linalg.svd(rows[np.isfinite(rows).all(axis=1)], full_matrices=False)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
     kept = sizes[:RANK] > sizes[0] * 1e-6
     scale = sizes[:RANK][kept, np.newaxis] / np.sqrt(len(rows))
     return np.asarray(directions[:RANK][kept] / scale)

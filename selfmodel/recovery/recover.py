@@ -39,7 +39,12 @@ RunTrial = Callable[[PhysicalRobot, TrialPlan], Trial]
 
 
 def by_repair(loop: "RecoveryLoop") -> Controller:
-    """Returns the best candidate of the repair that was not tried yet, or else the best one."""
+    """Returns the best candidate of the repair that was not tried yet, or else the best one.
+
+    A repair around the controller of the robot leaves that of an intact robot as it is.
+    """
+    if loop.gait and loop.keeps_intact and loop.diagnoses[-1].verdict == "intact":
+        return loop.gait
     candidates = [each.controller for each in loop.repaired()]
     return next((one for one in candidates if one not in loop.controllers), candidates[0])
 
@@ -145,6 +150,11 @@ class RecoveryLoop:
         diagnosis = self.diagnoses[-1]
         uncertainty = partial(self._posterior.after, self.trials, diagnosis.best)
         return self._evolved((diagnosis.best, *diagnosis.indistinguishable), uncertainty)
+
+    @property
+    def keeps_intact(self) -> bool:
+        """Whether a robot that is found intact keeps its controller."""
+        return self._repairs[-1].keeps_intact
 
     def _repair_in_simulator(self) -> repairs.Repair:
         settings = self.settings.of_repair(self.repair_settings)

@@ -11,7 +11,7 @@ transfer).
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -48,6 +48,9 @@ repair EA."""
 HALVED = 0.4
 """Share of a search's control steps in which its rollouts have half of the steps of a trial, with
 a score that grows with time."""
+
+LEAST = 8
+"""Part of its steps that a rollout which ended early counts as at least."""
 
 FINALISTS, FINAL_CONDITIONS = 12, 4
 """Largest numbers of candidates of a search, and of conditions under which they are compared."""
@@ -89,9 +92,11 @@ class Repair(Protocol):
 
     Attributes:
         evaluations: Number of controllers evaluated so far.
+        keeps_intact: Whether a robot that is found intact keeps its controller.
     """
 
     evaluations: int
+    keeps_intact: ClassVar[bool]
 
     def __call__(
         self,
@@ -140,6 +145,7 @@ class RepairSearch:
     settings: Settings
     design: Design | None = None
     score: Score = DISPLACEMENT
+    keeps_intact: ClassVar[bool] = False
     evaluations: int = field(default=0, init=False)
     _known: dict[Run, FloatArray] = field(default_factory=dict, init=False)
 
@@ -193,11 +199,13 @@ class RobustFitness:
     ) -> FloatArray:
         """Returns scores, ``(controllers, count)``; negative infinity for a diverged rollout."""
         conditions = draw_samples(self.hypotheses, self.uncertainty, count, rng)
-        faults = [condition.hypothesis for condition in conditions]
-        ends = self.score.ends_at_fall
-        until = fallen(self.simulator.robot, faults * len(controllers)) if ends else None
+        faults, record = [each.hypothesis for each in conditions], self.score.record
+        until = None
+        if self.score.ends_at_fall:
+            until = fallen(self.simulator.robot, faults * len(controllers))
+            record = tuple(dict.fromkeys([*record, *UPRIGHT.record]))
         outcome = self.simulator.run_under(
-            conditions, self.uncertainty, controllers, steps, self.score.record, until=until
+            conditions, self.uncertainty, controllers, steps, record, until=until
         )
         return scores_of(self.score, self.simulator.robot, faults, outcome)
 
@@ -215,6 +223,7 @@ class RobustRepair:
     design: Design
     score: Score = UPRIGHT
     make_search: MakeSearch = CmaEs
+    keeps_intact: ClassVar[bool] = False
     evaluations: int = field(default=0, init=False)
 
     def __call__(
@@ -287,7 +296,7 @@ def run_search(
         count_ended: Whether the steps count that a rollout did not simulate because it ended, as by
             a fall. If not, a search in which most fall has more generations.
     """
-    stats, begin = fitness.simulator.stats, fitness.simulator.stats.steps
+    stats = fitness.simulator.stats
     total, spent = rollouts * steps, 0
     halved = HALVED * total if fitness.score.grows_with_time else 0.0
     short, half = min(SHORT_STEPS, steps), min(steps, max(SHORT_STEPS, steps // 2))
@@ -295,8 +304,9 @@ def run_search(
     def scores(asked: FloatArray) -> FloatArray:
         nonlocal spent
         now = short if not spent else half if spent < halved else steps
+        before, whole = stats.steps, len(asked) * conditions * now
         found = robust(fitness([Controller(design, one) for one in asked], conditions, now, rng))
-        spent = spent + len(asked) * conditions * now if count_ended else stats.steps - begin
+        spent += whole if count_ended else max(stats.steps - before, whole // LEAST)
         return found
 
     def generations_left() -> int:

@@ -178,7 +178,7 @@ def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
     """
     own, of_repair = settings_of({"shared": shared})
     settings = dataclasses.asdict(own.of_repair(of_repair)).items()
-    if shared["repair"] in plugins.AROUND:  # a gait is evolved before anything is around it
+    if shared["repair"] in plugins.FILES:  # a gait is evolved before anything is around it
         shared = {**shared, "repair": plugins.ROBUST}
     parameters = {
         **robot,

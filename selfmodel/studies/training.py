@@ -42,6 +42,7 @@ from selfmodel.simulation.simulator import thread_count
 from selfmodel.tasks import suite_bodies
 from selfmodel.tasks.rewards import REWARDS, Starts, reward_of
 from selfmodel.tasks.suite_bodies import EPISODE
+from selfmodel.tasks.suite_tasks import check_effect
 
 SPAN = 10.0
 """Largest change of a weight from that of the first network."""
@@ -114,7 +115,9 @@ class Training:
         self.name, self.settings = robot, settings
         self._robot, parts = _body(robot)
         self._threads = threads
-        self._variant = build(self._robot, parse(settings.damage, self._robot.anatomy))
+        damage = parse(settings.damage, self._robot.anatomy)
+        check_effect(robot, damage)
+        self._variant = build(self._robot, damage)
         self._reward, self._starts = reward_of(*parts), Starts(*parts)
         self._rng = np.random.default_rng(settings.seed)
         key = observation_of(robot)
@@ -271,7 +274,7 @@ class Training:
         mine = {"robot": self.name, **asdict(self.settings)}
         try:
             found = read_arrays(data, MAX_STATE_BYTES)
-            about = json.loads(str(found["about"]))
+            about = {"steps": EPISODE, "damage": "intact", **json.loads(str(found["about"]))}
             differ = [OPTIONS.get(name, name) for name in mine if about.get(name) != mine[name]]
             if not differ:
                 self._continue(found, about)

@@ -28,27 +28,21 @@ def commands(design: Policy, genomes: np.ndarray, rows: slice = slice(None)) -> 
     return found
 
 
-def split(hidden: int, *, transposed: bool) -> Graph:
-    """A network of which half of the outputs is thrown away, as of a normal distribution."""
+def ending(hidden: int, *after: str) -> Graph:
+    """A network of which half of the outputs is thrown away, with operators at its end."""
     rng = np.random.default_rng(3)
     sizes = [(hidden, SIZE - 2), (4, hidden)] if hidden else [(4, SIZE - 2)]
-    graph = layers([(rng.normal(size=one), rng.normal(size=one[0])) for one in sizes], "Elu")
-    nodes = (*graph.nodes, Node("Split", (graph.output,), ("mean", "rest"), (("axis", 1.0),)))
-    nodes += (Node("Tanh", ("mean",), ("out",)),)
-    last = f"weight{len(sizes) - 1}"
-    if not transposed:
-        turned = graph.tensors[last].T.copy()
-        graph = replace(graph, tensors={**graph.tensors, last: turned}, nodes=_plain(nodes, last))
-        return replace(graph, output="out", outputs=2)
-    return replace(graph, nodes=nodes, output="out", outputs=2)
+    graph = layers([(rng.normal(0, 9, one), rng.normal(size=one[0])) for one in sizes], "Relu")
+    nodes = [*graph.nodes, Node("Split", (graph.output,), ("out0", "rest"), (("axis", 1.0),))]
+    nodes += [Node(name, (f"out{k}",), (f"out{k + 1}",)) for k, name in enumerate(after)]
+    value = Node("Gemm", (graph.input, "critic"), ("value",), (("transB", 1.0),))
+    tensors = {**graph.tensors, "critic": np.ones((1, SIZE - 2))}
+    changes = {"nodes": (*nodes, value), "tensors": tensors}
+    return replace(graph, **changes, output=f"out{len(after)}", outputs=2)
 
 
-def _plain(nodes: tuple[Node, ...], weight: str) -> tuple[Node, ...]:
-    return tuple(replace(one, attributes=()) if weight in one.inputs else one for one in nodes)
-
-
-def finetuned(hidden: int, *, transposed: bool = True) -> Finetuned:
-    graph = split(hidden, transposed=transposed)
+def finetuned(hidden: int, *after: str) -> Finetuned:
+    graph = ending(hidden, *after)
     plain = Policy(SENSORS, MOTORS, ranges=RANGES, graph=graph, interface=INTERFACE)
     features = np.random.default_rng(4).normal(size=(3, hidden or SIZE - 2))
     return Finetuned.of(plain, features)
@@ -58,8 +52,8 @@ DESIGNS = {
     "trained": trained(7),
     "trained, by BLAS": trained(450),
     "linear": trained(0),
-    "finetuned": finetuned(7),
-    "finetuned, turned": finetuned(7, transposed=False),
+    "finetuned": finetuned(7, "Tanh"),
+    "finetuned, clipped": finetuned(7, "Relu", "Tanh"),
     "finetuned, linear": finetuned(0),
 }
 EVERY_DESIGN = pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
@@ -91,15 +85,18 @@ def test_every_weight_of_a_trained_network_is_evolved(hidden: int):
 
 
 def test_only_what_the_output_depends_on_is_fine_tuned_at_the_rank_of_the_features():
-    design = finetuned(7)
+    design = finetuned(7, "Relu", "Tanh")
     genome = np.random.default_rng(1).uniform(-1, 1, (1, design.weights))
     change = design.tensors(genome)["weight1"][0] - design.graph.tensors["weight1"]
 
-    assert design.driven == (0, 1)
+    assert design.driven == [0, 1]
     assert design.weights == 2 * 3
     assert not change[2:].any()
     expected = 0.5 * genome.reshape(2, 3) @ np.array(design.features)
     np.testing.assert_allclose(change[:2], expected, atol=1e-12)
+    for wrong in (np.nan, np.inf, 1e7):
+        with pytest.raises(ValueError, match="features of at most"):
+            Finetuned.of(design, np.full((2, 7), wrong))
 
 
 @pytest.mark.parametrize("hidden", [0, 7])

@@ -8,7 +8,9 @@ import pytest
 
 from selfmodel.controllers.compensation import Compensated
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
+from selfmodel.controllers.trained import Finetuned
 from selfmodel.logs.physical_trial import TrialRunner
+from selfmodel.logs.policies import read_network
 from selfmodel.physical.simulated import SimulatedRobot
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
@@ -16,6 +18,8 @@ from selfmodel.trials.signals import SIGNALS
 from selfmodel.trials.trial import TrialPlan
 from tests.helpers.policies import (
     POLICY as POLICY_TEXT,
+    onnx_bytes,
+    policy,
     policy_of,
 )
 
@@ -63,3 +67,17 @@ def test_the_formula_on_a_recorded_trial_gives_its_commands(
         found = applied(layer, quadruped.anatomy.motors, within[0], np.array(felt))
         np.testing.assert_allclose(found, logged["commands"][k], rtol=0, atol=1e-12)
     assert np.ptp(logged["commands"], axis=0).min() > 0.01
+
+
+def test_the_change_of_a_fine_tuned_network_is_that_of_the_tensor_in_its_onnx_file(tmp_path: Path):
+    weights = np.random.default_rng(0).normal(size=(10, 2)).astype(np.float32)
+    path = tmp_path / "network.onnx"
+    path.write_bytes(onnx_bytes("y = MatMul(x, w)", {"w": weights}, 10, 2))
+    own = Finetuned.of(policy(graph=read_network(path)), np.ones((1, 10)))
+    genome = np.array([0.5, -0.25])
+    numbers = tomllib.loads(own.layer_file(genome))
+    rows = np.random.default_rng(1).normal(size=(3, 10))
+
+    assert numbers["tensor"] == "w"
+    changed = rows @ (weights + np.array(numbers["change"]))
+    np.testing.assert_allclose(own.policy(genome).graph(rows), changed, atol=1e-6)

@@ -165,6 +165,18 @@ def test_a_repair_that_was_tried_is_followed_by_the_next_best_and_the_last_by_th
     assert by_repair(loop_of(quadruped, [first, second], [second, first])) == second
 
 
+@pytest.mark.parametrize("keeps", [True, False])
+def test_an_intact_robot_keeps_its_controller_with_a_repair_around_it(
+    quadruped: Robot, *, keeps: bool
+):
+    gait, better = random_controllers(quadruped, 2)
+    for verdict in ("intact", "unexplained"):
+        found = diagnosis("intact", robot=quadruped, verdict=verdict)
+        loop = loop_of(quadruped, [gait], [better], [found])
+        loop.gait, loop._repairs = gait, [Mock(keeps_intact=keeps)]
+        assert by_repair(loop) == (gait if keeps and verdict == "intact" else better)
+
+
 @pytest.mark.parametrize(
     ("verdict", "unseen", "trials_left", "asks"),
     [

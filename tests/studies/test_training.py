@@ -54,8 +54,9 @@ def test_a_policy_may_be_evolved_for_a_damaged_body(tmp_path: Path):
     assert not np.array_equal(moved, stuck)
     with pytest.raises(InputError, match="another damage: give its options"):
         evolve_policy(HOPPER, tmp_path / "jammed", SMALL, generations=2, threads=1)
-    with pytest.raises(InputError, match="hand"):
-        Training(HOPPER, replace(SMALL, damage="jam:hand"))
+    for wrong, reason in (("jam:hand", "hand"), ("sensor:knee_angle", "no effect")):
+        with pytest.raises(InputError, match=reason):
+            Training(HOPPER, replace(SMALL, damage=wrong))
 
 
 def test_a_folder_of_another_training_is_refused(tmp_path: Path):
