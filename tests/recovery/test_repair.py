@@ -240,7 +240,7 @@ def test_a_candidate_whose_simulations_mostly_diverge_is_none(
 
     whole = RobustFitness.__call__
     monkeypatch.setattr(RobustFitness, "__call__", partly)
-    monkeypatch.setattr(module, "_comparisons", lambda _: ((8, 10), (4, 10)))
+    monkeypatch.setattr(module, "comparisons_of", lambda _: ((8, 10), (4, 10)))
     if number is None:
         with pytest.raises(WorkError, match="got 16 of 40 with the best 4 of"):
             found_by(Simulator(quadruped, 2), TINY)
