@@ -153,5 +153,5 @@ def test_a_study_recovers_around_the_gaits_that_it_evolves(tmp_path: Path):
     assert not around.run()
     (row,) = around.rows("recoveries")
     assert row["repair"] == "compensate"
-    gaits = [study.cells()[0].needs["gait"] for study in (around, robust)]
+    gaits = [study.cells()[0].needs["gait"].parameters for study in (around, robust)]
     assert gaits[0] == gaits[1], "the same gait, evolved by the robust repair"
