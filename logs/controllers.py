@@ -6,8 +6,8 @@ design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``,
 (float64, centre and half width per motor).
 
 In place of a number, a policy has ``content`` (its operators, terms and action, as JSON) and the
-tensors of its network, a fine-tuned one also ``features``, and a compensating layer
-``base`` (the bytes of the controller within) and ``feedback``.
+tensors of its network, a fine-tuned one also ``features``, and a compensating layer ``base`` (the
+bytes of the controller within) and ``feedback``.
 """
 
 import io

@@ -50,9 +50,7 @@ def _gemm(arguments: Arguments, attributes: Attributes) -> Sequence[FloatArray]:
     rows, matrix, *bias = arguments
     if attributes.get("transA"):
         raise ValueError("a transposed first factor is not supported")
-    turned = (
-        matrix if attributes.get("transB") else np.ascontiguousarray(np.swapaxes(matrix, -1, -2))
-    )
+    turned = matrix if attributes.get("transB") else np.ascontiguousarray(matrix.T)
     result = attributes.get("alpha", 1.0) * _matmul(rows, turned)
     return [result + attributes.get("beta", 1.0) * bias[0] if bias else result]
 

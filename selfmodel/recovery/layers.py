@@ -52,7 +52,6 @@ STALLED = 0.8
 """Share of what the failure took from the score that a layer is to regain; the search of one that
 regains less has stalled, and goes on with the next larger layer."""
 
-
 RANK, OBSERVED = 8, 200
 """Features of a fine-tuned policy, and control steps of the walks that they are the features of."""
 

@@ -45,8 +45,8 @@ def by_repair(loop: "RecoveryLoop") -> Controller:
     """
     if loop.gait and loop.keeps_intact and loop.diagnoses[-1].verdict == "intact":
         return loop.gait
-    candidates = [each.controller for each in loop.repaired()]
-    return next((one for one in candidates if one not in loop.controllers), candidates[0])
+    candidates, tried = [each.controller for each in loop.repaired()], loop.controllers
+    return next((one for one in candidates if one not in tried), candidates[0])
 
 
 @dataclass(kw_only=True, eq=False)
