@@ -15,7 +15,7 @@ from selfmodel.robot.robot import Robot
 MODEL, STATUS = "model.xml", "status.json"
 """The robot with the best hypothesis, and what policies and training frameworks take."""
 
-LOST = (joints.BROKEN, joints.JAMMED, joints.JAMMED_AT_ANGLE, joints.MOTOR_OFF)
+LOST = (joints.BROKEN, joints.JAMMED, joints.JAMMED_AT_ANGLE, joints.LOCKED_LEG, joints.MOTOR_OFF)
 WEAK = (joints.WEAK_MOTOR, joints.SERVO_GAIN)
 """Kinds that leave a joint no torque, and those whose severity is the share that is left."""
 
@@ -65,8 +65,10 @@ def joint_status(hypothesis: Hypothesis, anatomy: Anatomy) -> dict[str, float]:
     status = {joint.name: 1.0 for joint in anatomy.joints}
     for fault in hypothesis.faults:
         if fault.kind in LOST:
-            beyond = anatomy.joint(fault.part).descendants if fault.kind == joints.BROKEN else ()
-            status |= dict.fromkeys((fault.part, *(status.keys() & beyond)), 0.0)
+            lost = joints.joints_at(fault, anatomy)
+            beyond = lost[0].descendants if fault.kind == joints.BROKEN else ()
+            names = (*(joint.name for joint in lost), *(status.keys() & beyond))
+            status |= dict.fromkeys(names, 0.0)
         elif fault.kind in WEAK:
             status[fault.part] *= fault.severity
     return status

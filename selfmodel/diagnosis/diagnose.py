@@ -20,6 +20,7 @@ from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.alternatives import best_severities
 from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Candidate, Change, Cost, Diagnosis, Doubt
+from selfmodel.diagnosis.direct_evidence import evident
 from selfmodel.diagnosis.joints import with_joint_faults
 from selfmodel.diagnosis.losses import LimitReachedError, LossFunction, LossTable, Timeline
 from selfmodel.diagnosis.problem import Calibrate, Problem
@@ -141,8 +142,11 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
-        ranked = [one for one in seeds if problem.space.has(one)]
-        # With many losses, the refinement from the last hypotheses needs no start of the EA.
+        shown = evident(trials, problem.space) if how != EA else []
+        known = [one for one in dict.fromkeys([*seeds, *shown]) if problem.space.has(one)]
+        ranked = [one for one in known if len(one) <= self._settings.genes]
+        # With many losses, the refinement from the last hypotheses, or from those that standing
+        # encoders show, needs no start of the EA.
         if how == EA or (how != STEPWISE and not (ranked and self.losses.is_piecewise(trials))):
             table, of_trials = (self.losses, trials) if how == EA else surrogate
             distances = partial(table.distances, trials=of_trials)

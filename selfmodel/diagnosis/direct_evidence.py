@@ -1,17 +1,23 @@
 """Evidence on faults that a trial contains without any simulation.
 
-It is a report beside a diagnosis: ``segment-prediction`` uses the motion of the encoders as a term
-of its loss, and the readings and commands as before.
+It is a report beside a diagnosis, and begins its search: joints that stand under commands are
+jammed or lost. ``segment-prediction`` uses the motion of the encoders as a term of its loss, and
+the readings and commands as before.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.arrays import FloatArray, median_of_known
+from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import BROKEN, JAMMED_AT_ANGLE, LOCKED_LEG
+from selfmodel.faults.kind import Fault
+from selfmodel.robot.anatomy import Anatomy, Joint
+from selfmodel.simulation.requests import END
 from selfmodel.trials.estimation import PLAY, encoder_noise
 from selfmodel.trials.trial import Trial
 
@@ -24,6 +30,9 @@ MIN_COMMANDED = 0.05
 
 MIN_KNOWN = 10
 """Known angles or readings that a statement about a column needs."""
+
+MAX_JAM_SPREAD = 0.05
+"""Largest difference between the angles of the hinges of one jammed joint, rad."""
 
 Motion = Literal["stands", "moves", "unknown"]
 """Whether an encoder moves by more than its noise; unknown without enough known angles."""
@@ -121,3 +130,73 @@ def _evidence_of(trial: Trial, anatomy: Anatomy, trial_name: str) -> DirectEvide
 def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:
     """Returns the finite values of each column."""
     return {name: one[np.isfinite(one)] for name, one in zip(names, values.T, strict=True)}
+
+
+def observed_faults(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
+    """Returns for every joint a jam at the angle at which its encoders end, and the locked legs.
+
+    The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
+    without torque predicts a short segment better than the jam: each segment begins at the logged
+    angle. The encoder contains the angle, whether the joint is jammed or not.
+
+    There is none of a joint whose encoders are unknown, or whose hinges end at different angles. A
+    leg may be locked if all its joints stand under commands (``standing_joints``).
+    """
+    trial = _end(trials[-1])  # a fault may begin during the trials
+    medians = median_of_known(trial.trajectory["joint_positions"])
+    ends = dict(zip(trial.trajectory.names.hinges, medians, strict=True))
+    faults = []
+    for name in JAMMED_AT_ANGLE.parts(anatomy):
+        joint = anatomy.joint(name)
+        angles = [ends[hinge] for hinge in joint.hinges]
+        if np.isfinite(angles).all() and np.ptp(angles) <= MAX_JAM_SPREAD:
+            lows, highs = zip(*joint.limits, strict=True)
+            angle = min(max(round(float(np.mean(angles)), 3) + 0.0, *lows), *highs)
+            faults.append(Fault(JAMMED_AT_ANGLE, name, angle))
+    standing = standing_joints(trials, anatomy)
+    for name in LOCKED_LEG.parts(anatomy):
+        if standing.issuperset(joint.name for joint in anatomy.limbs[name]):
+            hinges = LOCKED_LEG.hinges(anatomy, name).items()
+            angles = [min(max(round(ends[one], 3) + 0.0, low), high) for one, (low, high) in hinges]
+            faults.append(Fault(LOCKED_LEG, name, angles=tuple(map(float, angles))))
+    return tuple(faults)
+
+
+def standing_joints(trials: Sequence[Trial], anatomy: Anatomy) -> frozenset[str]:
+    """Returns the joints that stand at the end of the trials though their motors are commanded.
+
+    The last trial that says so of a joint counts, whether it stands or moves.
+    """
+    standing = set[str]()
+    for trial in trials:
+        evidence = _evidence_of(_end(trial), anatomy, "").joints
+        for joint in anatomy.joints:
+            motions = [one for one in evidence if one.joint == joint.name]
+            if any(one.motion == "moves" for one in motions):
+                standing.discard(joint.name)
+            elif all(one.motion == "stands" for one in motions):
+                is_commanded = any(one.commanded >= MIN_COMMANDED for one in motions)
+                standing.update([joint.name] if is_commanded else [])
+    return frozenset(standing)
+
+
+def evident(trials: Sequence[Trial], space: HypothesisSpace) -> list[Hypothesis]:
+    """Returns the hypotheses of a space by which joints stand under commands, if any do.
+
+    Legs of which all joints stand are locked, or have come off; other joints are jammed.
+    """
+    anatomy, standing = space.anatomy, standing_joints(trials, space.anatomy)
+    legs = [fault for fault in space.observed if fault.kind == LOCKED_LEG]
+    limbs: list[Sequence[Joint]] = [anatomy.limbs[leg.part] for leg in legs]
+    within = {joint.name for limb in limbs for joint in limb}
+    jams = [one for one in space.observed if one.part in standing - within]
+    lost = [Fault(BROKEN, limb[0].name) for limb in limbs]
+    found = dict.fromkeys(space.canonical([*some, *jams]) for some in (legs, lost))
+    return [one for one in found if len(one) and space.has(one)]
+
+
+def _end(trial: Trial) -> Trial:
+    """Returns the last part of a trial, ``END``."""
+    trajectory = trial.trajectory
+    last = slice(round((1 - END) * trajectory.steps), None)
+    return replace(trial, trajectory=trajectory.rows(last))

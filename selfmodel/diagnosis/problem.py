@@ -8,18 +8,17 @@ from typing import Protocol
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, median_of_known
+from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis.direct_evidence import observed_faults
 from selfmodel.diagnosis.losses import LossTable, Parts
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.joints import JAMMED_AT_ANGLE, SERVO_GAIN, WEAK_MOTOR
+from selfmodel.faults.joints import LOCKED_LEG, SERVO_GAIN, WEAK_MOTOR
 from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
-from selfmodel.robot.anatomy import Anatomy
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.simulation.requests import END
 from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
 
 
@@ -38,16 +37,13 @@ MIN_SURROGATE_PIECES = 2
 TOLD_APART = (0.2, 0.5)
 """Severities at which the gain of a servo is compared with the torque of its motor."""
 
-MAX_JAM_SPREAD = 0.05
-"""Largest difference between the angles of the hinges of one jammed joint, rad."""
-
 
 @dataclass(eq=False)
 class Problem:
     """Trials to explain, or parts of them, and the losses of hypotheses about them.
 
-    Jams at the angles at which the encoders end are added to the hypotheses, and gains of servos
-    that equal weak motors in the trials are left out.
+    Jams at the angles at which the encoders end are added to the hypotheses. Left out are legs of
+    which a joint moves, and gains of servos that equal weak motors in the trials.
 
     Attributes:
         table: Losses of the comparator.
@@ -76,8 +72,10 @@ class Problem:
     _refits: "dict[Hypothesis, Problem | None]" = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        jams = observed_jams([part.rows for part in self.trials], self.space.anatomy)
-        self.space = self._told_apart(replace(self.space, observed=jams))
+        shown = observed_faults([part.rows for part in self.trials], self.space.anatomy)
+        space = replace(self.space, observed=shown, left_out=frozenset())
+        moving = {*LOCKED_LEG.parts(space.anatomy)} - {fault.part for fault in shown}
+        self.space = self._told_apart(space.without(LOCKED_LEG, moving))
         # Closed-loop windows are correlated, and not compared with those of healthy trials.
         every = [part.trial for part in (*self.healthy_trials, *self.trials)]
         is_comparable = self.table.is_piecewise(every) and self.table.uses_segments(every)
@@ -210,26 +208,3 @@ class Problem:
         return [
             replace(part, trial=observed_as(part.trial, others)) for part in self.healthy_trials
         ]
-
-
-def observed_jams(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
-    """Returns for every joint a jam at the angle at which its encoders end.
-
-    The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
-    without torque predicts a short segment better than the jam: each segment begins at the logged
-    angle. The encoder contains the angle, whether the joint is jammed or not.
-
-    There is none of a joint whose encoders are unknown, or whose hinges end at different angles.
-    """
-    trajectory = trials[-1].trajectory  # a fault may begin during the trials
-    medians = median_of_known(trajectory["joint_positions"][round((1 - END) * trajectory.steps) :])
-    ends = dict(zip(trajectory.names.hinges, medians, strict=True))
-    jams = []
-    for name in JAMMED_AT_ANGLE.parts(anatomy):
-        joint = anatomy.joint(name)
-        angles = [ends[hinge] for hinge in joint.hinges]
-        if np.isfinite(angles).all() and np.ptp(angles) <= MAX_JAM_SPREAD:
-            lows, highs = zip(*joint.limits, strict=True)
-            angle = min(max(round(float(np.mean(angles)), 3) + 0.0, *lows), *highs)
-            jams.append(Fault(JAMMED_AT_ANGLE, name, angle))
-    return tuple(jams)

@@ -8,7 +8,7 @@ from mujoco import MjModel, MjSpec
 
 from selfmodel.errors import typed
 from selfmodel.faults.hypothesis import Hypothesis
-from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE
+from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE, LOCKED_LEG, joints_at
 from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.anatomy import Anatomy, Joint, added_steps, write_control_delay
 from selfmodel.robot.model_variant import ModelVariant
@@ -149,11 +149,12 @@ def detached_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) ->
 
 def jammed_bodies(anatomy: Anatomy, model: MjModel, hypothesis: Hypothesis) -> frozenset[int]:
     """Returns the ids in a model of the bodies at the joints that a hypothesis jams."""
-    jammed = _joints_with((JAMMED, JAMMED_AT_ANGLE), anatomy, hypothesis)
+    jammed = _joints_with((JAMMED, JAMMED_AT_ANGLE, LOCKED_LEG), anatomy, hypothesis)
     return frozenset(int(model.joint(one).bodyid[0]) for joint in jammed for one in joint.hinges)
 
 
 def _joints_with(
     kinds: Sequence[FaultKind], anatomy: Anatomy, hypothesis: Hypothesis
 ) -> list[Joint]:
-    return [anatomy.joint(fault.part) for fault in hypothesis.faults if fault.kind in kinds]
+    faults = [fault for fault in hypothesis.faults if fault.kind in kinds]
+    return [joint for fault in faults for joint in joints_at(fault, anatomy)]

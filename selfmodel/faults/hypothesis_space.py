@@ -34,13 +34,14 @@ class HypothesisSpace:
         kinds: Fault kinds, in the order of the second value of a gene.
         observed: Faults whose severity the trials contain: those of the searched kinds are coarse
             candidates in the place of the levels of the same kind and part.
-        alike: Kinds at parts that are not searched, because they equal another kind in the trials.
+        left_out: Kinds at parts that are not searched: they equal another kind in the trials, or
+            the trials show that they are not there.
     """
 
     anatomy: Anatomy
     kinds: tuple[FaultKind, ...]
     observed: tuple[Fault, ...] = ()
-    alike: frozenset[tuple[FaultKind, str]] = frozenset()
+    left_out: frozenset[tuple[FaultKind, str]] = frozenset()
 
     @classmethod
     def of(cls, kinds: Iterable[FaultKind], anatomy: Anatomy) -> "HypothesisSpace":
@@ -90,11 +91,11 @@ class HypothesisSpace:
     def parts(self, kind: FaultKind) -> tuple[str, ...]:
         """Returns the parts of a kind, in the order of the third value of a gene."""
         parts = kind.parts(self.anatomy)
-        return tuple(part for part in parts if (kind, part) not in self.alike)
+        return tuple(part for part in parts if (kind, part) not in self.left_out)
 
     def without(self, kind: FaultKind, parts: Iterable[str]) -> "HypothesisSpace":
-        """Returns the space in which a kind is not searched at some parts; see ``alike``."""
-        space = replace(self, alike=self.alike | {(kind, part) for part in parts})
+        """Returns the space in which a kind is not searched at some parts; see ``left_out``."""
+        space = replace(self, left_out=self.left_out | {(kind, part) for part in parts})
         kinds = tuple(one for one in self.kinds if space.parts(one))
         return replace(space, kinds=kinds)
 
@@ -122,6 +123,11 @@ class HypothesisSpace:
         ]
         return (*spaced, *(fault for fault in self.observed if fault.kind in self.kinds))
 
+    @cached_property
+    def _shown(self) -> dict[tuple[FaultKind, str], Fault]:
+        """The observed faults that no level stands for."""
+        return {(fault.kind, fault.part): fault for fault in self.observed if fault.angles}
+
     def decode(self, genome: FloatArray) -> Hypothesis:
         """Returns the hypothesis of a genome, values in [0, 1), ``(genes * GENE_VALUES,)``."""
         faults = []
@@ -131,7 +137,8 @@ class HypothesisSpace:
                 parts = self.parts(kind)
                 part = parts[int(part_value * len(parts))]
                 levels = kind.levels_at(self.anatomy, part)
-                faults.append(Fault(kind, part, levels[int(severity_value * len(levels))]))
+                fault = Fault(kind, part, levels[int(severity_value * len(levels))])
+                faults.append(self._shown.get((kind, part), fault))
         return self.canonical(faults)
 
     def encode(self, hypothesis: Hypothesis, genes: int) -> FloatArray:

@@ -54,6 +54,8 @@ class BrokenJoint(JointFault):
         if other.part == fault.part:
             return other.kind != fault.kind
         broken = anatomy.joint(fault.part)
+        if other.kind == LOCKED_LEG:
+            return anatomy.limbs[other.part][0].name in (fault.part, *broken.descendants)
         if other.part in broken.descendants or other.kind not in OF_MOTORS:
             return other.part in broken.descendants
         return broken.motors_lost_if_broken.issuperset(anatomy.joint(other.part).motors)
@@ -124,11 +126,46 @@ def _weld(variant: "ModelVariant", anatomy: Anatomy, angles: Mapping[str, float]
             variant.fix_reading(column, sensor.reading(angles[sensor.hinge] + offset))
 
 
-def _nearest_to_zero(joint: Joint) -> dict[str, float]:
+def _nearest_to_zero(*joints: Joint) -> dict[str, float]:
+    return {hinge: min(max(low, 0.0), high) for hinge, (low, high) in _limits(*joints).items()}
+
+
+def _limits(*joints: Joint) -> dict[str, tuple[float, float]]:
+    """Returns the range of each hinge, rad."""
     return {
-        hinge: min(max(low, 0.0), high)
-        for hinge, (low, high) in zip(joint.hinges, joint.limits, strict=True)
+        hinge: limits
+        for joint in joints
+        for hinge, limits in zip(joint.hinges, joint.limits, strict=True)
     }
+
+
+class LockedLeg(FaultKind):
+    """A limb whose hinges are all welded, at angles that the encoders show, or as ``JAMMED``."""
+
+    def parts(self, anatomy: Anatomy) -> tuple[str, ...]:
+        """Returns the names of the limbs of several hinges; see ``Anatomy.limbs``."""
+        return tuple(name for name in anatomy.limbs if len(self.hinges(anatomy, name)) > 1)
+
+    def hinges(self, anatomy: Anatomy, part: str) -> dict[str, tuple[float, float]]:
+        """Returns the hinges of a limb, those nearest to the root body first."""
+        return _limits(*anatomy.limbs[part])
+
+    def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
+        """Welds the hinges."""
+        angles = _nearest_to_zero(*anatomy.limbs[fault.part])
+        if fault.angles:
+            angles = dict(zip(angles, fault.angles, strict=True))
+        _weld(variant, anatomy, angles)
+
+    def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
+        """Returns whether the other fault is one of a joint of the limb that a jam is or absorbs.
+
+        A joint of the limb that has come off stays a fault of its own.
+        """
+        if other.part not in {joint.name for joint in anatomy.limbs[fault.part]}:
+            return False
+        jam = Fault(JAMMED_AT_ANGLE, other.part)
+        return other.kind in (JAMMED, JAMMED_AT_ANGLE) or jam.kind.absorbs(jam, other, anatomy)
 
 
 class WeakMotor(MotorFault):
@@ -283,6 +320,11 @@ JAMMED_AT_ANGLE = JammedAtAngle(
     words="the joint {part} is stuck at {severity:.2f} rad",
     is_of_joint=True,
 )
+LOCKED_LEG = LockedLeg(
+    name="leg",
+    prefix="locked",
+    words="the leg {part} is stuck",
+)
 WEAK_MOTOR = WeakMotor(
     name="motor",
     bounds=(0.0, 1.0),
@@ -373,3 +415,9 @@ LOADED_LINK = LoadedLink(
 )
 OF_MOTORS = (WEAK_MOTOR, MOTOR_OFF, SERVO_GAIN)
 """Kinds without effect on a motor that moves nothing."""
+
+
+def joints_at(fault: Fault, anatomy: Anatomy) -> tuple[Joint, ...]:
+    """Returns the joints that a fault names: all of a locked leg, or one."""
+    is_leg = fault.kind == LOCKED_LEG
+    return anatomy.limbs[fault.part] if is_leg else (anatomy.joint(fault.part),)

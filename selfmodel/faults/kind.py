@@ -120,6 +120,13 @@ class FaultKind:
         """Returns whether the kind is to be expected on a robot; see ``base``."""
         return self.base in ("any", "free" if anatomy.floating_base else "fixed")
 
+    def hinges(self, _anatomy: Anatomy, _part: str) -> Mapping[str, tuple[float, float]]:
+        """Returns the hinges whose angles a fault may name, each with its range; by default none.
+
+        In notation the angles, rad, are after the prefix, with ``/`` between them.
+        """
+        return {}
+
     def bounds_at(self, _anatomy: Anatomy, _part: str) -> tuple[float, float] | None:
         """Returns ``bounds`` at one part."""
         return self.bounds
@@ -205,16 +212,18 @@ class Fault:
         kind: Kind of the fault.
         part: Name of the joint, sensor, neuron or place; ``ENVIRONMENT`` for an environment.
         severity: Severity in the kind's unit; 0 for a kind without severities.
+        angles: Angles of the hinges of a locked leg, rad; see ``FaultKind.hinges``.
     """
 
     kind: FaultKind
     part: str
     severity: float = 0.0
+    angles: tuple[float, ...] = ()
 
     def __str__(self) -> str:
         term = f"{self.kind.keyword}:{self.part}" if self.part else self.kind.keyword
-        graded = self.kind.bounds is not None
-        return f"{term}={self.kind.prefix}{self.severity!r}" if graded else term
+        values = "/".join(map(repr, self.angles if self.kind.bounds is None else [self.severity]))
+        return f"{term}={self.kind.prefix}{values}" if self.kind.prefix or values else term
 
     @property
     def words(self) -> str:

@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from selfmodel.errors import InputError, unknown_name
 from selfmodel.faults.hypothesis import INTACT, Hypothesis, canonical
@@ -26,7 +26,8 @@ def parse(
     """Returns the hypothesis of a notation, in canonical form.
 
     It is terms ``kind:part``, ``kind:part=severity`` or ``kind=severity`` joined by ``+``, with
-    names among ``kinds``; or ``intact``.
+    names among ``kinds``; or ``intact``. A locked leg may have an angle a hinge,
+    ``leg:front_left=locked0.1/-0.8``.
 
     Raises:
         InputError: A term is malformed, names an unknown kind or part, or has a severity outside
@@ -45,10 +46,11 @@ def parse(
     for fault in faults:
         kind, part = fault.kind, fault.part
         earlier = first.setdefault((kind.keyword, part, kind.prefix), fault)
-        if earlier.severity != fault.severity:
+        if earlier != fault:
             raise InputError(
                 f"{text!r} gives {kind.keyword}{':' if part else ''}{part} two severities, "
-                f"{earlier.severity!r} and {fault.severity!r}: keep one of the terms"
+                f"{earlier.angles or earlier.severity!r} and {fault.angles or fault.severity!r}: keep "
+                f"one of the terms"
             )
     return canonical(faults, anatomy)
 
@@ -68,14 +70,16 @@ def _fault(term: str, text: str, anatomy: Anatomy, kinds: tuple[FaultKind, ...])
         raise _unreadable(term, text, kinds)
     # Without a severity, the kind that has none, if any.
     plain = next((kind for kind in named if kind.bounds is None), named[0])
-    kind = _graded(term, named, value) if equals else plain
+    kind = _of_value(term, named, value) if equals else plain
     parts = kind.parts(anatomy)
     if part not in parts:
         if parts == (ENVIRONMENT,):
             raise InputError(f"the term {term!r} names a part, but {word} has none: write no ':'")
         raise unknown_name(f"part in the term {term!r} of {text!r}: for {word}", part, parts)
     bounds = kind.bounds_at(anatomy, part)
-    return Fault(kind, part, _severity(term, kind, bounds, value) if bounds else 0.0)
+    if bounds is None:
+        return Fault(kind, part, angles=_angles(term, kind, kind.hinges(anatomy, part), value))
+    return Fault(kind, part, _severity(term, kind, bounds, value))
 
 
 def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputError:
@@ -86,18 +90,36 @@ def _unreadable(term: str, text: str, kinds: tuple[FaultKind, ...]) -> InputErro
     )
 
 
-def _graded(term: str, named: list[FaultKind], value: str) -> FaultKind:
-    """Returns the kind of a term with a severity, by the prefix of the severity."""
-    graded = sorted((kind for kind in named if kind.bounds), key=lambda kind: -len(kind.prefix))
-    for kind in graded:
+def _of_value(term: str, named: list[FaultKind], value: str) -> FaultKind:
+    """Returns the kind of a term with a severity or angles, by the prefix of these."""
+    valued = [kind for kind in named if kind.bounds or kind.prefix]
+    valued.sort(key=lambda kind: -len(kind.prefix))
+    for kind in valued:
         if value.startswith(kind.prefix):
             return kind
-    if not graded:
+    if not valued:
         raise InputError(
             f"the term {term!r} has a severity, but {named[0].keyword} has none: write no '='"
         )
-    prefixes = " or ".join(kind.prefix for kind in graded)
-    raise InputError(f"the term {term!r} needs {prefixes} after '=' and then a number")
+    prefixes = " or ".join(kind.prefix for kind in valued)
+    number = " and then a number" if any(kind.bounds for kind in valued) else ""
+    raise InputError(f"the term {term!r} needs {prefixes} after '='{number}")
+
+
+def _angles(
+    term: str, kind: FaultKind, hinges: Mapping[str, tuple[float, float]], value: str
+) -> tuple[float, ...]:
+    text = value.removeprefix(kind.prefix)
+    numbers = text.split("/") if text else []
+    if len(numbers) not in (0, len(hinges)):
+        raise InputError(
+            f"the term {term!r} needs no angle, or one, rad, for each of {', '.join(hinges)}, with "
+            f"/ between them, got {text!r}"
+        )
+    return tuple(
+        _severity(f"{term}, {hinge}", kind, limits, number)
+        for number, (hinge, limits) in zip(numbers, hinges.items(), strict=False)
+    )
 
 
 def _severity(term: str, kind: FaultKind, bounds: tuple[float, float], value: str) -> float:

@@ -22,7 +22,7 @@ KINDS: Mapping[str, FaultKind] = {
         *(world.FRICTION, world.SLOPE, world.ROUGHNESS, world.WIND, world.CROSSWIND),
         *(world.PAYLOAD, joints.DAMPED_JOINT, joints.JOINT_FRICTION, joints.LOST_GRIP),
         *(world.GROWN_DELAY, joints.ENCODER_OFFSET, joints.ENCODER_SLIP, joints.LOADED_LINK),
-        *(joints.SERVO_GAIN, joints.MOTOR_OFF),
+        *(joints.SERVO_GAIN, joints.MOTOR_OFF, joints.LOCKED_LEG),
     )
 }
 """All built-in kinds by name."""
@@ -30,7 +30,7 @@ KINDS: Mapping[str, FaultKind] = {
 PAPER_KINDS: tuple[FaultKind, ...] = (joints.BROKEN, joints.JAMMED, sensors.FAILED_SENSOR)
 """Kinds of the paper's diagnosis, in the order of its genome."""
 
-_BODY_KINDS = tuple(KINDS[name] for name in ("break", "jam", "jam-angle", "sensor", "motor"))
+_BODY_KINDS = tuple(KINDS[name] for name in ("break", "jam", "jam-angle", "leg", "sensor", "motor"))
 _ENVIRONMENT_KINDS = tuple(KINDS[name] for name in ("friction", "slope", "wind", "payload"))
 
 ALL_KINDS: tuple[FaultKind, ...] = tuple(kind for kind in KINDS.values() if kind.searchable)
@@ -156,17 +156,8 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
 
 def limbs(anatomy: Anatomy) -> list[tuple[Joint, ...]]:
     """Returns the joints of each limb from the root body on; limbs with touch sensors first."""
-    joints = {joint.name: joint for joint in anatomy.joints}
-    beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
-    ends = {name for name in joints if not beyond[name]}
-    found = []
-    for end in joints:
-        if end in ends:
-            # A joint with two chain ends beyond it belongs to no limb.
-            chain = [one for one in joints if one == end or beyond[one] & ends == {end}]
-            chain.sort(key=lambda name: -len(beyond[name]))
-            found.append(tuple(joints[name] for name in chain))
-    return sorted(found, key=lambda limb: not _failed_sensor(anatomy, "touch", limb))  # stable
+    every = anatomy.limbs.values()
+    return sorted(every, key=lambda limb: not _failed_sensor(anatomy, "touch", limb))  # stable
 
 
 def _failed_sensor(anatomy: Anatomy, kind: str, limb: Sequence[Joint]) -> str | None:

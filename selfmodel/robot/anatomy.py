@@ -4,7 +4,9 @@ This module needs no MuJoCo, as little as notation and comparators, which import
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 from selfmodel.trials.signals import Names
@@ -95,10 +97,43 @@ class Anatomy:
         """Returns the sensor of that name, or raises ``KeyError``."""
         return {sensor.name: sensor for sensor in self.sensors}[name]
 
+    @cached_property
+    def limbs(self) -> Mapping[str, tuple[Joint, ...]]:
+        """Chains of joints without branches by name, the joint nearest to the root body first.
+
+        A limb has the name that its joints share, such as ``front_left``, or else that of its first
+        joint. A joint with two chain ends beyond it belongs to no limb.
+        """
+        joints = {joint.name: joint for joint in self.joints}
+        beyond = {name: joint.descendants & joints.keys() for name, joint in joints.items()}
+        ends = [name for name in joints if not beyond[name]]
+        chains = []
+        for end in ends:
+            chain = [one for one in joints if one == end or beyond[one].intersection(ends) == {end}]
+            chain.sort(key=lambda name: -len(beyond[name]))
+            chains.append(chain)
+        shared = _shared_words([*joints]) if len(chains) > 1 else []
+        words = [
+            "_".join(word for word in _shared_words(chain) if word not in shared)
+            for chain in chains
+        ]
+        names = [
+            word if word and words.count(word) == 1 else chain[0]
+            for word, chain in zip(words, chains, strict=True)
+        ]
+        limbs = [tuple(joints[name] for name in chain) for chain in chains]
+        return dict(zip(names, limbs, strict=True))
+
     @property
     def names(self) -> Names:
         """Column names of this robot's trajectories."""
         return Names(tuple(sensor.name for sensor in self.sensors), self.motors, self.hinges)
+
+
+def _shared_words(names: Sequence[str]) -> list[str]:
+    """Returns the words that all names have, in the order of the first one."""
+    words = [name.split("_") for name in names]
+    return [word for word in words[0] if all(word in others for others in words)]
 
 
 CONTROL_DELAY = "selfmodel_control_delay"

@@ -18,8 +18,8 @@ from selfmodel.comparators import (
     segment_prediction,
 )
 from selfmodel.diagnosis.comparator import Comparator, Losses, PreparedTrial
+from selfmodel.diagnosis.direct_evidence import observed_faults
 from selfmodel.diagnosis.losses import LossTable, contradiction_losses, simulate
-from selfmodel.diagnosis.problem import observed_jams
 from selfmodel.diagnosis.significance import CONTRADICTION
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -371,7 +371,7 @@ def jam_of(robot: Robot, *knees: np.ndarray) -> float | None:
         trials.append(
             Trial.from_arrays(robot, positions, np.zeros((90, len(robot.anatomy.motors))))
         )
-    jams = {jam.part: jam.severity for jam in observed_jams(trials, robot.anatomy)}
+    jams = {jam.part: jam.severity for jam in observed_faults(trials, robot.anatomy)}
     assert jams.keys() - {KNEE} == {joint.name for joint in robot.anatomy.joints} - {KNEE}
     return jams.get(KNEE)
 

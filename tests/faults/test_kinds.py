@@ -193,7 +193,7 @@ def names_of(names: str) -> tuple[str, ...]:
     [
         ("brake", "unknown kind 'brake': did you mean break"),
         ("papr", "unknown kind 'papr': did you mean paper"),
-        ("brake", "load, servo-gain, motor-off, paper, body, environment, default, all$"),
+        ("brake", "load, servo-gain, motor-off, leg, paper, body, environment, default, all$"),
         ("", "unknown kind ''"),
         ("break,", "unknown kind ''"),
         ("neuron", "unknown kind 'neuron'"),
