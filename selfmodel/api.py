@@ -15,7 +15,7 @@ from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError, check_type, items_of, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
-from selfmodel.faults.registry import DEFAULT_KINDS
+from selfmodel.faults.registry import DEFAULT_KINDS, notation_kinds
 from selfmodel.files import path_of
 from selfmodel.logs import export
 from selfmodel.logs.files import create_file, make_folder
@@ -172,6 +172,7 @@ def diagnose(
     robot: RobotSource | None = None,
     comparator: str | Comparator = AUTO,
     kinds: KindSource = DEFAULT_KINDS,
+    hypothesis: Hypothesis | str = INTACT,
     settings: Settings | None = None,
     calibrate: bool = True,
     seed: int | None = None,
@@ -202,6 +203,8 @@ def diagnose(
             that the trials allow.
         kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
             separated by commas.
+        hypothesis: Hypothesis, or its notation, that the search begins from, such as what you know
+            of the robot; it is kept only if the trials require it.
         settings: Parameters of the search; None for those in the first log.
         calibrate: Whether the self-model is fitted to the healthy trials.
         seed: Seed of all random numbers; None for that of the first trial.
@@ -235,6 +238,7 @@ def diagnose(
         robot=own,
         choose_comparator=choose,
         kinds=searched,
+        hypothesis=arguments.parse_hypothesis(hypothesis, own, notation_kinds(searched)),
         settings=arguments.settings_of(settings or logged.get(to_explain[0].path)),
         seed=seed,
         calibrate=calibrate,
@@ -252,6 +256,7 @@ def recover(
     comparator: str | Comparator = AUTO,
     kinds: KindSource = DEFAULT_KINDS,
     settings: Settings | None = None,
+    hypothesis: Hypothesis | str = INTACT,
     design: str | Design = "network",
     gait: Controller | str | Path | None = None,
     calibrate: bool = True,
@@ -288,6 +293,8 @@ def recover(
         comparator: A comparator, its name, or ``package.module:object``; ``auto`` for the best one.
         kinds: Fault kinds to search, or names of kinds and of their sets, in a sequence or
             separated by commas.
+        hypothesis: Hypothesis, or its notation, that the first diagnosis begins from, such as what
+            you know of the robot; it is kept only if the trials require it.
         settings: Parameters of the recovery; the paper's by default.
         design: Name of a controller design, such as ``network`` or ``cpg``, or a design.
         gait: Controller with which the robot walks, such as its policy, or the path of its file;
@@ -336,6 +343,7 @@ def recover(
         folder=folder,
         gait=gait,
         kinds=searched,
+        hypothesis=arguments.parse_hypothesis(hypothesis, robot, notation_kinds(searched)),
         calibrated=calibrate,
         next_trial=next_trial,
         design=drawn,
@@ -390,10 +398,13 @@ class LogDiagnosis:
     calibration: Calibration | None
     search: DiagnosticSearch
     seed: int
+    hypothesis: Hypothesis
 
     def run(self, on_event: Callable[[Event], None]) -> Diagnosis:
         """Returns the diagnosis of the trials."""
-        return recovery_loop.diagnose_trials(self.damaged, self.search, self.seed, on_event)
+        return recovery_loop.diagnose_trials(
+            self.damaged, self.search, self.seed, on_event, hypothesis=self.hypothesis
+        )
 
 
 def set_up_diagnosis(
@@ -403,6 +414,7 @@ def set_up_diagnosis(
     robot: Robot,
     choose_comparator: ComparatorChoice,
     kinds: Sequence[FaultKind],
+    hypothesis: Hypothesis,
     settings: Settings,
     seed: int | None,
     calibrate: bool,
@@ -437,4 +449,4 @@ def set_up_diagnosis(
         calibrate=fitted if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
-    return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn)
+    return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn, hypothesis)

@@ -52,6 +52,8 @@ class FromLogs(Command):
     self_model: str | None = None
     comparator: str = "auto"
     kinds: str = "default"
+    genes: int | None = None
+    hypothesis: str = "intact"
     calibrate: bool = True
     population: int | None = None
     generations: int | None = None
@@ -132,6 +134,8 @@ class Recover(Robot, Searched):
     calibrate: bool = True
     gap: float = 0.0
     kinds: str = "default"
+    genes: int = Settings.genes
+    hypothesis: str = "intact"
     next_trial: str = "repair"
     controller: str = "network"
     neurons: int | None = None
@@ -421,6 +425,8 @@ def settings_of(options: Study | Recover, score: str | None = None) -> Settings:
         small = replace(small, max_simulated_steps=options.max_simulated_steps)
     if isinstance(options, Recover | RunSuite):  # the searches of an ablation are an axis
         small = replace(small, diagnostic_search=options.diagnostic_search)
+    if isinstance(options, Recover):
+        small = replace(small, genes=options.genes)
     return small.scaled(options.population)
 
 

@@ -16,6 +16,7 @@ from selfmodel.diagnosis import text
 from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
 from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.errors import counted
+from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.files import file_digest
 from selfmodel.logs import TrialLog
 from selfmodel.logs.export import MODEL, STATUS
@@ -98,7 +99,7 @@ def diagnose_logs(
     healthy = trials[:split] + before
     explained = [log for log in logs if log.trial in failed]
     settings = explained[0].settings
-    given = {one: getattr(options, one) for one in ("generations", *ADDED)}
+    given = {one: getattr(options, one) for one in ("generations", "genes", *ADDED)}
     asked = {name: value for name, value in given.items() if value is not None}
     settings = dataclasses.replace(settings, **asked)
     if options.population is not None:
@@ -111,6 +112,7 @@ def diagnose_logs(
             robot=robot,
             choose_comparator=comparator,
             kinds=kinds,
+            hypothesis=HypothesisSpace(robot.anatomy, kinds).parse(options.hypothesis),
             settings=settings,
             seed=options.seed,
             calibrate=options.calibrate,

@@ -69,7 +69,8 @@ def experiment_of(options: Recover) -> Experiment:
         gait = arguments.read_controller(Path(options.controller), robot, neurons)
     design = gait.design if gait else plugins.design(options.controller, robot, neurons)
     repair, design, gait = plugins.repaired_around(options.repair, design, gait)
-    truth = HypothesisSpace(robot.anatomy, kinds).parse(damage)
+    space = HypothesisSpace(robot.anatomy, kinds)
+    truth, known = space.parse(damage), space.parse(options.hypothesis)
     check_silent_neurons(design, silent_neurons(truth))
     gaits = arguments.repertoire_of(options.repertoire, robot, design)
     plugins.repair(repair, options.search, gaits)
@@ -101,6 +102,7 @@ def experiment_of(options: Recover) -> Experiment:
         truth=truth,
         choose_comparator=arguments.comparator_choice(options.comparator),
         kinds=kinds,
+        hypothesis=known,
         calibrated=options.calibrate,
         settings=settings,
         seed=options.seed,

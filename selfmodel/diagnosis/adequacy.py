@@ -32,6 +32,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis import search, significance
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
+from selfmodel.diagnosis.direct_evidence import explains_standing
 from selfmodel.diagnosis.joints import excesses, joints_of
 from selfmodel.diagnosis.losses import by_total_loss
 from selfmodel.diagnosis.problem import Problem
@@ -277,6 +278,9 @@ def _without_some(
     others = best.lacking(fewer)
     if not others or not all(fault.kind.affects_dynamics for fault in others):
         return None  # the readings of a sensor are not fitted
+    anatomy = problem.space.anatomy
+    if all(explains_standing(fault, problem.standing, anatomy) for fault in others):
+        return None  # no parameter of a self-model stops joints under commands
     rest = search.with_fitted_severities(fewer, problem.coarse, problem.space)
     losses = problem.losses([best, rest, INTACT])
     if len(rest) < len(fewer) or not np.isfinite(losses).all():

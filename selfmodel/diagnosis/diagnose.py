@@ -142,7 +142,7 @@ class DiagnosticSearch:
             calibrate=self._calibrate,
             observer=observer,
         )
-        shown = evident(trials, problem.space) if how != EA else []
+        shown = evident(problem.standing, problem.space) if how != EA else []
         known = [one for one in dict.fromkeys([*seeds, *shown]) if problem.space.has(one)]
         ranked = [one for one in known if len(one) <= self._settings.genes]
         # With many losses, the refinement from the last hypotheses, or from those that standing

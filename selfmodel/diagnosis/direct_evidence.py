@@ -5,7 +5,7 @@ jammed or lost. ``segment-prediction`` uses the motion of the encoders as a term
 the readings and commands as before.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,7 +14,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, median_of_known
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.joints import BROKEN, JAMMED_AT_ANGLE, LOCKED_LEG
+from selfmodel.faults.joints import BROKEN, JAMMED, JAMMED_AT_ANGLE, LOCKED_LEG, joints_at
 from selfmodel.faults.kind import Fault
 from selfmodel.robot.anatomy import Anatomy, Joint
 from selfmodel.simulation.requests import END
@@ -132,7 +132,9 @@ def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:
     return {name: one[np.isfinite(one)] for name, one in zip(names, values.T, strict=True)}
 
 
-def observed_faults(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, ...]:
+def observed_faults(
+    trials: Sequence[Trial], anatomy: Anatomy, standing: Collection[str]
+) -> tuple[Fault, ...]:
     """Returns for every joint a jam at the angle at which its encoders end, and the locked legs.
 
     The coarse levels of a jam's angle are tenths of a radian apart. Between two of them, a motor
@@ -140,7 +142,7 @@ def observed_faults(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, .
     angle. The encoder contains the angle, whether the joint is jammed or not.
 
     There is none of a joint whose encoders are unknown, or whose hinges end at different angles. A
-    leg may be locked if all its joints stand under commands (``standing_joints``).
+    leg may be locked if all its joints are ``standing_joints``.
     """
     trial = _end(trials[-1])  # a fault may begin during the trials
     medians = median_of_known(trial.trajectory["joint_positions"])
@@ -153,9 +155,8 @@ def observed_faults(trials: Sequence[Trial], anatomy: Anatomy) -> tuple[Fault, .
             lows, highs = zip(*joint.limits, strict=True)
             angle = min(max(round(float(np.mean(angles)), 3) + 0.0, *lows), *highs)
             faults.append(Fault(JAMMED_AT_ANGLE, name, angle))
-    standing = standing_joints(trials, anatomy)
     for name in LOCKED_LEG.parts(anatomy):
-        if standing.issuperset(joint.name for joint in anatomy.limbs[name]):
+        if all(joint.name in standing for joint in anatomy.limbs[name]):
             hinges = LOCKED_LEG.hinges(anatomy, name).items()
             angles = [min(max(round(ends[one], 3) + 0.0, low), high) for one, (low, high) in hinges]
             faults.append(Fault(LOCKED_LEG, name, angles=tuple(map(float, angles))))
@@ -180,19 +181,25 @@ def standing_joints(trials: Sequence[Trial], anatomy: Anatomy) -> frozenset[str]
     return frozenset(standing)
 
 
-def evident(trials: Sequence[Trial], space: HypothesisSpace) -> list[Hypothesis]:
-    """Returns the hypotheses of a space by which joints stand under commands, if any do.
+def evident(standing: Collection[str], space: HypothesisSpace) -> list[Hypothesis]:
+    """Returns the hypotheses of a space by which the ``standing_joints`` stand, if there are any.
 
     Legs of which all joints stand are locked, or have come off; other joints are jammed.
     """
-    anatomy, standing = space.anatomy, standing_joints(trials, space.anatomy)
+    anatomy = space.anatomy
     legs = [fault for fault in space.observed if fault.kind == LOCKED_LEG]
     limbs: list[Sequence[Joint]] = [anatomy.limbs[leg.part] for leg in legs]
     within = {joint.name for limb in limbs for joint in limb}
-    jams = [one for one in space.observed if one.part in standing - within]
+    jams = [one for one in space.observed if one.part in standing and one.part not in within]
     lost = [Fault(BROKEN, limb[0].name) for limb in limbs]
     found = dict.fromkeys(space.canonical([*some, *jams]) for some in (legs, lost))
     return [one for one in found if len(one) and space.has(one)]
+
+
+def explains_standing(fault: Fault, standing: Collection[str], anatomy: Anatomy) -> bool:
+    """Returns whether a fault stops joints, and these are ``standing_joints``."""
+    is_stop = fault.kind in (BROKEN, JAMMED, JAMMED_AT_ANGLE, LOCKED_LEG)
+    return is_stop and all(joint.name in standing for joint in joints_at(fault, anatomy))
 
 
 def _end(trial: Trial) -> Trial:

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.diagnosis.direct_evidence import observed_faults
+from selfmodel.diagnosis.direct_evidence import observed_faults, standing_joints
 from selfmodel.diagnosis.losses import LossTable, Parts
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -56,6 +56,7 @@ class Problem:
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
         observer: Called with the progress of each stage.
+        standing: Joints that stand in the trials though they are commanded to move.
     """
 
     table: LossTable
@@ -68,11 +69,14 @@ class Problem:
     calibrate: Calibrate | None = None
     healthy_parts: Sequence[TrialPart] = ()
     observer: Observer = ignore
+    standing: frozenset[str] = field(init=False)
     _is_comparable: bool = field(init=False)
     _refits: "dict[Hypothesis, Problem | None]" = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        shown = observed_faults([part.rows for part in self.trials], self.space.anatomy)
+        trials, anatomy = [part.rows for part in self.trials], self.space.anatomy
+        self.standing = standing_joints(trials, anatomy)
+        shown = observed_faults(trials, anatomy, self.standing)
         space = replace(self.space, observed=shown, left_out=frozenset())
         moving = {*LOCKED_LEG.parts(space.anatomy)} - {fault.part for fault in shown}
         self.space = self._told_apart(space.without(LOCKED_LEG, moving))

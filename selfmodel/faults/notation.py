@@ -47,10 +47,10 @@ def parse(
         kind, part = fault.kind, fault.part
         earlier = first.setdefault((kind.keyword, part, kind.prefix), fault)
         if earlier != fault:
+            values = (one.angles or one.severity for one in (earlier, fault))
             raise InputError(
                 f"{text!r} gives {kind.keyword}{':' if part else ''}{part} two severities, "
-                f"{earlier.angles or earlier.severity!r} and {fault.angles or fault.severity!r}: keep "
-                f"one of the terms"
+                f"{' and '.join(map(repr, values))}: keep one of the terms"
             )
     return canonical(faults, anatomy)
 

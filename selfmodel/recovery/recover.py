@@ -68,6 +68,7 @@ class RecoveryLoop:
             recovery does not depend on whether the same gait is evolved or given.
         design: Design of the controllers to evolve; the paper's network if not given.
         kinds: Fault kinds that a diagnosis searches.
+        hypothesis: Hypothesis that the first diagnosis begins from; ``INTACT`` if none is known.
         calibrate: Fits the self-model to the trials before the failure; no fit if not given.
         next_trial: Chooses the controller of each trial after the failing one.
         score: Fitness of the repair.
@@ -88,6 +89,7 @@ class RecoveryLoop:
     gait: Controller | None = None
     design: Design | None = None
     kinds: Sequence[FaultKind] = DEFAULT_KINDS
+    hypothesis: Hypothesis = INTACT
     calibrate: Calibrate | None = None
     next_trial: Callable[["RecoveryLoop"], Controller] = by_repair
     score: Score = UPRIGHT
@@ -237,7 +239,8 @@ class RecoveryLoop:
     def _diagnose(self, search: DiagnosticSearch) -> None:
         """Explains all trials since the failure; the last hypotheses seed the search."""
         evidence = self.trials[1:]
-        diagnosis = _diagnosed(search, evidence, self.diagnoses, self.seed, self.on_event)
+        known = _known(self.diagnoses, self.hypothesis)
+        diagnosis = _diagnosed(search, evidence, known, self.seed, self.on_event)
         self.store_diagnosis(diagnosis)
         self.diagnoses = (*self.diagnoses, diagnosis)
         self.rng = random_stream(self.seed, "choice", len(self.diagnoses))
@@ -275,7 +278,9 @@ def diagnose_trials(
     diagnose: DiagnosticSearch,
     seed: int,
     on_event: Callable[[Event], None],
+    *,
     after: Collection[int] | None = None,
+    hypothesis: Hypothesis = INTACT,
 ) -> Diagnosis:
     """Returns the diagnosis of logged trials, trial by trial as in a recovery.
 
@@ -289,24 +294,32 @@ def diagnose_trials(
         on_event: Callback, called with each event as it happens.
         after: Numbers of trials after which to diagnose, including the number of all trials; after
             each trial, if not given.
+        hypothesis: Hypothesis that the first diagnosis begins from; ``INTACT`` if none is known.
     """
     diagnoses: tuple[Diagnosis, ...] = ()
     for number in range(1, len(trials) + 1) if after is None else sorted(after):
-        diagnoses = (_diagnosed(diagnose, trials[:number], diagnoses, seed, on_event),)
+        known = _known(diagnoses, hypothesis)
+        diagnoses = (_diagnosed(diagnose, trials[:number], known, seed, on_event),)
         on_event(diagnoses[-1])
     return diagnoses[-1]
+
+
+def _known(diagnoses: Sequence[Diagnosis], hypothesis: Hypothesis) -> list[Hypothesis]:
+    """Returns the hypotheses that a diagnosis begins from: those of the last one, or the first."""
+    if diagnoses:
+        return [each.hypothesis for each in diagnoses[-1].ranked]
+    return [hypothesis] if len(hypothesis) else []
 
 
 def _diagnosed(
     search: DiagnosticSearch,
     trials: Sequence[Trial],
-    earlier: Sequence[Diagnosis],
+    known: Sequence[Hypothesis],
     seed: int,
     on_event: Callable[[Event], None],
 ) -> Diagnosis:
-    """Returns the diagnosis of trials; the search begins from the last of the earlier ones."""
+    """Returns the diagnosis of trials; the search begins from known hypotheses."""
     on_event(SearchBegins("diagnostic"))
-    known = [each.hypothesis for each in earlier[-1].ranked] if earlier else []
     rng = random_stream(seed, "diagnosis", len(trials))
     return search(trials, known, rng, on_event)
 

@@ -222,7 +222,8 @@ def calibrate(
             if best.is_fitted
             else (),
             held_out_gain=0.0 if is_exact else float(1 - loss / loss_before),
-            suspicion=None if is_exact or is_fixed else suspicion(segments, best),
+            # A robot with faults is predicted badly for other reasons than its recording.
+            suspicion=None if is_exact or is_fixed or hypotheses else suspicion(segments, best),
         )
 
 

@@ -95,6 +95,7 @@ class Experiment:
     entry: Entry | None = None
     gait: Controller | None = None
     kinds: tuple[FaultKind, ...] = DEFAULT_KINDS
+    hypothesis: Hypothesis = INTACT
     calibrated: bool = True
     next_trial: NextTrial | str = "repair"
     design: Design | None = None
@@ -227,6 +228,7 @@ def run_recovery(
         gait=experiment.gait,
         design=experiment.design,
         kinds=kinds,
+        hypothesis=experiment.hypothesis,
         calibrate=partial(fit, observer=on_event) if calibrated else None,
         next_trial=next_trial,
         score=experiment.score,

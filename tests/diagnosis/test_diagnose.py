@@ -52,6 +52,19 @@ def test_the_truth_is_at_distance_zero_and_ranks_first(quadruped: Robot, truth: 
     assert distances == sorted(distances)
 
 
+@pytest.mark.parametrize("truth", ["leg:front_left=locked0.2/-0.3", "break:front_left_shoulder"])
+def test_a_leg_that_stands_is_locked_or_lost_by_the_loss_and_needs_no_evolution(
+    quadruped: Robot, truth: str
+):
+    (controller,) = random_cpgs(quadruped, 1)
+    trials = [logged(quadruped, truth, controller)]
+    diagnose = DiagnosticSearch(Simulator(quadruped, 2), SEGMENT_PREDICTION, SMALL, DEFAULT_KINDS)
+    diagnosis = diagnose(trials, [], np.random.default_rng(0), lambda _: None)
+
+    assert (str(diagnosis.best), diagnosis.verdict) == (truth, "explained")
+    assert diagnose.evaluations == 0
+
+
 class Indifferent:
     """A comparator to which every hypothesis is as good as any other."""
 

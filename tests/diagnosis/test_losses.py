@@ -371,7 +371,7 @@ def jam_of(robot: Robot, *knees: np.ndarray) -> float | None:
         trials.append(
             Trial.from_arrays(robot, positions, np.zeros((90, len(robot.anatomy.motors))))
         )
-    jams = {jam.part: jam.severity for jam in observed_faults(trials, robot.anatomy)}
+    jams = {jam.part: jam.severity for jam in observed_faults(trials, robot.anatomy, ())}
     assert jams.keys() - {KNEE} == {joint.name for joint in robot.anatomy.joints} - {KNEE}
     return jams.get(KNEE)
 

@@ -18,7 +18,7 @@ from selfmodel.trials.trajectory import Trajectory, collect
 from tests.faults.test_build import assert_same_paths, built, follow
 from tests.faults.test_registry import BARE
 from tests.faults.test_world import STATES, STEPS, playback, segments_of
-from tests.helpers.drivers import random_motion
+from tests.helpers.drivers import random_controllers, random_motion
 
 
 def with_motor(attributes: str) -> Robot:
@@ -50,6 +50,28 @@ def test_a_joint_without_damping_in_the_model_is_damped_relative_to_its_inertia(
 
     assert damped.dof_damping[-1] == pytest.approx(3 * UNDAMPED.model.dof_M0[-1])
     assert str(parse("damping:hip=1", UNDAMPED.anatomy)) == "intact"
+
+
+@pytest.mark.parametrize(
+    ("leg", "jams"),
+    [
+        ("leg:front_left=locked", "jam:front_left_shoulder+jam:front_left_knee"),
+        (
+            "leg:front_left=locked0.2/-0.3",
+            "jam:front_left_shoulder=0.2+jam:front_left_knee=-0.3",
+        ),
+    ],
+)
+def test_a_locked_leg_is_the_jams_of_all_its_joints_as_one_fault(
+    quadruped: Robot, leg: str, jams: str
+):
+    locked, jammed = (parse(text, quadruped.anatomy) for text in (leg, jams))
+    assert [len(locked), len(jammed)] == [1, 2]
+    controller = random_controllers(quadruped, 1)[0]
+    runs = [(locked, controller), (jammed, controller)]
+    moved = Simulator(quadruped, 1).run(runs, 40, SIGNALS).trajectory
+    for signal in SIGNALS:
+        np.testing.assert_array_equal(*moved[signal], err_msg=signal)
 
 
 def test_joint_friction_is_that_part_of_the_largest_torque_of_one_joint(quadruped: Robot):

@@ -160,6 +160,20 @@ def test_a_limb_is_lost_whole_and_leaves_the_others(body: Robot):
         assert not set(others) & anatomy.joint(lost).descendants
 
 
+@pytest.mark.parametrize(
+    ("name", "limbs"),
+    [
+        ("quadruped", "front_left front_right back_left back_right"),
+        ("suite-walker-walk", "right left"),
+        # Its arms and legs share no other words; the joints of these share none at all.
+        ("suite-humanoid-walk", "right_hip left_hip right_shoulder left_shoulder"),
+        ("suite-cheetah-run", "bthigh fthigh"),
+    ],
+)
+def test_a_limb_has_the_name_that_its_joints_share(name: str, limbs: str):
+    assert list(entry(name).robot().anatomy.limbs) == limbs.split()
+
+
 def test_what_a_body_cannot_have_is_left_out():
     assert 4 not in cases(entry("suite-hopper-hop").robot())  # one limb
     assert 8 not in cases(entry("suite-walker-walk").robot())  # two limbs

@@ -25,9 +25,24 @@ def hypotheses(
 def _fault(kind: FaultKind, anatomy: Anatomy) -> st.SearchStrategy[Fault]:
     parts = st.sampled_from(kind.parts(anatomy))
     if kind.bounds is None:
-        return parts.map(lambda part: Fault(kind, part))
+        return parts.flatmap(
+            lambda part: (
+                st.tuples(
+                    *(
+                        st.floats(*ends).map(lambda x: x + 0.0)
+                        for ends in _limits(kind, anatomy, part)
+                    )
+                )
+                .flatmap(lambda angles: st.sampled_from([(), angles]))
+                .map(lambda angles: Fault(kind, part, angles=angles))
+            )
+        )
     return parts.flatmap(
         lambda part: st.floats(*kind.bounds_at(anatomy, part)).map(
             lambda severity: Fault(kind, part, severity + 0.0)
         )
     )
+
+
+def _limits(kind: FaultKind, anatomy: Anatomy, part: str) -> list[tuple[float, float]]:
+    return [*kind.hinges(anatomy, part).values()]
