@@ -1,13 +1,14 @@
 """Recurrent network: the paper's controller design."""
 
 from collections.abc import Mapping, Sequence, Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandScaler, Design
+from selfmodel.controllers.steering import HEADING, Steering
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
@@ -18,18 +19,27 @@ MAX_HIDDEN_NEURONS = 100
 
 @dataclass(frozen=True)
 class Network(Design):
-    """Design of a recurrent network with one hidden layer of ``hidden`` neurons."""
+    """Design of a recurrent network with one hidden layer of ``hidden`` neurons.
+
+    With ``steers``, the outputs are scaled by the heading; see ``steering``.
+    """
 
     name: ClassVar[str] = "network"
 
     hidden: int = HIDDEN_NEURONS
+    steers: bool = field(default=False, kw_only=True)
 
     @property
     def weights(self) -> int:
         """Number of weights: 68 for the paper's quadruped, 120 for its hexapod."""
         return self.hidden * (len(self.sensors) + 1 + self.hidden) + len(self.motors) * (
-            self.hidden + 1
+            self.hidden + 1 + self.steers
         )
+
+    @property
+    def observes(self) -> tuple[str, ...]:
+        """The orientation of the base, of a network that steers."""
+        return HEADING if self.steers else ()
 
     @property
     def description(self) -> str:
@@ -52,7 +62,8 @@ class Network(Design):
 
         Args:
             genomes: ``(n, weights)``: input to hidden with the bias last, hidden to hidden, hidden
-                to motors with the bias last, each by rows of the receiving neuron.
+                to motors with the bias last, each by rows of the receiving neuron. What follows is
+                the steering.
 
         Returns:
             ``(n, hidden, sensors + hidden + 1)`` and ``(n, motors, hidden + 1)``, the bias last.
@@ -62,7 +73,7 @@ class Network(Design):
         ends = np.cumsum([rows * columns for rows, columns in shapes])
         from_input, from_hidden, to_motor = (
             block.reshape(-1, *shape)
-            for block, shape in zip(np.split(genomes, ends[:-1], axis=1), shapes, strict=True)
+            for block, shape in zip(np.split(genomes, ends, axis=1)[:-1], shapes, strict=True)
         )
         to_hidden = np.concatenate(
             [from_input[..., :-1], from_hidden, from_input[..., -1:]], axis=2
@@ -87,7 +98,11 @@ class NetworkBatch:
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]
-        self.observed: Mapping[str, FloatArray] = {}
+        genes = genomes[:, -len(network.motors) :]
+        self._steering = Steering(genes) if network.steers else None
+        self.observed: Mapping[str, FloatArray] = (
+            {"base_orientation": self._steering.orientation} if self._steering else {}
+        )
         self._hidden = self._inputs[:, sensors:-1]
         self._outputs = self._inputs[:, sensors:]
 
@@ -100,4 +115,6 @@ class NetworkBatch:
             self._hidden *= self._working
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
+        if self._steering:
+            motors = np.clip(motors * self._steering.gains(), -1, 1)
         self._scaler.write(motors, targets)
