@@ -32,12 +32,22 @@ class Contact(NamedTuple):
 
 
 class Bullet(Client):
-    """A damaged robot in a client of PyBullet, by the names of its model."""
+    """A damaged robot in a client of PyBullet, by the names of its model.
 
-    def __init__(self, robot: Robot, reality: Reality, damage: Damage) -> None:
+    Its URDF is that of the model, damaged, unless another is given, which is damaged already.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reality: Reality,
+        damage: Damage,
+        urdf: str = "",
+        timestep: float = SUBSTEP,
+    ) -> None:
         super().__init__()
         self._robot, self._reality, self._damage = robot, reality, damage
-        self._urdf = damaged_urdf(robot, reality, damage)
+        self._urdf, self.timestep = urdf or damaged_urdf(robot, reality, damage), timestep
         model = robot.model
         self._sites = {
             sensor.name: int(model.sensor_objid[model.sensor(sensor.name).id])
@@ -51,7 +61,7 @@ class Bullet(Client):
         self._call("resetSimulation")
         self._call(
             "setPhysicsEngineParameter",
-            fixedTimeStep=SUBSTEP,
+            fixedTimeStep=self.timestep,
             numSubSteps=0,
             deterministicOverlappingPairs=1,
             enableFileCaching=0,
