@@ -34,6 +34,7 @@ def main() -> None:
         command.add_argument("--score", default="upright", help="of gaits")
         command.add_argument("--design", default="network", help="of gaits")
         command.add_argument("--repair", default="robust", help="of recoveries")
+        command.add_argument("--trials", type=int, default=Settings.trials, help="of recoveries")
         command.add_argument("--population", type=int, default=Settings.population)
         command.add_argument("--generations", type=int, default=Settings.generations)
     commands.add_parser("table", help="print tables of the rows")
@@ -51,7 +52,9 @@ def main() -> None:
         "diagnose": trials.diagnosed,
         "recover": trials.recovered,
     }
-    settings = Settings(steps=STEPS, generations=given.generations).scaled(given.population)
+    settings = Settings(steps=STEPS, trials=given.trials, generations=given.generations).scaled(
+        given.population
+    )
     bench = trials.Bench(given.folder, settings, given.score, given.design, given.repair)
     done = read_rows(given.rows)
     new = (key for key in cases(given) if not any(key.items() <= row.items() for row in done))

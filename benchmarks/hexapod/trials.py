@@ -70,14 +70,17 @@ def logged(key: Row, legs: str, stream: int, gait: Controller, path: Path) -> Tr
 
 
 def walked(bench: Bench, key: Row, work: Path) -> Row:
-    """Returns how far the first gait goes in the self-model, at two time steps, and in PyBullet."""
+    """Returns how far the first gait goes in the self-model, at two time steps, and in PyBullet, m.
+
+    A simulation that diverges goes nowhere.
+    """
     gait = bench.gait(key["model"], key["seed"])
     predicted, finer = (
-        in_mujoco(Simulator(model_of(key["model"], part), 1), INTACT, gait, STEPS)
+        in_mujoco(Simulator(model_of(key["model"], part), 1), INTACT, gait, STEPS) or 0.0
         for part in (1, FINER)
     )
     trial = logged(key, "intact", 0, gait, work / "intact.mcap")
-    return {"predicted": _rounded(predicted), "finer": _rounded(finer), **_walk(key, trial)}
+    return {"predicted": round(predicted, 2), "finer": round(finer, 2), **_walk(key, trial)}
 
 
 def diagnosed(bench: Bench, key: Row, work: Path) -> Row:
@@ -95,7 +98,7 @@ def diagnosed(bench: Bench, key: Row, work: Path) -> Row:
         threads=1,
     )
     spent = round(time.process_time() - start, 1)
-    before = _rounded(healthy.displacement)
+    before = round(healthy.displacement, 2)
     return {"before": before, **_walk(key, trial), **_facts(found, key["legs"]), "spent": spent}
 
 
@@ -120,7 +123,7 @@ def recovered(bench: Bench, key: Row, work: Path) -> Row:
         "before": before["walked"],
         "after": after["walked"],
         "trials": trials,
-        "predicted": [_rounded(value) for value in found.predicted[2:]],
+        "predicted": [round(value, 2) for value in found.predicted[2:]],
         "tried": [str(one) for one in found.tried[2:]],
     }
 
@@ -131,7 +134,7 @@ def _walk(key: Row, trial: Trial) -> Row:
     heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     fall = falls_of(model_of(key["model"]), INTACT, trial.trajectory)
     return {
-        "walked": _rounded(trial.displacement),
+        "walked": round(trial.displacement, 2),
         "heading": round(float(np.degrees(heading[-1] - heading[0])), 1),
         "fell": bool(fall < trial.trajectory.steps),
     }
@@ -148,7 +151,3 @@ def _facts(found: Diagnosis, legs: str) -> Row:
         "verdict": found.verdict,
         "reason": found.doubt.reason if found.doubt else found.reason,
     }
-
-
-def _rounded(metres: float | None) -> float | None:
-    return None if metres is None else round(metres, 2)

@@ -1,5 +1,6 @@
 """A damaged robot on the ground in a client of PyBullet, and its URDF."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -96,6 +97,17 @@ class Bullet(Client):
         Those of absent and fixed hinges have no effect.
         """
         self._advance(torques[self._present])
+
+    def follow(self, targets: np.ndarray, efforts: np.ndarray, motor: Mapping[str, float]) -> None:
+        """Advances by a substep under Bullet's own motors, of targets, rad, and efforts, N m.
+
+        Both are of each hinge of the model; ``motor`` has what all motors share.
+        """
+        own = targets[self._present], efforts[self._present]
+        for joint, target, effort in zip(self._hinges, *own, strict=True):
+            drive = {"controlMode": pybullet.POSITION_CONTROL, "targetPosition": target, **motor}
+            self._call("setJointMotorControl2", self._body, joint, force=effort, **drive)
+        self._call("stepSimulation")
 
     def hinges(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns angle, rad, and angular velocity, rad/s, of each hinge of the model.
