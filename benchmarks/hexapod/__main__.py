@@ -73,11 +73,12 @@ def cases(given: argparse.Namespace) -> Iterator[Row]:
     failed = [{"group": group, "legs": legs} for group in CASES for legs in CASES[group]]
     if given.command == "walk":
         failed = [{"group": "intact", "legs": "intact"}]
-    search = {name: getattr(given, name) for name in ("score", "design", "generations")}
+    names = ("design", "score", "population", "generations", "repair", "trials")
+    search = {name: getattr(given, name) for name in names}
     for seed, model, gain, case in product(given.seeds, given.models, given.gains, failed):
         if given.cases in f"{case['group']} {case['legs']}":
             own = {"command": given.command, "model": model, "gain": gain, "seed": seed}
-            yield {**own, **case, **search, "population": given.population}
+            yield {**own, **case, **search}
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ from benchmarks.foreign.scoring import rate
 from selfmodel.studies.study import Row
 from selfmodel.studies.tables import markdown_of, table_of
 
+HEADINGS = {"model": "self-model", "gain": "gain", "design": "gaits", "group": "failed"}
+"""Column of each part of what names a line."""
+
 LARGEST_TURN = 15.0
 """Change of heading up to which a trial counts as straight, degrees."""
 
@@ -16,14 +19,15 @@ def table(rows: Sequence[Row]) -> str:
     parts, columns = [], {"walk": _walks, "diagnose": _diagnoses, "recover": _recoveries}
     for command in dict.fromkeys(row["command"] for row in rows):
         own = [row for row in rows if row["command"] == command]
-        names = dict.fromkeys((row["model"], row["gain"], row["group"]) for row in own)
+        groups: dict[tuple[str, ...], list[Row]] = {}
+        for row in own:
+            groups.setdefault(tuple(str(row[key]) for key in HEADINGS), []).append(row)
         lines = []
-        for name in names:
-            chosen = [row for row in own if (row["model"], row["gain"], row["group"]) == name]
-            heading = dict(zip(("self-model", "gain", "failed"), map(str, name), strict=True))
+        for name, chosen in groups.items():
+            heading = dict(zip(HEADINGS.values(), name, strict=True))
             seconds = _values([row["seconds"] for row in chosen])
             lines.append({**heading, **columns[command](chosen), "CPU seconds": seconds})
-        parts.append(markdown_of(table_of(command, lines, lines, texts=3)))
+        parts.append(markdown_of(table_of(command, lines, lines, texts=len(HEADINGS))))
     return "\n".join(parts)
 
 
