@@ -1,5 +1,6 @@
 """A damaged robot on the ground in a client of PyBullet, and its URDF."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -32,12 +33,22 @@ class Contact(NamedTuple):
 
 
 class Bullet(Client):
-    """A damaged robot in a client of PyBullet, by the names of its model."""
+    """A damaged robot in a client of PyBullet, by the names of its model.
 
-    def __init__(self, robot: Robot, reality: Reality, damage: Damage) -> None:
+    Its URDF is that of the model, damaged, unless another is given, which is damaged already.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        reality: Reality,
+        damage: Damage,
+        urdf: str = "",
+        timestep: float = SUBSTEP,
+    ) -> None:
         super().__init__()
         self._robot, self._reality, self._damage = robot, reality, damage
-        self._urdf = damaged_urdf(robot, reality, damage)
+        self._urdf, self.timestep = urdf or damaged_urdf(robot, reality, damage), timestep
         model = robot.model
         self._sites = {
             sensor.name: int(model.sensor_objid[model.sensor(sensor.name).id])
@@ -51,7 +62,7 @@ class Bullet(Client):
         self._call("resetSimulation")
         self._call(
             "setPhysicsEngineParameter",
-            fixedTimeStep=SUBSTEP,
+            fixedTimeStep=self.timestep,
             numSubSteps=0,
             deterministicOverlappingPairs=1,
             enableFileCaching=0,
@@ -86,6 +97,17 @@ class Bullet(Client):
         Those of absent and fixed hinges have no effect.
         """
         self._advance(torques[self._present])
+
+    def follow(self, targets: np.ndarray, efforts: np.ndarray, motor: Mapping[str, float]) -> None:
+        """Advances by a substep under Bullet's own motors, of targets, rad, and efforts, N m.
+
+        Both are of each hinge of the model; ``motor`` has what all motors share.
+        """
+        own = targets[self._present], efforts[self._present]
+        for joint, target, effort in zip(self._hinges, *own, strict=True):
+            drive = {"controlMode": pybullet.POSITION_CONTROL, "targetPosition": target, **motor}
+            self._call("setJointMotorControl2", self._body, joint, force=effort, **drive)
+        self._call("stepSimulation")
 
     def hinges(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns angle, rad, and angular velocity, rad/s, of each hinge of the model.

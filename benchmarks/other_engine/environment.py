@@ -43,12 +43,17 @@ class BulletEnvironment(dm_env.Environment):
     """
 
     def __init__(
-        self, robot: Robot, reality: Reality, damage: Damage | None = None, stream: int = 0
+        self,
+        robot: Robot,
+        reality: Reality,
+        damage: Damage | None = None,
+        stream: int = 0,
+        bullet: Bullet | None = None,
     ) -> None:
         self._robot, self._reality, self._damage = robot, reality, damage or Damage()
         self._noise = np.random.SeedSequence(reality.seed, spawn_key=(1, stream))
-        self._substeps = round(robot.control_timestep / SUBSTEP)
-        self._bullet = Bullet(robot, reality, self._damage)
+        self._bullet = bullet or Bullet(robot, reality, self._damage)
+        self._substeps = round(robot.control_timestep / self._bullet.timestep)
         self._begun = False
 
     def __enter__(self) -> Self:
@@ -85,14 +90,18 @@ class BulletEnvironment(dm_env.Environment):
         for _ in range(self._substeps):
             while self._sent and self._sent[0][0] <= self._substep:
                 _, self._targets = self._sent.popleft()
-            self._bullet.step(self._servos.step(self._targets, *self._bullet.hinges()))
+            self._drive()
             self._substep += 1
         if not self._bullet.is_valid():
-            time = self._substep * SUBSTEP
+            time = self._substep * self._bullet.timestep
             raise FloatingPointError(f"PyBullet's simulation diverged before {time:.3f} s")
         observation = self._observation()
         speed = (self._bullet.base()[0][0] - before) / self._robot.control_timestep
         return dm_env.transition(float(speed), observation)
+
+    def _drive(self) -> None:
+        """Advances by a substep towards the targets."""
+        self._bullet.step(self._servos.step(self._targets, *self._bullet.hinges()))
 
     def stop(self) -> None:
         """Drops the targets on their way, and commands the initial pose."""
@@ -122,7 +131,7 @@ class BulletEnvironment(dm_env.Environment):
         self._bullet.place(lifted, orientation, angles)
 
     def _observation(self) -> dict[str, np.ndarray]:
-        time = np.array(self._substep * SUBSTEP)
+        time = np.array(self._substep * self._bullet.timestep)
         return {**self._measurements.observe(self._bullet), "time": time}
 
 

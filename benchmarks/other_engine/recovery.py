@@ -106,11 +106,11 @@ def _simulated(recovery: Recovery, nominal: Simulator) -> Iterator[float | None]
     calibrated = Simulator(fitted.robot, nominal.threads) if fitted else nominal
     for trial, tried in zip(recovery.trials, recovery.tried, strict=True):
         simulator = nominal if trial.plan.stage == "before" else calibrated
-        walked = _in_mujoco(simulator, tried, trial.plan.controller, trial.plan.steps)
+        walked = in_mujoco(simulator, tried, trial.plan.controller, trial.plan.steps)
         yield None if trial.plan.stage == "after" else walked
 
 
-def _in_mujoco(
+def in_mujoco(
     simulator: Simulator, hypothesis: Hypothesis, driver: CommandSource, steps: int
 ) -> float | None:
     """Returns the displacement of a simulation, m; None if it diverged."""
@@ -128,7 +128,7 @@ def transfer_lines(
     yield "|---" * len(names) + "|"
     for path in gaits:
         gait = load_controller(path)
-        found = [_in_mujoco(Simulator(robot, threads=1), INTACT, gait, steps) or 0.0]
+        found = [in_mujoco(Simulator(robot, threads=1), INTACT, gait, steps) or 0.0]
         found += [_in_bullet(robot, gait, reality, steps) for reality in realities]
         yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
 

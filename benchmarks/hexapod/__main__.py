@@ -1,0 +1,85 @@
+"""``python -m benchmarks.hexapod COMMAND``: a hexapod in PyBullet walks, fails, and walks again.
+
+A command appends a row for each case to ROWS, and skips the cases that are there. FOLDER keeps the
+first gaits, which are evolved once. It needs PyBullet: ``pip install --group other-engine``.
+"""
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice, product
+from pathlib import Path
+
+from benchmarks.foreign.scoring import read_rows
+from benchmarks.hexapod.robots import CASES, GAIN, MODELS, STEPS
+from benchmarks.hexapod.tables import table
+from selfmodel import Settings
+from selfmodel.studies.study import Row
+
+
+def main() -> None:
+    """Runs a command."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.hexapod", description=__doc__)
+    commands = parser.add_subparsers(required=True, dest="command")
+    for name in ("walk", "diagnose", "recover"):
+        command = commands.add_parser(name)
+        command.add_argument("folder", type=Path, help="folder of the first gaits")
+        command.add_argument("--models", nargs="+", choices=MODELS, default=["import", "stiff"])
+        command.add_argument("--gains", nargs="+", type=float, default=[GAIN], help="of the motors")
+        command.add_argument("--seeds", type=int, nargs="+", default=[0], help="physical robots")
+        command.add_argument("--cases", default="", help="only those whose name has this text")
+        command.add_argument("--limit", type=int, help="number of new rows")
+        command.add_argument("--score", default="upright", help="of gaits")
+        command.add_argument("--design", default="network", help="of gaits")
+        command.add_argument("--repair", default="robust", help="of recoveries")
+        command.add_argument("--trials", type=int, default=Settings.trials, help="of recoveries")
+        command.add_argument("--population", type=int, default=Settings.population)
+        command.add_argument("--generations", type=int, default=Settings.generations)
+    commands.add_parser("table", help="print tables of the rows")
+    for command in commands.choices.values():
+        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
+    given = parser.parse_args()
+    if given.command == "table":
+        print(table(read_rows(given.rows)))
+        return
+    # Here, so that --help and the tables need no PyBullet.
+    from benchmarks.hexapod import trials  # noqa: PLC0415  # see above
+
+    run: Mapping[str, Callable[[trials.Bench, Row, Path], Row]] = {
+        "walk": trials.walked,
+        "diagnose": trials.diagnosed,
+        "recover": trials.recovered,
+    }
+    settings = Settings(steps=STEPS, trials=given.trials, generations=given.generations).scaled(
+        given.population
+    )
+    bench = trials.Bench(given.folder, settings, given.score, given.design, given.repair)
+    done = read_rows(given.rows)
+    new = (key for key in cases(given) if not any(key.items() <= row.items() for row in done))
+    for key in islice(new, given.limit):
+        start = time.process_time()
+        with tempfile.TemporaryDirectory() as work:
+            values = run[given.command](bench, key, Path(work))
+        row = {**key, **values, "seconds": round(time.process_time() - start)}
+        with given.rows.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps(row)}\n")
+        print(json.dumps(row), flush=True)
+
+
+def cases(given: argparse.Namespace) -> Iterator[Row]:
+    """Yields what names each row of a command."""
+    failed = [{"group": group, "legs": legs} for group in CASES for legs in CASES[group]]
+    if given.command == "walk":
+        failed = [{"group": "intact", "legs": "intact"}]
+    names = ("design", "score", "population", "generations", "repair", "trials")
+    search = {name: getattr(given, name) for name in names}
+    for seed, model, gain, case in product(given.seeds, given.models, given.gains, failed):
+        if given.cases in f"{case['group']} {case['legs']}":
+            own = {"command": given.command, "model": model, "gain": gain, "seed": seed}
+            yield {**own, **case, **search}
+
+
+if __name__ == "__main__":
+    main()

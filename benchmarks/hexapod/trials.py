@@ -1,0 +1,153 @@
+"""First gaits, walks, diagnoses and recoveries of the hexapod in PyBullet."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import selfmodel
+from benchmarks.hexapod.environment import HexapodEnvironment
+from benchmarks.hexapod.robots import LEGS, STEPS, self_model
+from benchmarks.other_engine.environment import physical_robot
+from benchmarks.other_engine.recovery import in_mujoco
+from selfmodel import Controller, Diagnosis, EnvironmentRobot, Settings, Simulator, Trial
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.logs import load_controller, save_controller
+from selfmodel.recovery.falls import falls_of
+from selfmodel.rotation import directions
+from selfmodel.studies.study import Row
+
+FINER = 4
+"""Part of the time step of a self-model at which its predictions are made again."""
+
+model_of = cache(self_model)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Settings of the searches, and the folder of the first gaits."""
+
+    folder: Path
+    settings: Settings
+    score: str
+    design: str
+    repair: str
+
+    def gait(self, model: str, seed: int) -> Controller:
+        """Returns the first gait of a self-model: of the folder, or evolved for it."""
+        size = f"{self.settings.population}x{self.settings.generations}"
+        path = self.folder / f"{model}-{self.design}-{self.score}-{size}-{seed}.npz"
+        if not path.exists():
+            self.folder.mkdir(parents=True, exist_ok=True)
+            gait = selfmodel.evolve(
+                model_of(model),
+                design=self.design,
+                score=self.score,
+                settings=self.settings,
+                seed=seed,
+                threads=1,
+            )
+            save_controller(path, gait)
+        return load_controller(path)
+
+
+@contextmanager
+def physical(key: Row, legs: str, stream: int) -> Iterator[EnvironmentRobot]:
+    """Yields the physical robot of a row with some legs failed, or ``intact``."""
+    robot = model_of(key["model"])
+    with HexapodEnvironment(robot, key["seed"], legs, key["gain"], stream) as environment:
+        yield physical_robot(environment, robot)
+
+
+def logged(key: Row, legs: str, stream: int, gait: Controller, path: Path) -> Trial:
+    """Runs and logs a trial, and returns it."""
+    with physical(key, legs, stream) as robot:
+        return selfmodel.run_trial(robot, gait, path, robot=model_of(key["model"]), steps=STEPS)
+
+
+def walked(bench: Bench, key: Row, work: Path) -> Row:
+    """Returns how far the first gait goes in the self-model, at two time steps, and in PyBullet, m.
+
+    A simulation that diverges goes nowhere.
+    """
+    gait = bench.gait(key["model"], key["seed"])
+    predicted, finer = (
+        in_mujoco(Simulator(model_of(key["model"], part), 1), INTACT, gait, STEPS) or 0.0
+        for part in (1, FINER)
+    )
+    trial = logged(key, "intact", 0, gait, work / "intact.mcap")
+    return {"predicted": round(predicted, 2), "finer": round(finer, 2), **_walk(key, trial)}
+
+
+def diagnosed(bench: Bench, key: Row, work: Path) -> Row:
+    """Returns the diagnosis of the first gait with failed legs, by a log of the intact robot."""
+    gait = bench.gait(key["model"], key["seed"])
+    healthy = logged(key, "intact", 0, gait, work / "intact.mcap")
+    trial = logged(key, key["legs"], 1, gait, work / "failed.mcap")
+    start = time.process_time()
+    found = selfmodel.diagnose(
+        trial,
+        healthy=healthy,
+        robot=model_of(key["model"]),
+        settings=bench.settings,
+        seed=key["seed"],
+        threads=1,
+    )
+    spent = round(time.process_time() - start, 1)
+    before = round(healthy.displacement, 2)
+    return {"before": before, **_walk(key, trial), **_facts(found, key["legs"]), "spent": spent}
+
+
+def recovered(bench: Bench, key: Row, work: Path) -> Row:
+    """Returns the recovery of a robot with failed legs from its first gait."""
+    with physical(key, "intact", 0) as healthy, physical(key, key["legs"], 1) as damaged:
+        found = selfmodel.recover(
+            healthy,
+            damaged,
+            model_of(key["model"]),
+            work / "run",
+            gait=bench.gait(key["model"], key["seed"]),
+            repair=bench.repair,
+            score=bench.score,
+            settings=bench.settings,
+            seed=key["seed"],
+            threads=1,
+        )
+    before, after, *trials = (_walk(key, trial) for trial in found.trials)
+    return {
+        **_facts(found.diagnosis, key["legs"]),
+        "before": before["walked"],
+        "after": after["walked"],
+        "trials": trials,
+        "predicted": [round(value, 2) for value in found.predicted[2:]],
+        "tried": [str(one) for one in found.tried[2:]],
+    }
+
+
+def _walk(key: Row, trial: Trial) -> Row:
+    """Returns displacement, m, change of heading, degrees, and whether the robot fell."""
+    ahead = directions(trial.trajectory["base_orientation"])
+    heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    fall = falls_of(model_of(key["model"]), INTACT, trial.trajectory)
+    return {
+        "walked": round(trial.displacement, 2),
+        "heading": round(float(np.degrees(heading[-1] - heading[0])), 1),
+        "fell": bool(fall < trial.trajectory.steps),
+    }
+
+
+def _facts(found: Diagnosis, legs: str) -> Row:
+    faults = found.best.faults
+    named = sorted({leg for leg in LEGS for fault in faults if fault.part.startswith(leg)})
+    return {
+        "named": "+".join(named),
+        "right": set(named) == set(legs.split("+")),
+        "kinds": sorted({fault.kind.name for fault in faults}),
+        "best": str(found.best),
+        "verdict": found.verdict,
+        "reason": found.doubt.reason if found.doubt else found.reason,
+    }
