@@ -3,7 +3,7 @@
 The arrays of every file: ``kind`` (the name of the design), ``sensors`` and ``motors`` (names), the
 design's own number (``KINDS``: ``hidden``, a count, of a network; ``timestep``, s, of a CPG) and
 ``genome`` (float64). Controllers whose command ranges differ from the paper's also have ``ranges``
-(float64, centre and half width per motor).
+(float64, centre and half width per motor), and those that hold their heading ``heading`` (true).
 
 In place of a number, a policy has ``content`` (its operators, terms and action, as JSON) and the
 tensors of its network, a fine-tuned one also ``features``, and a compensating layer ``base`` (the
@@ -139,7 +139,8 @@ _GRAPH = ("input", "output", "inputs", "outputs", "nodes")
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     if design.name in KINDS:
         number = KINDS[design.name][1]
-        return {number: np.array(getattr(design, number))}
+        holds = {"heading": np.array(object=True)} if design.observes else {}
+        return {number: np.array(getattr(design, number)), **holds}
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.graph import Graph  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Policy  # noqa: PLC0415  # few controllers are one
@@ -178,7 +179,7 @@ def _own_types(kind: str, arrays: Arrays) -> dict[str, str]:
     if kind == LAYER:
         return {"base": "u1", "feedback": "b0"}
     _, number, code = KINDS[kind]
-    return {number: f"{code}0"}
+    return {number: f"{code}0"} | ({"heading": "b0"} if "heading" in arrays else {})
 
 
 def _design(
@@ -190,7 +191,8 @@ def _design(
 ) -> Design:
     if kind in KINDS:
         design, number, _ = KINDS[kind]
-        return design(*ends, arrays[number].item(), ranges=ranges)
+        heading = bool(arrays.get("heading"))
+        return design(*ends, arrays[number].item(), ranges=ranges, heading=heading)
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.graph import Graph, Node, State  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.policy import Interface, Policy  # noqa: PLC0415  # few controllers are one

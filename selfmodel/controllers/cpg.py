@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.steering import HEADING, Steering
+from selfmodel.controllers.heading import HeadingHold, observes
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
@@ -42,7 +42,7 @@ class Cpg(Design):
 
     Attributes:
         timestep: Control time step, s.
-        steers: Whether the amplitudes change with the heading; see ``steering``.
+        heading: Whether the amplitudes hold the heading; see ``heading``.
 
     Raises:
         ValueError: The time step is out of range, or the ranges do not fit the motors.
@@ -51,7 +51,7 @@ class Cpg(Design):
     name: ClassVar[str] = "cpg"
 
     timestep: float
-    steers: bool = field(default=False, kw_only=True)
+    heading: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,12 +64,12 @@ class Cpg(Design):
     @property
     def weights(self) -> int:
         """Length of a genome: 33 for the paper's quadruped, 67 for its hexapod."""
-        return 1 + (3 + self.steers) * len(self.motors) + len(self.sensors)
+        return 1 + (3 + self.heading) * len(self.motors) + len(self.sensors)
 
     @property
     def observes(self) -> tuple[str, ...]:
-        """The orientation of the base, of a CPG that steers."""
-        return HEADING if self.steers else ()
+        """The orientation of the base, of a CPG that holds its heading."""
+        return observes(self.heading)
 
     @property
     def description(self) -> str:
@@ -89,11 +89,11 @@ class Cpg(Design):
         Args:
             genome: ``(weights,)``, each value in [-1, 1]: the frequency, then per motor the
                 amplitudes, the offsets and the phases, then per sensor the feedback, then per motor
-                the steering.
+                the heading hold.
         """
         motors = len(self.motors)
         ends = np.cumsum([1, 3 * motors, len(self.sensors)])
-        _, own, feedback, steering = np.split(genome, ends)
+        _, own, feedback, heading = np.split(genome, ends)
         amplitude, offset, phase = own.reshape(3, motors)
         middle = math.sqrt(MIN_FREQUENCY * MAX_FREQUENCY)
         width = MAX_FREQUENCY / MIN_FREQUENCY
@@ -104,7 +104,7 @@ class Cpg(Design):
             offsets=offset * (1 - amplitudes),
             phases=phase / 2,
             feedback=feedback * (MAX_FEEDBACK / max(1, len(self.sensors))),
-            steering=steering,
+            heading=heading,
         )
 
     def batch(self, genomes: FloatArray, _silent: Sequence[AbstractSet[int]]) -> "CpgBatch":
@@ -123,7 +123,7 @@ class CpgParameters:
             amplitude and offset together stay within the range.
         phases: Phase lead of each oscillator, in strides, -1/2 to 1/2, ``(motors,)``.
         feedback: Relative change of the phase speed per sensor reading of 1, ``(sensors,)``.
-        steering: Genes of the steering, ``(motors,)``, or ``(0,)``.
+        heading: Genes of the heading hold, ``(motors,)``, or ``(0,)``.
     """
 
     frequency: float
@@ -131,7 +131,7 @@ class CpgParameters:
     offsets: FloatArray
     phases: FloatArray
     feedback: FloatArray
-    steering: FloatArray
+    heading: FloatArray
 
 
 class CpgBatch:
@@ -152,11 +152,8 @@ class CpgBatch:
         self._phase = np.zeros(len(decoded))
         self._step = 0
         self.readings = np.zeros((len(decoded), len(cpg.sensors)))
-        steering = np.array([parameters.steering for parameters in decoded])
-        self._steering = Steering(steering) if cpg.steers else None
-        self.observed: Mapping[str, FloatArray] = (
-            {"base_orientation": self._steering.orientation} if self._steering else {}
-        )
+        self._heading = HeadingHold(np.array([parameters.heading for parameters in decoded]))
+        self.observed: Mapping[str, FloatArray] = self._heading.observed
 
     def step(self, targets: FloatArray) -> None:
         """Writes the commands of the next control step; see ``ControllerBatch``."""
@@ -164,11 +161,9 @@ class CpgBatch:
         phases -= np.floor(phases)
         outputs = np.cos(2 * np.pi * phases)
         outputs *= self._amplitudes
-        if self._steering:
-            outputs *= self._steering.gains()
+        self._heading.scale(outputs)
         outputs += self._offsets
-        if self._steering:
-            np.clip(outputs, -1, 1, out=outputs)
+        np.clip(outputs, -1, 1, out=outputs)
         # The fraction r of the final amplitude solves r'' = a (a (1 - r) / 4 - r') from rest, which
         # is critically damped, so the first commands do not jump.
         exponent = AMPLITUDE_RATE * (self._step * self._timestep) / 2

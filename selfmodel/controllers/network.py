@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.steering import HEADING, Steering
+from selfmodel.controllers.heading import HeadingHold, observes
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
@@ -21,25 +21,25 @@ MAX_HIDDEN_NEURONS = 100
 class Network(Design):
     """Design of a recurrent network with one hidden layer of ``hidden`` neurons.
 
-    With ``steers``, the outputs are scaled by the heading; see ``steering``.
+    With ``heading``, the outputs hold it; see ``heading``.
     """
 
     name: ClassVar[str] = "network"
 
     hidden: int = HIDDEN_NEURONS
-    steers: bool = field(default=False, kw_only=True)
+    heading: bool = field(default=False, kw_only=True)
 
     @property
     def weights(self) -> int:
         """Number of weights: 68 for the paper's quadruped, 120 for its hexapod."""
         return self.hidden * (len(self.sensors) + 1 + self.hidden) + len(self.motors) * (
-            self.hidden + 1 + self.steers
+            self.hidden + 1 + self.heading
         )
 
     @property
     def observes(self) -> tuple[str, ...]:
-        """The orientation of the base, of a network that steers."""
-        return HEADING if self.steers else ()
+        """The orientation of the base, of a network that holds its heading."""
+        return observes(self.heading)
 
     @property
     def description(self) -> str:
@@ -63,7 +63,7 @@ class Network(Design):
         Args:
             genomes: ``(n, weights)``: input to hidden with the bias last, hidden to hidden, hidden
                 to motors with the bias last, each by rows of the receiving neuron. What follows is
-                the steering.
+                the heading hold.
 
         Returns:
             ``(n, hidden, sensors + hidden + 1)`` and ``(n, motors, hidden + 1)``, the bias last.
@@ -98,11 +98,9 @@ class NetworkBatch:
         self._inputs = np.zeros((len(genomes), sensors + network.hidden + 1))
         self._inputs[:, -1] = 1.0
         self.readings = self._inputs[:, :sensors]
-        genes = genomes[:, -len(network.motors) :]
-        self._steering = Steering(genes) if network.steers else None
-        self.observed: Mapping[str, FloatArray] = (
-            {"base_orientation": self._steering.orientation} if self._steering else {}
-        )
+        own = network.heading * len(network.motors)
+        self._heading = HeadingHold(genomes[:, network.weights - own :])
+        self.observed: Mapping[str, FloatArray] = self._heading.observed
         self._hidden = self._inputs[:, sensors:-1]
         self._outputs = self._inputs[:, sensors:]
 
@@ -115,6 +113,6 @@ class NetworkBatch:
             self._hidden *= self._working
         motors = np.einsum("nij,nj->ni", self._to_motors, self._outputs)
         np.tanh(motors, out=motors)
-        if self._steering:
-            motors = np.clip(motors * self._steering.gains(), -1, 1)
+        self._heading.scale(motors)
+        np.clip(motors, -1, 1, out=motors)
         self._scaler.write(motors, targets)

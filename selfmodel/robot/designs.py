@@ -1,6 +1,7 @@
 """Controller designs for a robot, by name; ``controllers/controller.py`` says how to add one."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from selfmodel.controllers.controller import Design
 from selfmodel.controllers.cpg import Cpg
@@ -11,12 +12,13 @@ from selfmodel.robot.robot import Robot
 
 
 @typed
-def network_for(robot: Robot, hidden: int | None = None) -> Network:
+def network_for(robot: Robot, hidden: int | None = None, *, heading: bool = False) -> Network:
     """Returns the network that controls a robot.
 
     Args:
         robot: The robot.
         hidden: Number of hidden neurons; the paper's by default.
+        heading: Whether the network holds its heading.
 
     Raises:
         InputError: The number of hidden neurons is out of range, or a motor has no command range.
@@ -25,16 +27,18 @@ def network_for(robot: Robot, hidden: int | None = None) -> Network:
     if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
         raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
     names = robot.anatomy.names
-    return Network(names.sensors, names.motors, neurons, ranges=command_ranges(robot.model))
+    ranges = command_ranges(robot.model)
+    return Network(names.sensors, names.motors, neurons, ranges=ranges, heading=heading)
 
 
 @typed
-def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
+def cpg_for(robot: Robot, hidden: int | None = None, *, heading: bool = False) -> Cpg:
     """Returns the CPG that controls a robot.
 
     Args:
         robot: The robot.
         hidden: None; a CPG has no hidden neurons.
+        heading: Whether the CPG holds its heading.
 
     Raises:
         InputError: A number of hidden neurons is given, or a motor has no command range.
@@ -45,11 +49,14 @@ def cpg_for(robot: Robot, hidden: int | None = None) -> Cpg:
         )
     names = robot.anatomy.names
     ranges = command_ranges(robot.model)
-    return Cpg(names.sensors, names.motors, robot.control_timestep, ranges=ranges)
+    timestep = robot.control_timestep
+    return Cpg(names.sensors, names.motors, timestep, ranges=ranges, heading=heading)
 
 
 DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = {
     Network.name: network_for,
     Cpg.name: cpg_for,
+    f"{Network.name}+heading": partial(network_for, heading=True),
+    f"{Cpg.name}+heading": partial(cpg_for, heading=True),
 }
 """Function from a robot and a number of hidden neurons (None: the default) to a design, by name."""
