@@ -46,7 +46,7 @@ from tests.helpers.comparators import Prepared
 from tests.helpers.drivers import random_controllers, random_cpgs
 from tests.helpers.memory import trial_of
 
-SMALL = dataclasses.replace(Settings().scaled(12), generations=2, steps=300)
+SMALL = dataclasses.replace(Settings().scaled(6), generations=1, steps=150, genes=2)
 CASES = ROBOTS["quadruped"].cases
 GAIT = 4
 """Index of a random controller under which every failure below is detectable."""
@@ -197,7 +197,8 @@ def test_whole_trials_that_no_hypothesis_reproduces_are_not_judged(
     healthy, damaged = (
         trial(quadruped, text, gait, steps=60, gap=gap) for text in ("intact", truth)
     )
-    found = diagnosed(quadruped, [damaged], [healthy], comparator=plugins.comparator(name))
+    comparator, kinds = plugins.comparator(name), (KINDS["break"], KINDS["sensor"])
+    found = diagnosed(quadruped, [damaged], [healthy], comparator=comparator, kinds=kinds)
 
     assert found.verdict == "not judged"
     assert found.probability == {}
@@ -210,7 +211,9 @@ def test_trials_that_are_too_short_for_segments_are_to_be_recorded_for_longer(
 ):
     gap = draw_gap(quadruped, 0.1, np.random.default_rng(0))
     short = trial(quadruped, "intact", gait, steps=MIN_SEGMENTED - 1, gap=gap)
-    found = diagnosed(quadruped, [short], comparator=COMPARATORS["sensor-series"])
+    found = diagnosed(
+        quadruped, [short], comparator=COMPARATORS["sensor-series"], kinds=(KINDS["break"],)
+    )
 
     assert f"record trials of {MIN_SEGMENTED} control steps or more" in summary(found)[1]
     with pytest.raises(InputError, match=f"needs {MIN_SEGMENTED} steps or more"):

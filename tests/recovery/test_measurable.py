@@ -24,7 +24,7 @@ from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.robots.arms import arm
 
-SMALL = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
+SMALL = selfmodel.Settings(steps=60, trials=1, generations=1, diagnostic_search="ea").scaled(4)
 KNEE = "break:front_left_knee"
 ONBOARD: tuple[Signal, ...] = (
     *("sensors", "joint_positions", "joint_velocities"),
