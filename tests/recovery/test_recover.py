@@ -51,9 +51,7 @@ from tests.helpers.drivers import random_controllers
 from tests.helpers.gaits import changed, gait, logged
 from tests.helpers.memory import in_memory
 
-TINY = dataclasses.replace(
-    Settings(steps=60, genes=2, diagnostic_search="ea").scaled(6), generations=2
-)
+TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60, diagnostic_search="ea")
 KINDS = (BROKEN, JAMMED)
 TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
 
