@@ -16,6 +16,7 @@ from selfmodel.errors import InputError
 from selfmodel.faults import BROKEN, JAMMED
 from selfmodel.recovery import RecoveryLoop
 from selfmodel.trials.trial import Trial
+from tests.helpers.calibration import coarse
 from tests.helpers.command import selfmodel as command
 from tests.helpers.hostile import lacking
 
@@ -128,7 +129,8 @@ def test_results_have_figures_of_their_tables(
     (axes,) = recovery.plot().axes
     assert labels(recovery.plot()) == list(recovery.to_pandas()["trial"])
     assert [bar.get_width() for bar in axes.patches] == list(recovery.scores)
-    fit = selfmodel.calibrate(BEFORE, "quadruped")
+    with coarse():
+        fit = selfmodel.calibrate(BEFORE, "quadruped")
     assert [one.strip("()") for one in labels(fit.plot())] == list(fit.to_pandas()["name"])
 
 

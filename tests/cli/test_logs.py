@@ -12,6 +12,7 @@ import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
+from tests.cli.conftest import KINDS
 from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.go2 import STAND, recorded
 
@@ -203,7 +204,7 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
 
 @pytest.mark.search
 @pytest.mark.parametrize(
-    ("run", "options"), [("short", ("--kinds", "paper")), ("recovered_as_the_paper_did", PAPERS)]
+    ("run", "options"), [("short", ("--kinds", KINDS)), ("recovered_as_the_paper_did", PAPERS)]
 )
 def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     run: str, options: tuple[str, ...], request: pytest.FixtureRequest

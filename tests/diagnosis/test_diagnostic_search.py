@@ -86,8 +86,13 @@ def diagnosed(
     return found, simulator.stats.steps
 
 
-@pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
-@pytest.mark.parametrize("trials", [1, pytest.param(2, marks=pytest.mark.search)])
+@pytest.mark.parametrize(
+    ("search", "trials"),
+    [
+        *((search, 1) for search in (STEPWISE, EA)),
+        *(pytest.param(search, 2, marks=pytest.mark.search) for search in DIAGNOSTIC_SEARCHES),
+    ],
+)
 def test_the_same_distance_with_and_without_losses_is_the_same_diagnosis_at_the_same_cost(
     quadruped: Robot, search: str, trials: int
 ):
@@ -124,7 +129,7 @@ def test_one_distance_is_searched_step_by_step_to_the_damage_that_the_small_ea_m
 
 @pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SEGMENT_PREDICTION])
 @pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
-@pytest.mark.parametrize("limit", [500, 2500])
+@pytest.mark.parametrize("limit", [500, 1500])
 def test_no_search_simulates_more_than_its_limit_and_one_that_reaches_it_does_not_judge(
     quadruped: Robot, comparator: Comparator, search: str, limit: int
 ):
