@@ -170,6 +170,7 @@ def test_a_controller_evolves_as_the_first_gait_of_a_recovery(
     assert first.plan.controller == selfmodel.evolve("quadruped", settings=SMALL, **options)
 
 
+@pytest.mark.search
 def test_a_repair_may_have_another_budget_than_the_diagnosis(
     tmp_path: Path, recovery: selfmodel.Recovery
 ):

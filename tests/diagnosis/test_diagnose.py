@@ -142,7 +142,7 @@ def test_what_a_refit_explains_is_left_out_before_the_verdict(monkeypatch: pytes
         ("floating", DEFAULT_KINDS, "", True),
         ("floating", DEFAULT_KINDS, "jam:left_hip", False),  # as many faults as genes
         ("floating", PAPER_KINDS, "", False),
-        ("fixed", DEFAULT_KINDS, "", False),
+        pytest.param("fixed", DEFAULT_KINDS, "", False, marks=pytest.mark.search),
     ],
 )
 def test_a_kind_that_is_named_as_better_is_searched_too_among_the_default_kinds_on_a_floating_base(

@@ -136,7 +136,9 @@ def test_a_hidden_neuron_is_unexplained(quadruped: Robot, gait: Controller, befo
     assert found.verdict == "unexplained"
 
 
-@pytest.mark.parametrize(("gap", "order"), [(0.0, 1), (0.05, -1)])
+@pytest.mark.parametrize(
+    ("gap", "order"), [(0.0, 1), pytest.param(0.05, -1, marks=pytest.mark.search)]
+)
 def test_logs_of_a_healthy_and_of_a_damaged_robot_contradict_each_other(
     quadruped: Robot, gait: Controller, gap: float, order: int
 ):
@@ -169,7 +171,7 @@ def test_a_log_of_another_fault_is_not_called_healthy(quadruped: Robot):
     assert all(f"'{name}' alone" in action for name in ("first", "last"))
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.05])
+@pytest.mark.parametrize("gap", [0.0, pytest.param(0.05, marks=pytest.mark.search)])
 def test_a_fault_that_one_of_two_gaits_hardly_shows_is_no_contradiction(
     quadruped: Robot, gait: Controller, gap: float
 ):
