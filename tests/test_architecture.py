@@ -91,6 +91,7 @@ def test_every_module_has_a_room_or_is_vocabulary():
     }
 
 
+@pytest.mark.process
 def test_one_module_imports_gymnasium_which_is_no_dependency():
     found = [
         module
@@ -125,6 +126,7 @@ def test_no_module_imports_itself_through_others():
         assert module not in seen
 
 
+@pytest.mark.process
 def test_what_needs_no_simulator_imports_without_mujoco_and_a_face_and_help_without_numpy():
     python(f"""
 import sys

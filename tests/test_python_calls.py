@@ -28,6 +28,7 @@ from selfmodel.testing import check_comparator, check_fault_kind
 from selfmodel.trials.trial import Trial
 
 SMALL = Settings(steps=60, generations=1, trials=1).scaled(4)
+BY_EA = dataclasses.replace(SMALL, diagnostic_search="ea")
 TWO = dataclasses.replace(SMALL, trials=2)
 
 MINE = """
@@ -113,13 +114,13 @@ def evolved(place: Place, **options: object) -> bytes:
 
 def diagnosed(**options: object) -> str:
     given = {"trials": "walk.mcap", "comparator": "forward-displacement", "kinds": "jam"}
-    given |= {"settings": SMALL, "calibrate": False, **options}
+    given |= {"settings": BY_EA, "calibrate": False, **options}
     return str(selfmodel.diagnose(given.pop("trials"), **given))
 
 
 def recovered(place: Place, **options: object) -> tuple[object, ...]:
     given = {"comparator": FORWARD_DISPLACEMENT, "kinds": "jam", "repair": "paper"}
-    given |= {"settings": SMALL, "calibrate": False, "healthy": place.physical}
+    given |= {"settings": BY_EA, "calibrate": False, "healthy": place.physical}
     given |= {"folder": f"run-{place.numbers()}", **options}
     found: Recovery = selfmodel.recover(
         given.pop("healthy"), place.damaged, place.robot, given.pop("folder"), **given

@@ -266,7 +266,8 @@ class LossTable:
         account, stats = self.account, self._simulator.stats
         afforded = account.left // steps_of(section.request, trial)
         possible = missing[: min(afforded, len(missing))]
-        size = largest_batch(self._simulator.robot, section.request, trial.trajectory.steps)
+        robot, steps = self._simulator.robot, trial.trajectory.steps
+        size = largest_batch(robot, section.request, steps) if possible else 1  # reads files
         for first in range(0, len(possible), size):
             batch, before = possible[first : first + size], stats.steps
             losses = self._simulated(batch, trial, section)

@@ -23,7 +23,7 @@ from selfmodel.recovery.recover import NextTrial, RecoveryLoop
 from selfmodel.recovery.repair import MakeSearch, RepairSearch
 from selfmodel.recovery.scores import Score, check_measurable, checked
 from selfmodel.robot.designs import network_for
-from selfmodel.settings import Settings
+from selfmodel.settings import EA, Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.testing.contract import require, require_alone
 from selfmodel.testing.diagnosis import CHECKED_STEPS
@@ -32,7 +32,7 @@ from selfmodel.trials.trajectory import Trajectory
 RUNS = 3
 """Controllers of a batch that is checked."""
 
-SMALL = Settings(steps=CHECKED_STEPS, trials=3, generations=1).scaled(4)
+SMALL = Settings(steps=CHECKED_STEPS, trials=3, generations=1, diagnostic_search=EA).scaled(4)
 """Settings of the recovery in which a choice of the next trial is checked."""
 
 GENERATIONS = 4

@@ -7,7 +7,8 @@ import pytest
 
 from tests.helpers.command import SMALL, Done, succeeds
 
-SHORT = ("quadruped", "--case", "4", *SMALL, "--kinds", "paper", "--steps", "60", "--trials", "1")
+KINDS = "break,sensor"
+SHORT = ("quadruped", "--case", "4", *SMALL, "--kinds", KINDS, "--steps", "60", "--trials", "1")
 
 
 @pytest.fixture(scope="session")

@@ -119,8 +119,8 @@ def test_progress_goes_to_standard_error_in_plain_lines_when_piped(recovery: tup
     assert "\x1b" not in done.stderr + done.stdout
     assert len(lines) == len(begins)
     assert all(line.startswith(begin) for line, begin in zip(lines, begins, strict=True))
-    (result,) = folder.rglob("result.json")
-    scores = [f"{one['score']:.3f} m" for one in json.loads(result.read_text())["trials"]]
+    result = json.loads((folder / "run" / "result.json").read_text())
+    scores = [f"{one['score']:.3f} m" for one in result["trials"]]
     assert [line.split("upright ")[1] for line in lines if "upright" in line] == scores
 
 

@@ -44,9 +44,16 @@ def test_pairs_are_printed_with_difference_interval_n_and_p(folder: Path):
     assert row["table"] == "quadruped, 1 trial"
 
 
-def test_a_table_for_a_paper_has_five_columns_and_none_has_all_rows(folder: Path):
-    for wanted in ("markdown", "latex"):
-        succeeds("compare", "rows.csv", "-o", "out", "--table", wanted, cwd=folder)
+def test_a_paper_has_tables_of_five_columns_and_figures_as_wide_as_its_style_says(folder: Path):
+    (folder / "own.mplstyle").write_text("figure.figsize: 5, 3\nsavefig.dpi: 100\n")
+    for wanted, style, pixels in (
+        ("markdown", "column", 3.5 * 150),
+        ("latex", "own.mplstyle", 5 * 100),
+    ):
+        given = ("--table", wanted, "--style", style)
+        succeeds("compare", "rows.csv", "-o", "out", *given, cwd=folder)
+        data = (folder / "out" / "differences-quadruped.png").read_bytes()
+        assert int.from_bytes(data[16:20], "big") == pixels
 
     head, _, pair, _, note = (folder / "out" / "comparisons.md").read_text().splitlines()
     assert head == "| table | comparison | difference (95 %) | n | p |"
@@ -58,14 +65,6 @@ def test_a_table_for_a_paper_has_five_columns_and_none_has_all_rows(folder: Path
         assert said in note
         assert said.replace("%", r"\%") in latex.split(r"\end{tabular}")[1]
     assert not list((folder / "out").glob("rows.*"))
-
-
-def test_figures_are_as_wide_as_a_column_or_as_a_style_file_says(folder: Path):
-    (folder / "own.mplstyle").write_text("figure.figsize: 5, 3\nsavefig.dpi: 100\n")
-    for style, pixels in (("column", 3.5 * 150), ("own.mplstyle", 5 * 100)):
-        succeeds("compare", "rows.csv", "-o", "out", "--style", style, cwd=folder)
-        data = (folder / "out" / "differences-quadruped.png").read_bytes()
-        assert int.from_bytes(data[16:20], "big") == pixels
 
 
 def test_a_study_of_one_method_has_nothing_to_compare(tmp_path: Path):

@@ -12,12 +12,16 @@ import pytest
 
 from selfmodel.logs import read_log
 from selfmodel.logs.inspection import read_info
+from tests.cli.conftest import KINDS
 from tests.helpers.command import DIAGNOSIS, SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.go2 import STAND, recorded
 
 OLD = Path(__file__).parents[1] / "data" / "logs-0.1" / "recovery" / "trials"
 OLD_BEFORE, OLD_AFTER = str(OLD / "00-before.mcap"), str(OLD / "01-after.mcap")
-PAPERS = ("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate")
+PAPERS = (
+    *("--kinds", "paper", "--comparator", "forward-displacement", "--no-calibrate"),
+    *("--diagnostic-search", "ea"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -192,15 +196,15 @@ def recovered_as_the_paper_did(tmp_path_factory: pytest.TempPathFactory) -> tupl
     """A folder in which a small recovery by displacement alone ran, and what it printed."""
     folder = tmp_path_factory.mktemp("paper")
     return folder, printed(
-        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "100", *PAPERS),
-        *("--trials", "1", "--out", "run", "--json"),
+        *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "60", *PAPERS),
+        *("--repair", "paper", "--trials", "1", "--out", "run", "--json"),
         cwd=folder,
     )
 
 
 @pytest.mark.search
 @pytest.mark.parametrize(
-    ("run", "options"), [("short", ("--kinds", "paper")), ("recovered_as_the_paper_did", PAPERS)]
+    ("run", "options"), [("short", ("--kinds", KINDS)), ("recovered_as_the_paper_did", PAPERS)]
 )
 def test_diagnosis_from_logs_alone_says_what_the_run_said_that_wrote_them(
     run: str, options: tuple[str, ...], request: pytest.FixtureRequest

@@ -16,7 +16,8 @@ from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.drivers import random_repertoire
 from tests.helpers.policies import save_policy
 
-FEW = (*SMALL, "--kinds", "paper", "--trials", "1", "--steps", "60", "--no-calibrate", "--json")
+TINY = ("--population", "4", "--generations", "1")
+FEW = (*TINY, "--kinds", "paper", "--trials", "1", "--steps", "60", "--no-calibrate", "--json")
 QUICK = (
     *("recover", "quadruped", "--case", "1", *FEW, "--comparator", "forward-displacement"),
     *("--diagnostic-search", "ea"),

@@ -3,6 +3,7 @@
 import dataclasses
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,6 +71,7 @@ def weaker(quadruped: Robot) -> Robot:
     return unlike(quadruped, 0.5)
 
 
+@cache
 def moved(robot: Robot, gait: str, *, pace: int = 1, truth: str = "intact") -> Trial:
     """A trial of a robot under sinusoids of a gait, ``pace`` times as fast."""
     sizes = np.resize(GAITS[gait], robot.model.nu)
@@ -97,10 +99,15 @@ def weak(real: Robot) -> Trial:
     return moved(real, "third", truth=WEAK)
 
 
+@cache
+def table_of(robot: Robot) -> LossTable:
+    """Losses of a self-model, which are kept from test to test."""
+    return LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
+
+
 @pytest.fixture(scope="module")
 def table(quadruped: Robot) -> LossTable:
-    """Losses of the self-model, which are kept from test to test."""
-    return LossTable(Simulator(quadruped, 1), SEGMENT_PREDICTION)
+    return table_of(quadruped)
 
 
 def problem_of(
@@ -167,7 +174,7 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
     known, physical, fitted = map(request.getfixturevalue, (model, robot, refit))
     before = [moved(physical, gait) for gait in ("first", "second")]
     trials = [moved(physical, gait, truth=truth) for gait in ("first", "second")]
-    table = LossTable(Simulator(known, 1), SEGMENT_PREDICTION)
+    table = table_of(known)
 
     hypothesis = parse(best, known.anatomy)
 
@@ -176,7 +183,7 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
 
     assert str(found) == left
     (losses,) = by_refit.losses([found])
-    refitted = LossTable(Simulator(fitted, 1), SEGMENT_PREDICTION).losses([found], trials)
+    refitted = table_of(fitted).losses([found], trials)
     assert (losses == (refitted if left != best else table.losses([found], trials))).all()
 
 
@@ -365,7 +372,7 @@ def test_the_refit_is_to_the_healthy_trials_and_those_to_explain(
 def test_a_refit_that_spoils_the_healthy_trials_explains_nothing(
     table: LossTable, quadruped: Robot, real: Robot, healthy: list[Trial], weak: Trial
 ):
-    exact = problem_of(LossTable(Simulator(real, 1), SEGMENT_PREDICTION), weak, healthy)
+    exact = problem_of(table_of(real), weak, healthy)
     exact.calibrate = lambda *_, **__: SimpleNamespace(robot=unlike(quadruped, 0.5))
 
     assert doubted(problem_of(table, weak, healthy, unlike(quadruped, 0.5)), WEAK) is not None

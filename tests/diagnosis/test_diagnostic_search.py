@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from selfmodel.trials.trial import Trial
 from tests.helpers.drivers import random_controllers
 from tests.helpers.memory import trial_of
 
-SMALL = dataclasses.replace(Settings(steps=60).scaled(12), generations=3)
+SMALL = dataclasses.replace(Settings(steps=60).scaled(12), generations=3, genes=2)
 REQUEST = ClosedLoop(record=("joint_positions",))
 
 
@@ -58,32 +58,48 @@ class OfOnePiece:
         return Prepared(REQUEST, lambda run: distance_of(run, trial)[:, np.newaxis])
 
 
+BY_DISTANCE, OF_ONE_PIECE = ByDistance(), OfOnePiece()
+
+
 def distance_of(simulated: Trajectory, trial: Trial) -> np.ndarray:
     """Returns the mean difference of joint positions, ``(n,)``."""
     difference = np.abs(simulated["joint_positions"] - trial.trajectory["joint_positions"])
     return np.ascontiguousarray(difference).reshape(len(difference), -1).mean(axis=1)
 
 
+@cache
 def diagnosed(
-    robot: Robot, comparator: Comparator, settings: Settings, damage: str, *, trials: int = 1
-) -> tuple[Diagnosis, Simulator]:
-    """Returns the diagnosis of some trials, and the simulator of the self-model."""
+    robot: Robot,
+    comparator: Comparator,
+    search: str,
+    damage: str,
+    *,
+    trials: int = 1,
+    limit: int | None = None,
+) -> tuple[Diagnosis, int]:
+    """Returns the diagnosis of some trials, and the control steps that were simulated for it."""
     logged = [trial_of(robot, damage, one, steps=60) for one in random_controllers(robot, trials)]
     simulator = Simulator(robot, 1)
-    search = DiagnosticSearch(simulator, comparator, settings, PAPER_KINDS)
-    return search(logged, [], np.random.default_rng(0), lambda _: None), simulator
+    settings = dataclasses.replace(SMALL, diagnostic_search=search, max_simulated_steps=limit)
+    diagnose = DiagnosticSearch(simulator, comparator, settings, PAPER_KINDS)
+    found = diagnose(logged, [], np.random.default_rng(0), lambda _: None)
+    return found, simulator.stats.steps
 
 
-@pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
-@pytest.mark.parametrize("trials", [1, pytest.param(2, marks=pytest.mark.search)])
+@pytest.mark.parametrize(
+    ("search", "trials"),
+    [
+        *((search, 1) for search in (STEPWISE, EA)),
+        *(pytest.param(search, 2, marks=pytest.mark.search) for search in DIAGNOSTIC_SEARCHES),
+    ],
+)
 def test_the_same_distance_with_and_without_losses_is_the_same_diagnosis_at_the_same_cost(
     quadruped: Robot, search: str, trials: int
 ):
-    settings = dataclasses.replace(SMALL, diagnostic_search=search)
     damage = "break:front_left_shoulder+jam:back_right_knee"
     one, other = (
-        diagnosed(quadruped, comparator, settings, damage, trials=trials)[0]
-        for comparator in (ByDistance(), OfOnePiece())
+        diagnosed(quadruped, comparator, search, damage, trials=trials)[0]
+        for comparator in (BY_DISTANCE, OF_ONE_PIECE)
     )
     assert one == other
     assert one.cost.hypotheses > len(PAPER_KINDS)
@@ -94,24 +110,17 @@ def test_the_same_distance_with_and_without_losses_is_the_same_diagnosis_at_the_
 def test_the_cost_of_a_diagnosis_is_all_that_was_simulated(
     quadruped: Robot, comparator: Comparator, search: str
 ):
-    settings = dataclasses.replace(SMALL, diagnostic_search=search)
-    found, simulator = diagnosed(quadruped, comparator, settings, "break:front_left_knee")
-    assert found.cost.control_steps == simulator.stats.steps
+    found, simulated = diagnosed(quadruped, comparator, search, "break:front_left_knee")
+    assert found.cost.control_steps == simulated
     assert str(found.best) == "break:front_left_knee" or search == EA
 
 
 def test_one_distance_is_searched_step_by_step_to_the_damage_that_the_small_ea_misses(
     quadruped: Robot,
 ):
-    damage = "break:front_left_shoulder"
+    damage = "break:front_left_shoulder+jam:back_right_knee"
     by_steps, by_ea = (
-        diagnosed(
-            quadruped,
-            ByDistance(),
-            dataclasses.replace(SMALL, diagnostic_search=search),
-            damage,
-        )[0]
-        for search in (STEPWISE, EA)
+        diagnosed(quadruped, BY_DISTANCE, search, damage, trials=1)[0] for search in (STEPWISE, EA)
     )
     assert str(by_steps.best) == damage
     assert by_steps.verdict == "explained"
@@ -120,13 +129,12 @@ def test_one_distance_is_searched_step_by_step_to_the_damage_that_the_small_ea_m
 
 @pytest.mark.parametrize("comparator", [FORWARD_DISPLACEMENT, SEGMENT_PREDICTION])
 @pytest.mark.parametrize("search", DIAGNOSTIC_SEARCHES)
-@pytest.mark.parametrize("limit", [500, 2500])
+@pytest.mark.parametrize("limit", [500, 1500])
 def test_no_search_simulates_more_than_its_limit_and_one_that_reaches_it_does_not_judge(
     quadruped: Robot, comparator: Comparator, search: str, limit: int
 ):
-    settings = dataclasses.replace(SMALL, diagnostic_search=search, max_simulated_steps=limit)
     damage, trials = "break:front_left_shoulder+jam:back_right_knee", 2
-    found, _ = diagnosed(quadruped, comparator, settings, damage, trials=trials)
+    found, _ = diagnosed(quadruped, comparator, search, damage, trials=trials, limit=limit)
     assert found.cost.control_steps <= limit * trials
     # The limit was reached: less is left than a hypothesis needs in a trial.
     assert found.cost.control_steps > limit * trials - 400 or found.doubt is None
@@ -139,12 +147,10 @@ def test_no_search_simulates_more_than_its_limit_and_one_that_reaches_it_does_no
 def test_a_limit_that_is_reached_in_the_verdict_changes_no_best_hypothesis(
     quadruped: Robot, comparator: Comparator, search: str
 ):
-    settings = dataclasses.replace(SMALL, diagnostic_search=search)
     damage = "break:front_left_knee"
-    whole, _ = diagnosed(quadruped, comparator, settings, damage)
+    whole, _ = diagnosed(quadruped, comparator, search, damage)
     limit = whole.cost.control_steps - 1
-    limited = dataclasses.replace(settings, max_simulated_steps=limit)
-    found, _ = diagnosed(quadruped, comparator, limited, damage)
+    found, _ = diagnosed(quadruped, comparator, search, damage, limit=limit)
     assert (found.best, found.verdict) == (whole.best, "not judged")
     assert "best hypothesis until then" in verdict_sentences(found)
 
@@ -154,7 +160,7 @@ def test_one_distance_a_trial_is_compared_by_its_sum_and_many_losses_one_by_one(
         trial_of(quadruped, "intact", one, steps=60) for one in random_controllers(quadruped, 3)
     ]
     hypotheses = [INTACT, parse("break:front_left_knee", quadruped.anatomy)]
-    table = LossTable(Simulator(quadruped, 1), ByDistance())
+    table = LossTable(Simulator(quadruped, 1), BY_DISTANCE)
     losses = table.losses(hypotheses, trials)
     assert losses.shape == (2, 3)
     np.testing.assert_array_equal(table.compared(hypotheses, trials)[:, 0], losses.sum(axis=1))
@@ -166,9 +172,8 @@ def test_one_distance_a_trial_is_compared_by_its_sum_and_many_losses_one_by_one(
 
 def test_a_limit_with_which_nothing_can_be_simulated_is_refused(quadruped: Robot):
     # An ensemble has more rollouts than one.
-    settings = dataclasses.replace(SMALL, max_simulated_steps=60)
     with pytest.raises(InputError, match="got 60 for 1"):
-        diagnosed(quadruped, NOISY_TRANSFER, settings, "intact")
+        diagnosed(quadruped, NOISY_TRANSFER, EA, "intact", limit=60)
 
 
 @pytest.mark.parametrize(

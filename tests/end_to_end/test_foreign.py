@@ -90,6 +90,7 @@ def test_a_gap_changes_each_limb_and_motor_independently_and_none_changes_nothin
     assert real.opt.timestep == 0.001
 
 
+@pytest.mark.search
 def test_every_case_has_faults_of_known_kinds_that_compile_on_every_robot(machine: Robot):
     for name, case in CASES.items():
         faults = faults_of(case, machine, 3)

@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from signal import SIGINT, raise_signal
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_log, save_controller
 from selfmodel.physical.simulated import SimulatedRobot, draw_gap
+from selfmodel.recovery import RecoveryLoop
 from selfmodel.recovery.layers import layered
 from selfmodel.recovery.tracking import following
 from selfmodel.robot.robot import Robot
@@ -36,7 +38,7 @@ from selfmodel.simulation.trial_replay import replay
 from selfmodel.trials.signals import MEASUREMENT_FULL_SCALES, SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory, collect
 from tests.helpers.bench import NAMES, STEPS, Bench, bench_robot, observation
-from tests.helpers.command import SMALL, printed, refused, succeeds
+from tests.helpers.command import SMALL, printed, refused, selfmodel, succeeds
 from tests.helpers.hostile import unstable
 from tests.helpers.policies import (
     POLICY,
@@ -340,6 +342,7 @@ def test_a_robot_is_not_sent_commands_that_are_not_finite(tmp_path: Path, quadru
 RECOVER = (
     *("recover", "quadruped", "--case", "1", *SMALL, "--steps", "30", "--trials", "1"),
     *("--comparator", "forward-displacement", "--kinds", "paper", "--no-calibrate"),
+    *("--diagnostic-search", "ea"),
     *("--gap", "0.05", "--out", "run", "--json"),
 )
 
@@ -357,8 +360,15 @@ def test_a_recovery_of_a_policy_is_scored_by_the_velocity_that_it_is_commanded(
     refused(*RECOVER, "--score", "velocity", said="give --controller policy.toml", cwd=tmp_path)
 
 
+def before(folder: Path, patch: pytest.MonkeyPatch, *options: str) -> Controller:
+    """Returns the controller before the failure of a recovery in ``again``, which ends there."""
+    patch.setattr(RecoveryLoop, "_diagnose", lambda *_: raise_signal(SIGINT))
+    assert selfmodel(*RECOVER, *options, "--out", "again", cwd=folder).returncode == 130
+    return read_log(folder / "again" / "trials" / "00-before.mcap").trial.plan.controller
+
+
 def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
-    tmp_path: Path, quadruped: Robot
+    tmp_path: Path, quadruped: Robot, monkeypatch: pytest.MonkeyPatch
 ):
     policy = policy_of(tmp_path, quadruped)
     found = printed(*RECOVER, "--controller", "policy.toml", cwd=tmp_path)
@@ -371,20 +381,21 @@ def test_a_recovery_keeps_the_policy_and_evolves_a_layer_around_it(
     assert {driver.design.base for driver in drivers} == {policy}
     assert not any(driver.genome.any() for driver in drivers[:2]), "the policy as it is"
 
-    repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
-    (again, *_) = printed(*RECOVER, *repaired, cwd=tmp_path)["trials"]
-    assert read_log(tmp_path / again["log"]).trial.plan.controller == drivers[2]
+    repaired = ("--controller", found["trials"][2]["log"])
+    assert before(tmp_path, monkeypatch, *repaired) == drivers[2]
 
 
-def test_a_recovery_fine_tunes_the_last_layer_of_a_policy(tmp_path: Path, quadruped: Robot):
+def test_a_recovery_fine_tunes_the_last_layer_of_a_policy(
+    tmp_path: Path, quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
     policy = policy_of(tmp_path, quadruped)
     options = ("--controller", "policy.toml", "--repair", "finetune", "--seed", "1")
     found = printed(*RECOVER, *options, cwd=tmp_path)
     logs = [tmp_path / trial["log"] for trial in found["trials"]]
-    before, _, last = (read_log(path).trial.plan.controller for path in logs)
+    healthy, _, last = (read_log(path).trial.plan.controller for path in logs)
 
     assert (found["repair"], found["controller"]) == ("finetune", "policy")
-    assert before == policy
+    assert healthy == policy
     assert isinstance(last.design, Finetuned)
     assert last.design.graph == policy.design.graph
     assert last.genome.any()
@@ -396,7 +407,6 @@ def test_a_recovery_fine_tunes_the_last_layer_of_a_policy(tmp_path: Path, quadru
     succeeds("trial", "quadruped", *walk, cwd=tmp_path)
     assert printed("replay", "walk.mcap", "--json", cwd=tmp_path)["identical"] is True
 
-    repaired = ("--controller", found["trials"][2]["log"], "--out", "again")
-    (again, *_) = printed(*RECOVER, *repaired, "--repair", "finetune", cwd=tmp_path)["trials"]
-    assert read_log(tmp_path / again["log"]).trial.plan.controller == last
+    repaired = ("--controller", found["trials"][2]["log"])
+    assert before(tmp_path, monkeypatch, *repaired, "--repair", "finetune") == last
     refused(*RECOVER, "--repair", "finetune", said="needs a controller", cwd=tmp_path)

@@ -24,7 +24,7 @@ from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import Trajectory
 from tests.helpers.robots.arms import arm
 
-SMALL = selfmodel.Settings(steps=60, trials=1, generations=1).scaled(4)
+SMALL = selfmodel.Settings(steps=60, trials=1, generations=1, diagnostic_search="ea").scaled(4)
 KNEE = "break:front_left_knee"
 ONBOARD: tuple[Signal, ...] = (
     *("sensors", "joint_positions", "joint_velocities"),
@@ -63,6 +63,7 @@ def test_a_score_that_the_robot_cannot_have_is_refused_at_the_first_sign_with_ot
     assert len(list(tmp_path.rglob("*.mcap"))) == trials
 
 
+@pytest.mark.search
 def test_a_robot_without_odometry_recovers_by_its_steps(tmp_path: Path):
     _, physical = robots(observe=onboard, signals=ONBOARD)
     found = selfmodel.recover(

@@ -104,6 +104,7 @@ def test_offspring_is_of_every_controller_that_was_tried_and_is_none_of_them(
             assert len(pool) == 1, "every mutant equals its parent: a random controller"
 
 
+@pytest.mark.search
 def test_what_is_asked_is_bred_to_ask_more_and_of_its_seed_at_any_number_of_threads(
     quadruped: Robot, monkeypatch: pytest.MonkeyPatch
 ):

@@ -23,8 +23,8 @@ from selfmodel.errors import InputError
 from selfmodel.evolution import Draw, Evolution, Generation
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import read_truth, reader
 from selfmodel.logs.journal import create_journal
 from selfmodel.logs.log_file import Contents
@@ -52,6 +52,7 @@ from tests.helpers.gaits import changed, gait, logged
 from tests.helpers.memory import in_memory
 
 TINY = dataclasses.replace(Settings().scaled(6), generations=2, steps=60, diagnostic_search="ea")
+KINDS = (BROKEN, JAMMED)
 TRUTH, ALIKE = "break:back_left_knee", "jam:front_left_knee"
 
 
@@ -82,7 +83,7 @@ def recovery(
         "settings": TINY,
         "seed": 5,
         "on_event": lambda _event: None,
-        "kinds": PAPER_KINDS,
+        "kinds": KINDS,
         "make_repair": RepairSearch,
     }
     truth = parse(changes.pop("truth", TRUTH), robot.anatomy)
@@ -185,7 +186,7 @@ def test_every_search_starts_from_what_the_database_holds(
 ):
     started, trials = watched.started, watched.outcome.trials
     genomes = [trial.plan.controller.genome.tobytes() for trial in trials]
-    space = HypothesisSpace(quadruped.anatomy, PAPER_KINDS)
+    space = HypothesisSpace(quadruped.anatomy, KINDS)
     encoded = [
         [space.encode(c.hypothesis, TINY.genes).tobytes() for c in diagnosis.ranked]
         for diagnosis in watched.diagnoses
@@ -403,7 +404,9 @@ def test_logged_trials_are_diagnosed_in_turn_and_each_diagnosis_seeds_the_next(q
     trials, events = trials_of(quadruped, 3), []
 
     def search(threads: int) -> DiagnosticSearch:
-        return DiagnosticSearch(Simulator(quadruped, threads), FORWARD_DISPLACEMENT, TINY)
+        return DiagnosticSearch(
+            Simulator(quadruped, threads), FORWARD_DISPLACEMENT, TINY, (BROKEN, JAMMED)
+        )
 
     last = diagnose_trials(trials, search(2), 4, events.append)
     diagnoses = [event for event in events if isinstance(event, Diagnosis)]
@@ -419,7 +422,7 @@ def test_a_trial_that_other_software_drove_is_explained_by_its_commands(quadrupe
     (trial,) = trials_of(quadruped, 1)
     playback = Playback(quadruped.anatomy.motors, trial.trajectory["commands"])
     plan = dataclasses.replace(trial.plan, controller=playback)
-    search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, TINY)
+    search = DiagnosticSearch(Simulator(quadruped, 2), FORWARD_DISPLACEMENT, TINY, KINDS)
     hypotheses = [parse(text, quadruped.anatomy) for text in (TRUTH, "intact")]
     exact, other = search.losses.distances(hypotheses, [dataclasses.replace(trial, plan=plan)])
 

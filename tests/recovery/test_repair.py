@@ -155,7 +155,7 @@ def test_a_rollout_ends_at_a_fall_where_nothing_counts_after_it_to_the_same_bits
         own = dataclasses.replace(score, ends_at_fall=ends)
         simulator = Simulator(hopper, 1)
         fitness = RobustFitness(simulator, own, (INTACT,), certain)
-        found.append(fitness(drivers, 3, 250, np.random.default_rng(0)))
+        found.append(fitness(drivers, 2, 150, np.random.default_rng(0)))
         steps.append(simulator.stats.steps)
 
     assert found[0].tobytes() == found[1].tobytes()

@@ -13,7 +13,7 @@ from tests.helpers.command import selfmodel
 RECOVER = (
     *("recover", "quadruped", "--case", "2", "--gap", "0.1", "--population", "6"),
     *("--generations", "1", "--steps", "60", "--trials", "1", "--repair", "paper"),
-    *("--kinds", "paper", "--out", "run"),
+    *("--kinds", "break,jam", "--out", "run"),
 )
 
 

@@ -1,4 +1,4 @@
-"""Promises of the observations of tasks: dm_control's to the bit, wherever a policy runs."""
+"""Promises of the observations of tasks: those of dm_control, wherever a policy runs."""
 
 from pathlib import Path
 
@@ -49,7 +49,7 @@ def test_six_domains_have_an_observation():
 
 
 @pytest.mark.parametrize("parts", SUPPORTED, ids="-".join)
-def test_an_observation_of_many_states_is_dm_controls_to_the_bit(parts: tuple[str, str]):
+def test_an_observation_of_many_states_is_dm_controls(parts: tuple[str, str]):
     robot, states = suite_bodies.robot(*parts), 4
     make, task = suite_bodies.episode_parts(*parts)
     physics, rng, model = make(robot.model), np.random.default_rng(3), robot.model
@@ -68,7 +68,9 @@ def test_an_observation_of_many_states_is_dm_controls_to_the_bit(parts: tuple[st
         rows.append(flat(task.get_observation(physics)))
     batch.forward()
 
-    np.testing.assert_array_equal(observe(), rows)
+    # dm_control turns points by BLAS, whose last bit depends on the processor.
+    atol = 1e-15 if parts[0] in ("humanoid", "fish") else 0
+    np.testing.assert_allclose(observe(), rows, rtol=0, atol=atol)
 
 
 @pytest.mark.parametrize("body", ["suite-walker-walk", "suite-hopper-hop", "suite-fish-upright"])

@@ -214,14 +214,14 @@ def test_a_cut_between_two_messages_of_a_step_loses_that_step_alone(
     recording = import_recording(bag, mapping, biped)
     path = write_recording(tmp_path / "trial.mcap", biped, recording, mapping, None)
     content, steps = path.read_bytes(), []
-    for number, end in enumerate(range(len(content) // 2, len(content), len(content) // 28)):
+    for number, end in enumerate(range(len(content) // 2, len(content), len(content) // 20)):
         path.write_bytes(content[:end])
         salvage(path, tmp_path / f"{number}.mcap")
         saved = read_log(tmp_path / f"{number}.mcap")
         assert len(saved.acceleration) == saved.trial.trajectory.steps
         steps.append(saved.trial.trajectory.steps)
     assert steps == sorted(steps)
-    assert len(set(steps)) > 5
+    assert len(set(steps)) > 4
 
 
 def test_a_recording_with_jitter_has_its_gap_marked_and_its_angles_right(
