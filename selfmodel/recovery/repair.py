@@ -10,7 +10,7 @@ transfer).
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -65,6 +65,10 @@ repair is larger: every candidate has one condition and then two."""
 
 VIABLE = 0.5
 """Smallest share of the last conditions in which the rollouts of a candidate remain finite."""
+
+HEADINGS = 0.3
+"""Standard deviation of the initial heading of rollouts of controllers that hold theirs, rad: what
+turns a physical robot is in no model, and such a controller has to turn it back."""
 
 TAIL = 0.25
 """Fraction of the conditions, those with the lowest scores, that count as the lower tail."""
@@ -239,7 +243,11 @@ class RobustRepair:
         A small search may end far below a known controller; its mutants, which are compared too, do
         not. A candidate whose rollouts diverged under most conditions is left out.
         """
-        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
+        drawn = uncertainty()
+        if self.design.observes:
+            start = replace(drawn.start, heading=HEADINGS)
+            drawn = replace(drawn, start=start)
+        fitness = RobustFitness(self.simulator, self.score, hypotheses, drawn)
         comparisons = comparisons_of(self.settings)
         compared = sum(candidates * conditions for candidates, conditions in comparisons)
         known = [controller for controller in seeds if controller.design == self.design]

@@ -43,11 +43,13 @@ DRAWN_STEPS = 50
 class StartSpread:
     """Standard deviations of initial poses from the reference pose of a model.
 
-    They are those of the joint angles, and of the roll and the pitch of the base, rad.
+    They are those of the joint angles, of the roll and the pitch of the base, and of its heading,
+    rad.
     """
 
     angles: float
     tilt: float
+    heading: float = 0.0
 
 
 NO_SPREAD = StartSpread(0.0, 0.0)
@@ -148,15 +150,17 @@ def randomize_initial_pose(
 ) -> None:
     """Moves a robot from its reference pose to a random pose nearby, above the ground.
 
-    Joint angles stay within their limits. Welded joints and the heading are unchanged, and so are
-    degrees of freedom that the base does not have, such as the tilt of a planar base. ``data`` is
-    the reference pose of the robot with its faults.
+    Joint angles stay within their limits. Welded joints are unchanged, and so are degrees of
+    freedom that the base does not have, such as the tilt of a planar base. ``data`` is the
+    reference pose of the robot with its faults.
     """
     model = data.model
     fields, write = signal_fields(robot, model), state_writer(robot, bind_data(data), model)
     reference_depth = _penetration_depth(robot, data)
     randomize_joint_angles(robot.anatomy, model, data, spread.angles, rng)
     tilt = np.append(spread.tilt * rng.standard_normal(2), 0.0)
+    if spread.heading:
+        tilt[2] = spread.heading * rng.standard_normal()
     base = rotated_by_vector(current_value(fields["base_orientation"], data), tilt)
     write({"base_orientation": base[np.newaxis]})
     # Penetration no deeper than in the reference pose: deeper contacts would throw the robot up.
