@@ -1,5 +1,6 @@
 """Promises of the public functions: names, paths and objects are equal arguments; clear errors."""
 
+import dataclasses
 import json
 from pathlib import Path
 from unittest.mock import Mock
@@ -49,6 +50,21 @@ def test_logs_whose_stages_say_the_opposite_are_refused_and_others_are_not():
         diagnosis(BEFORE, AFTER)
     both = diagnosis([BEFORE, AFTER], LOGS / "02-recovery.mcap")
     assert both.trials == 2, "given as healthy, whatever the stage"
+
+
+def test_a_diagnosis_begins_from_what_is_known_and_has_as_many_faults_as_its_genes(
+    reference: selfmodel.Diagnosis,
+):
+    def ranked(found: selfmodel.Diagnosis) -> list[selfmodel.Hypothesis]:
+        return [one.hypothesis for one in found.ranked]
+
+    payload = selfmodel.parse_hypothesis("payload=0.2", "quadruped")  # of no searched kind
+    assert payload not in ranked(reference)
+    few = dataclasses.replace(SMALL, genes=1)
+    for known in (payload, str(payload)):
+        found = ranked(diagnosis(hypothesis=known, settings=few))
+        assert payload in found
+        assert {len(one) for one in found} == {0, 1}
 
 
 def recovered(folder: Path, **options: object) -> selfmodel.Recovery:

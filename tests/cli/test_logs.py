@@ -244,7 +244,11 @@ def test_diagnosis_shows_its_ranking_and_takes_another_self_model(
     diagnose = ("diagnose", str(log), *PAPERS)
     named = succeeds(*diagnose, "--robot", "quadruped", cwd=tmp_path)
     own = printed(*diagnose, "--robot", "mine.xml", "--json", cwd=tmp_path)
+    begun = ("--hypothesis", "payload=0.2", "--genes", "1")
+    known = printed(*diagnose, *begun, "--json", cwd=tmp_path)["diagnosis"]
 
+    assert "payload=0.2" in {one["hypothesis"] for one in known}
+    assert not any("+" in one["hypothesis"] for one in known)
     assert own["diagnosis"][0]["hypothesis"] in named.stdout
     assert "1 log, forward-displacement" in named.stdout
     assert "diagnosis from 1 trial" in named.stderr
