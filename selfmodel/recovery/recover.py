@@ -24,10 +24,17 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
+from selfmodel.recovery.result import (
+    Event,
+    Recovery,
+    SearchBegins,
+    SelfModelWarning,
+    TrialScore,
+)
 from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in, scores_of
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import RepairSettings, Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.domain import DomainDistribution
@@ -125,6 +132,7 @@ class RecoveryLoop:
         self._predicted: list[float] = []
         self._robust_means: list[float] = []
         self._scored: tuple[TrialScore, ...] = ()
+        self._warnings: list[str] = []
         assumed = partial(assumed_uncertainty, robot)
         gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
         self._log_trial(healthy, "before", gait)
@@ -169,7 +177,17 @@ class RecoveryLoop:
         repair = self._repairs[-1]
         candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
         self._means.update({each.controller: each.mean for each in candidates})
+        if not candidates[0].converged:
+            self._warn(
+                f"every finalist of the repair for {hypotheses[0]} loses more than a fifth of its "
+                f"score at a quarter of the physics time step: the self-model flatters; "
+                f"{finer_model(self.simulator.robot)}"
+            )
         return candidates
+
+    def _warn(self, text: str) -> None:
+        self._warnings.append(text)
+        self.on_event(SelfModelWarning(text))
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
         foreseen = stage != "after"
@@ -263,7 +281,17 @@ class RecoveryLoop:
             predicted=tuple(self._predicted),
             robust_means=tuple(self._robust_means),
             scored=self._scored,
+            warnings=tuple(self._warnings),
         )
+
+
+def finer_model(robot: Robot) -> str:
+    """Returns what to change about a robot whose motion depends on the time step, as text."""
+    timestep = float(robot.model.opt.timestep) / repairs.FINER
+    return (
+        f"give its model timestep={timestep:.6g}, or armature, the inertia of the rotors at the "
+        f"joints (`selfmodel robots FILE` has numbers)"
+    )
 
 
 NextTrial = Callable[[RecoveryLoop], Controller]

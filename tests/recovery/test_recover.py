@@ -35,7 +35,13 @@ from selfmodel.recovery import recover as module
 from selfmodel.recovery.next_trial import discriminating_controller
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, diagnose_trials
 from selfmodel.recovery.repair import CandidateController, RepairSearch
-from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
+from selfmodel.recovery.result import (
+    Event,
+    Recovery,
+    SearchBegins,
+    SelfModelWarning,
+    TrialScore,
+)
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
@@ -286,6 +292,31 @@ class StubRepair:
         self.hypotheses.append(tuple(map(str, hypotheses)))
         self.uncertainties.append(uncertainty())
         return tuple(CandidateController(one, np.array([9.0, 7.0])) for one in self._candidates)
+
+
+def test_a_repair_whose_every_finalist_is_flattered_is_a_warning(quadruped: Robot):
+    events: list[Event] = []
+
+    class Flattered(StubRepair):
+        def __call__(self, *given: object) -> tuple[CandidateController, ...]:
+            found = super().__call__(*given)
+            return tuple(dataclasses.replace(each, converged=False) for each in found)
+
+    repair = Flattered(random_controllers(quadruped, 3))
+    outcome = recovery(
+        quadruped,
+        settings=dataclasses.replace(TINY, trials=1),
+        on_event=events.append,
+        make_repair=lambda *_given: repair,
+    )
+
+    found = [text for text in outcome.warnings if "the self-model flatters" in text]
+    assert ["intact" in text for text in found] == [True, False]
+    step = quadruped.model.opt.timestep / 4
+    assert all(f"timestep={step:g}, or armature" in text for text in found)
+    assert {*found} <= {event.text for event in events if isinstance(event, SelfModelWarning)}
+    assert found[0] in repr(outcome)
+    assert outcome.to_dict()["warnings"] == list(outcome.warnings)
 
 
 @pytest.fixture
