@@ -129,6 +129,15 @@ class Robot:
         return mujoco.MjSpec.from_string(self.mjcf, assets=dict(self.assets))
 
 
+def mjcf_of(spec: mujoco.MjSpec) -> str:
+    """Returns a specification as MJCF: to six digits, but for the exact physics time step.
+
+    A control time step is a multiple of it, and 1/240 s has more than six digits.
+    """
+    step, text = float(spec.option.timestep), str(spec.to_xml())
+    return text.replace(f'timestep="{step:.6g}"', f'timestep="{step!r}"')
+
+
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _UNSUPPORTED_JOINTS = {
     int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
