@@ -100,11 +100,13 @@ class LayerRepair:
         small = {widened(one, known[0].design): one for one in tried}
         order = np.argsort(-values, kind="stable")
         rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
-        found = [small.get(known[k], known[k]) for k in rows]
-        finite = viable(found, scores[rows], fitness, self.evaluations)
+        finite = viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
         kept = converged(finite, fitness, self.settings.steps, again)
         better = takewhile(lambda one: one.controller != finite[-1].controller, kept)
-        return tuple(better) or kept[:1]
+        found = tuple(better) or kept[:1]
+        return tuple(
+            replace(one, controller=small.get(one.controller, one.controller)) for one in found
+        )
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
         """Returns the designs of changes of the controller, by their size."""

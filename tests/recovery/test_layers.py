@@ -46,6 +46,7 @@ def found_by(
     def scored(
         fitness: RobustFitness, layers: Sequence[Controller], count: int, *_: object
     ) -> np.ndarray:
+        assert len({one.design for one in layers}) == 1, "as a batch must have"
         intact = fitness.hypotheses == (INTACT,)
         share = 1.0 if fitness.simulator.robot is robot else finer
         values = [SOUND if intact else share * value(one.genome) for one in layers]
