@@ -205,6 +205,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
         recovery: Recovered displacement as a share of that before; None if that is not positive, or
             if the robot fell.
         evaluations: Number of evaluations, by the EA, and of simulations.
+        warnings: Where the self-model foresees more than the robot does, with the likely cause.
         settings: Parameters of the recovery, of ``result.json``.
         repair_settings: Those of the repair, where they are others.
     """
@@ -226,6 +227,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
     displacement: dict[str, float | None] = {}  # a struct copies it
     recovery: float | None = None
     evaluations: dict[str, int] = {}
+    warnings: tuple[str, ...] = ()
     settings: dict[str, Any] | UnsetType = UNSET
     repair_settings: dict[str, Any] | UnsetType = UNSET
 

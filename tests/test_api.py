@@ -118,13 +118,15 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path: Path, reference: self
 
 
 def test_a_recovery_is_readable_serialisable_and_a_table(recovery: selfmodel.Recovery):
-    first, heading, *rows = repr(recovery).splitlines()
+    first, heading, *lines = repr(recovery).removesuffix(">").splitlines()
+    rows, warned = lines[:3], lines[3:]
 
     assert first == f"<Recovery: {recovery.diagnosis.best}, {recovery.diagnosis.verdict}"
     assert heading.split() == f"trial best hypothesis so far {recovery.score.name}, m".split()
     assert [row.split()[0] for row in rows] == ["00-before", "01-after", "02-recovery"]
-    values = [float(row.rstrip(">").split()[2].rstrip(",")) for row in rows]
+    values = [float(row.split()[2].rstrip(",")) for row in rows]
     assert values == pytest.approx(recovery.scores, abs=5e-4)
+    assert warned == [f"  warning: {text}" for text in recovery.warnings]
     values = json.loads(json.dumps(recovery.to_dict(), allow_nan=False))
     assert values["displacement"]["after"] == recovery.after
     table = recovery.to_pandas().astype(object)

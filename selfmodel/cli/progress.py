@@ -17,7 +17,13 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.progress import Progress, time_left, timed
 from selfmodel.recovery.falls import fall_of, fall_text
-from selfmodel.recovery.result import DiscriminatingTrial, Event, SearchBegins, TrialScore
+from selfmodel.recovery.result import (
+    DiscriminatingTrial,
+    Event,
+    SearchBegins,
+    SelfModelWarning,
+    TrialScore,
+)
 from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import UNDETERMINED, Calibration
@@ -81,7 +87,7 @@ class _Events(Display):
                     self.print_lines(f"{self._search}: {event}")
             case Progress():
                 self._stage(event)
-            case ChosenComparator() | DiscriminatingTrial():
+            case ChosenComparator() | DiscriminatingTrial() | SelfModelWarning():
                 self.print_lines(str(event))
             case Calibration():
                 self.print_lines(*_fit_lines(event))

@@ -141,6 +141,7 @@ def _print(found: results.RecoveryResult, recovery: Recovery, folder: Path) -> N
         f"{subject} {before} before, {after} after the failure, and {recovered} at best in "
         f"{counted(found.physical_trials, 'trial')} since.",
         *(["The robot fell in that trial, which is no recovery."] if found.fell else []),
+        *(f"Warning: {text}." for text in found.warnings),
         f"{evaluations['repair']} controllers and {evaluations['distinct_hypotheses']} distinct "
         f"hypotheses in {found.seconds:.0f} s; diverged: {evaluations['diverged']}.",
         f"Logs: {folder}",

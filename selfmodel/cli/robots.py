@@ -12,6 +12,7 @@ from selfmodel.robot.actuators import command_ranges, motor_joints
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import FixedBase, FreeBase, read_base
+from selfmodel.simulation.model_check import model_notes
 from selfmodel.studies import bodies
 from selfmodel.tasks import ROBOTS, Entry
 
@@ -26,8 +27,10 @@ def robots(options: Robots) -> None:
             _print_all(every)
         return
     entry = arguments.robot_entry(options.robot, options.model_settings or ())
-    notes = entry.robot().notes if arguments.is_model(options.robot) else ()
-    facts = {**_facts(entry), **_parts(entry.robot()), "notes": list(notes)}
+    robot, notes = entry.robot(), list[str]()
+    if arguments.is_model(options.robot):
+        notes = [*robot.notes, *model_notes(robot)]
+    facts = {**_facts(entry), **_parts(robot), "notes": notes}
     if options.as_json:
         print_json(facts)
         return

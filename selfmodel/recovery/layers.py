@@ -4,9 +4,11 @@ The search begins at what changes nothing, under the conditions of the robust re
 regains too little of what the failure took is followed by a larger one.
 """
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import takewhile
 from typing import ClassVar
 
 import numpy as np
@@ -28,6 +30,7 @@ from selfmodel.recovery.repair import (
     MakeSearch,
     RobustFitness,
     comparisons_of,
+    converged,
     robust,
     run_search,
     viable,
@@ -90,16 +93,20 @@ class LayerRepair:
             none = Controller(design, np.zeros(design.weights))
             known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
             known += self._evolved(fitness, known, rng, on_generation)
-            known, scores, intact = self._compared(fitness, known, rng)
+            known, scores, intact, again = self._compared(fitness, known, rng)
             values = robust(scores)
             if values.max() - values[-1] >= STALLED * (intact - values[-1]):
                 break
         small = {widened(one, known[0].design): one for one in tried}
         order = np.argsort(-values, kind="stable")
         rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
-        found = [small.get(known[k], known[k]) for k in rows]
-        *better, none_at_last = viable(found, scores[rows], fitness, self.evaluations)
-        return tuple(better) or (none_at_last,)
+        finite = viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
+        kept = converged(finite, fitness, self.settings.steps, again)
+        better = takewhile(lambda one: one.controller != finite[-1].controller, kept)
+        found = tuple(better) or kept[:1]
+        return tuple(
+            replace(one, controller=small.get(one.controller, one.controller)) for one in found
+        )
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
         """Returns the designs of changes of the controller, by their size."""
@@ -136,10 +143,11 @@ class LayerRepair:
 
     def _compared(
         self, fitness: RobustFitness, known: Sequence[Controller], rng: np.random.Generator
-    ) -> tuple[list[Controller], FloatArray, float]:
+    ) -> tuple[list[Controller], FloatArray, float, np.random.Generator]:
         """Returns the best of some layers and the first one, which is none, as the last.
 
-        With them are their scores, ``(n, conditions)``, and that of the intact robot without one.
+        With them are their scores, ``(n, conditions)``, that of the intact robot without one, and
+        the generator in the state in which the conditions were drawn.
         """
         (_, fewer), (_, conditions) = comparisons_of(self.settings)
         none, steps = known[0], self.settings.steps
@@ -147,7 +155,8 @@ class LayerRepair:
         best = [known[k] for k in np.argsort(-first, kind="stable")[:JUDGED] if k]
         intact = replace(fitness, hypotheses=(INTACT,))
         whole = robust(intact([none], conditions, steps, rng))[0]
-        return [*best, none], fitness([*best, none], conditions, steps, rng), float(whole)
+        again, compared = copy.deepcopy(rng), [*best, none]
+        return compared, fitness(compared, conditions, steps, rng), float(whole), again
 
 
 def features_of(

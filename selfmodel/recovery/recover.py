@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from selfmodel.controllers.controller import Controller, Design
+from selfmodel.controllers.controller import CommandSource, Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.diagnose import DiagnosticSearch
 from selfmodel.diagnosis.diagnosis import Diagnosis
@@ -24,10 +24,18 @@ from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
 from selfmodel.recovery.falls import fall_of
-from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
+from selfmodel.recovery.result import (
+    Event,
+    Recovery,
+    SearchBegins,
+    SelfModelWarning,
+    TrialScore,
+)
 from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in, scores_of
+from selfmodel.recovery.shortfall import advice, shortfall
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
+from selfmodel.robot.robot import Robot
 from selfmodel.settings import RepairSettings, Settings
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.domain import DomainDistribution
@@ -127,6 +135,7 @@ class RecoveryLoop:
         self._predicted: list[float] = []
         self._robust_means: list[float] = []
         self._scored: tuple[TrialScore, ...] = ()
+        self._warnings: list[str] = []
         assumed = partial(assumed_uncertainty, robot)
         gait = self.gait or self._evolved((INTACT,), assumed)[0].controller
         self._log_trial(healthy, "before", gait)
@@ -171,11 +180,23 @@ class RecoveryLoop:
         repair = self._repairs[-1]
         candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
         self._means.update({each.controller: each.mean for each in candidates})
+        if not candidates[0].converged:
+            self._warn(
+                f"every finalist of the repair for {hypotheses[0]} loses more than a fifth of its "
+                f"score at a quarter of the physics time step: the self-model flatters; "
+                f"{advice(self.simulator.robot)}"
+            )
         return candidates
+
+    def _warn(self, text: str) -> None:
+        self._warnings.append(text)
+        self.on_event(SelfModelWarning(text))
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
         foreseen = stage != "after"
-        self._predicted.append(self._predicted_score(controller) if foreseen else math.nan)
+        robot_now = self.simulator.robot
+        predicted = self._simulated_score(controller, robot_now) if foreseen else math.nan
+        self._predicted.append(predicted)
         mean = self._means.get(controller, math.nan) if foreseen else math.nan
         self._robust_means.append(mean)
         name = f"{len(self.trials):02d}-{stage}"
@@ -184,12 +205,12 @@ class RecoveryLoop:
         self.trials = (*self.trials, trial)
         self.on_event(trial)
 
-    def _predicted_score(self, controller: Controller) -> float:
-        """Returns the score of one simulation by the self-model, without noise; NaN if it diverges.
+    def _simulated_score(self, controller: CommandSource, robot: Robot) -> float:
+        """Returns the score of one simulation of a robot, without noise; NaN if it diverges.
 
         Its hypothesis is the best so far. The simulation is no cost of a search.
         """
-        best, robot = self._best_so_far, self.simulator.robot
+        best = self._best_so_far
         runs = Simulator(robot, threads=1).run(
             [(best, controller)], self.settings.steps, self.score.record
         )
@@ -213,8 +234,20 @@ class RecoveryLoop:
                 before, known = known, TrialScore(trial, hypothesis, self.score, value, fall)
                 if before is None or (before.value, before.fall) != (value, fall):
                     self.on_event(known)
+                if before is None:
+                    self._warn_of_shortfall(number, known)
             scored.append(known)
         self._scored = tuple(scored)
+
+    def _warn_of_shortfall(self, number: int, found: TrialScore) -> None:
+        """Warns of a new trial with less than half of the score that was predicted."""
+        mean = self._robust_means[number]
+        predicted = self._predicted[number] if math.isnan(mean) else mean
+        tried = self.diagnoses[number - 2].best if number > 1 else found.hypothesis
+        simulated = partial(self._simulated_score, found.trial.plan.controller)
+        text = shortfall(found, predicted, tried, self.simulator.robot, simulated)
+        if text is not None:
+            self._warn(text)
 
     def _fit_self_model(self) -> Calibration | None:
         """Fits the self-model to the healthy trials; a new repair simulates the fitted one."""
@@ -266,6 +299,7 @@ class RecoveryLoop:
             predicted=tuple(self._predicted),
             robust_means=tuple(self._robust_means),
             scored=self._scored,
+            warnings=tuple(self._warnings),
         )
 
 

@@ -8,6 +8,7 @@ Husbands and Harvey, "Noise and the reality gap" (ECAL 1995); the paper, section
 transfer).
 """
 
+import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -70,6 +71,11 @@ HEADINGS = 0.3
 """Standard deviation of the initial heading of rollouts of controllers that hold theirs, rad: what
 turns a physical robot is in no model, and such a controller has to turn it back."""
 
+FINER, LOSS = 4, 0.2
+"""Physics steps in place of each under which the last candidates are simulated again, and the share
+of its score that one of them may lose by that. The conditions are the first quarter of the last
+ones, so that the physics steps are as many as those of the last comparison."""
+
 TAIL = 0.25
 """Fraction of the conditions, those with the lowest scores, that count as the lower tail."""
 
@@ -79,10 +85,17 @@ class CandidateController:
     """A controller for the next trial, and its simulated score under each condition.
 
     There is a single score from a repair that simulates the self-model alone.
+
+    Attributes:
+        controller: The controller.
+        scores: Score under each condition; negative infinity for a rollout that diverged.
+        converged: Whether it keeps its score at a quarter of the physics time step; see
+            ``converged``. True of a repair that does not simulate that.
     """
 
     controller: Controller
     scores: FloatArray
+    converged: bool = True
 
     @property
     def mean(self) -> float:
@@ -269,10 +282,12 @@ class RobustRepair:
         # A search of one generation may have evaluated known controllers alone.
         candidates = new or [_random_controller(self.design, rng)]
         for count, conditions in comparisons:
+            again = copy.deepcopy(rng)
             scores = fitness(candidates[:count], conditions, self.settings.steps, rng)
             best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
             candidates, scores = [candidates[i] for i in best], scores[best]
-        return viable(candidates, scores, fitness, search.evaluations)
+        finite = viable(candidates, scores, fitness, search.evaluations)
+        return converged(finite, fitness, self.settings.steps, again)
 
 
 def run_search(
@@ -349,6 +364,35 @@ def viable(
         best_of = f"with the best {len(finite)} of {evaluations} controllers"
         raise _divergence(fitness.simulator, fitness.hypotheses[0], f"{share} {best_of}")
     return tuple(CandidateController(controllers[i], scores[i]) for i in rows)
+
+
+def converged(
+    candidates: Sequence[CandidateController],
+    fitness: RobustFitness,
+    steps: int,
+    rng: np.random.Generator,
+) -> tuple[CandidateController, ...]:
+    """Returns the candidates that keep their scores at a quarter of the physics time step.
+
+    A search finds the controllers that a model flatters: what a stiff servo or a massless rotor
+    does at a coarse time step is no motion of a robot. If none keeps its score, all are returned,
+    the best ones at a quarter of the step first, as not converged.
+
+    Args:
+        candidates: Candidates, best first.
+        fitness: What scored them.
+        steps: Control steps of a rollout.
+        rng: Random number generator in the state in which their conditions were drawn.
+    """
+    finer = replace(fitness, simulator=fitness.simulator.finer(FINER))
+    conditions = max(1, len(candidates[0].scores) // FINER)
+    before = robust(np.array([each.scores[:conditions] for each in candidates]))
+    after = robust(finer([each.controller for each in candidates], conditions, steps, rng))
+    keep = before - after <= LOSS * abs(before)
+    if keep.any():
+        return tuple(candidates[i] for i in np.flatnonzero(keep).tolist())
+    order = np.argsort(-after, kind="stable").tolist()
+    return tuple(replace(candidates[i], converged=False) for i in order)
 
 
 def robust(scores: FloatArray) -> FloatArray:

@@ -73,6 +73,16 @@ class TrialScore:
         return f"{self.value:.3f}{fall_text(self.fall)}{self.trial.early_end}"
 
 
+@dataclass(frozen=True)
+class SelfModelWarning:
+    """Sign that the self-model foresees more than the robot does, with the likely cause."""
+
+    text: str
+
+    def __str__(self) -> str:
+        return f"warning: {self.text}"
+
+
 Event = (
     SearchBegins
     | Generation
@@ -82,11 +92,13 @@ Event = (
     | DiscriminatingTrial
     | Trial
     | TrialScore
+    | SelfModelWarning
     | Diagnosis
 )
 """What a recovery or a diagnosis reports to a callback as it happens: the start or a generation of
 a search, the progress of another stage, the chosen comparator, the calibration, a finished trial,
-its score, a diagnosis. ``print`` shows each as text, those of a stage with the time left."""
+its score, a warning about the self-model, a diagnosis. ``print`` shows each as text, those of a
+stage with the time left."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +122,7 @@ class Recovery:
         scored: Score and fall of each trial; those after the failure under the last diagnosis.
         calibration: Fit of the self-model to the trials before the failure; None without one.
         score: Fitness of the repair.
+        warnings: Where the self-model foresees more than the robot does, with the likely cause.
     """
 
     trials: tuple[Trial, ...]
@@ -124,6 +137,7 @@ class Recovery:
     scored: tuple[TrialScore, ...]
     calibration: Calibration | None = None
     score: Score = DISPLACEMENT
+    warnings: tuple[str, ...] = ()
 
     @property
     def scores(self) -> tuple[float, ...]:
@@ -191,7 +205,8 @@ class Recovery:
             f"  {name:{widths[0]}}  {tried:{widths[1]}}  {result}" for name, tried, result in rows
         ]
         title = f"<Recovery: {self.diagnosis.best}, {self.diagnosis.verdict}"
-        return "\n".join([title, *lines]) + ">"
+        warnings = [f"  warning: {text}" for text in self.warnings]
+        return "\n".join([title, *lines, *warnings]) + ">"
 
     @property
     def table(self) -> list[tuple[str, str, str]]:
@@ -221,6 +236,7 @@ class Recovery:
                 "diagnostic": self.diagnostic_evaluations,
                 "distinct_hypotheses": self.distinct_hypotheses,
             },
+            "warnings": list(self.warnings),
         }
 
     def to_pandas(self) -> Any:  # noqa: ANN401  # pandas has no types

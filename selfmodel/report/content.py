@@ -99,7 +99,8 @@ def details(subject: Subject) -> tuple[str, ...]:
     """Returns what to do, the sentences of the verdict, and the truth where it is known."""
     diagnosis, result = subject.diagnosis, subject.result
     sentences = [summary(diagnosis)[1], verdict_sentences(diagnosis), fit_sentence(diagnosis)]
-    sentences += [_truth(result)] if result is not None else []
+    if result is not None:
+        sentences += [*(f"Warning: {one}." for one in result.warnings), _truth(result)]
     return tuple(sentence for sentence in sentences if sentence)
 
 

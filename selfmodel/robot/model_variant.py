@@ -194,9 +194,9 @@ class ModelVariant:
         the damping that slows the hinge, with all that it carries, with a time constant of 1 s.
         """
         model, dof = self.model, int(self.model.joint(hinge).dofadr[0])
-        if model.dof_damping[dof] or model.dof_dampingpoly[dof].any():
+        model.dof_dampingpoly[dof] *= factor
+        if model.dof_damping[dof]:
             model.dof_damping[dof] *= factor
-            model.dof_dampingpoly[dof] *= factor
         else:
             model.dof_damping[dof] = max(factor - 1, 0.0) * model.dof_M0[dof]
 

@@ -91,7 +91,7 @@ def read_urdf(root: ET.Element, files: Files, settings: MjcfSettings) -> Work:
     urdf = _checked(root, work)
     read_meshes(urdf, work, files)
     hinges = [j for j in urdf.findall("joint") if j.get("type") in HINGE_TYPES]
-    for values in (settings.kp, settings.kd, settings.effort, settings.pose):
+    for values in (settings.kp, settings.kd, settings.effort, settings.velocity, settings.pose):
         check_patterns(values, [j.get("name", "") for j in hinges])
     # Kept: the folders (none), links on fixed joints, such as feet, and the visuals.
     flags = {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
@@ -309,8 +309,15 @@ def _add_couplings(work: Work, hinges: list[ET.Element]) -> None:
 
 
 def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
-    """Adds a position servo for each joint that mimics no other."""
+    """Adds a position servo for each joint that mimics no other.
+
+    A servo has no torque left at the velocity limit of its joint, whatever its gains: the joint has
+    a resistance that is the effort there, and grows with the square of the speed. Unlike the linear
+    one of a motor's induced voltage, it is small at the low speeds of joints with a load, where
+    MuJoCo computes contacts without it.
+    """
     settings, names = work.settings, dict[str, list[str]]()
+    elements = {j.get("name"): j for j in work.section("worldbody").iter("joint")}
     actuators = work.section("actuator")
     for joint in [hinge for hinge in hinges if hinge.find("mimic") is None]:
         name, limit = joint.get("name", ""), joint.find("limit")
@@ -328,8 +335,13 @@ def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
         kp, kd = value_of(settings.kp, name), value_of(settings.kd, name)
         if kp is None:
             kp = effort / min(FULL_EFFORT_ERROR, (high - low) / 2)
+        velocity = value_of(settings.velocity, name)
+        velocity = _number(limit, "velocity") if velocity is None else velocity
+        if velocity > 0:
+            own = elements[name].get("damping", "0").split()[0]
+            elements[name].set("damping", f"{own} {effort / velocity / velocity!r}")
         if kd is None:
-            velocity, (least, most) = _number(limit, "velocity"), (kp * t for t in DAMPING_TIMES)
+            least, most = (kp * t for t in DAMPING_TIMES)
             kd = most if velocity <= 0 else min(max(effort / velocity, least), most)
         servo = {
             "name": name,
@@ -342,7 +354,8 @@ def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
             "forcelimited": "true",
         }
         ET.SubElement(actuators, "position", servo)
-        names.setdefault(f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m", []).append(name)
+        speed = f", {velocity:.3g} rad/s" if velocity > 0 else ""
+        names.setdefault(f"kp {kp:.3g}, kd {kd:.3g}, {effort:.3g} N m{speed}", []).append(name)
     for gains, joints in names.items():
         work.notes.append(f"position servos with {gains}: {listed(joints, _MAX_LISTED)}")
 

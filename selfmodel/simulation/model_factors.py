@@ -17,7 +17,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, IndexArray
 from selfmodel.robot.actuators import motor_joints
 from selfmodel.robot.anatomy import FITTED_CONTACTS, write_control_delay
-from selfmodel.robot.robot import Robot
+from selfmodel.robot.robot import Robot, mjcf_of
 
 SHARED = ("root_mass", "limb_mass", "friction", "damping")
 """Quantities with one factor for the whole robot."""
@@ -225,7 +225,7 @@ def with_parameters(robot: Robot, parameters: Parameters) -> Robot:
         return fitted
     spec = fitted.specification()
     spec.add_numeric(name=FITTED_CONTACTS, data=[1.0])
-    return dataclasses.replace(fitted, mjcf=spec.to_xml())
+    return dataclasses.replace(fitted, mjcf=mjcf_of(spec))
 
 
 def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
@@ -244,7 +244,7 @@ def with_model(robot: Robot, model: mujoco.MjModel, delay: float) -> Robot:
     spec.compile()
     spec.copy_back(model)
     write_control_delay(spec, delay)
-    return dataclasses.replace(robot, mjcf=spec.to_xml())
+    return dataclasses.replace(robot, mjcf=mjcf_of(spec))
 
 
 def kinds_of_joints(robot: Robot) -> IndexArray:

@@ -192,6 +192,7 @@ def result_of(experiment: Experiment, outcome: Outcome) -> results.RecoveryResul
             "simulated_steps": stats.steps,
             "diverged": stats.diverged,
         },
+        warnings=recovery.warnings,
         seconds=outcome.seconds,
     )
 

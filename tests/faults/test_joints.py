@@ -74,6 +74,15 @@ def test_a_locked_leg_is_the_jams_of_all_its_joints_as_one_fault(
         np.testing.assert_array_equal(*moved[signal], err_msg=signal)
 
 
+def test_a_damped_joint_is_damped_more_at_its_velocity_limit_too():
+    limited = BARE.replace('name="hip" axis', 'name="hip" damping="0 0.3" axis')
+    assert limited != BARE
+    damped = built(Robot("limited", limited, 0.02), "damping:hip=4")
+
+    assert damped.dof_dampingpoly[-1].tolist() == pytest.approx([1.2, 0])
+    assert damped.dof_damping[-1] > 0
+
+
 def test_joint_friction_is_that_part_of_the_largest_torque_of_one_joint(quadruped: Robot):
     stiff = built(quadruped, "joint-friction:front_left_knee=0.25")
 

@@ -36,14 +36,20 @@ def found_by(
     none: Controller,
     value: Callable[[np.ndarray], float],
     tried: Sequence[Controller] = (),
+    finer: float = 1.0,
 ) -> tuple[CandidateController, ...]:
-    """The candidates of a repair, in a world in which a layer has a value by its genome."""
+    """The candidates of a repair, in a world in which a layer has a value by its genome.
+
+    At a quarter of the time step the values are those times ``finer``.
+    """
 
     def scored(
         fitness: RobustFitness, layers: Sequence[Controller], count: int, *_: object
     ) -> np.ndarray:
+        assert len({one.design for one in layers}) == 1, "as a batch must have"
         intact = fitness.hypotheses == (INTACT,)
-        values = [SOUND if intact else value(one.genome) for one in layers]
+        share = 1.0 if fitness.simulator.robot is robot else finer
+        values = [SOUND if intact else share * value(one.genome) for one in layers]
         fitness.simulator.stats.steps += len(layers) * count * TINY.steps
         return np.repeat(values, count).reshape(len(layers), count)
 
@@ -69,6 +75,15 @@ def test_the_smallest_layer_that_regains_enough_is_the_repair(quadruped: Robot, 
     assert values == sorted(values, reverse=True)
     assert values[0] >= 0.8 * SOUND
     assert values[-1] > 0
+
+
+@pytest.mark.parametrize(("finer", "is_changed"), [(0.5, False), (0.9, True)])
+def test_a_layer_that_a_coarse_time_step_flatters_is_no_repair(
+    quadruped: Robot, none: Controller, finer: float, *, is_changed: bool
+):
+    found = found_by(quadruped, none, lambda genome: 5 * genome[0], finer=finer)
+    assert (found[0].controller != none) == is_changed
+    assert is_changed or len(found) == 1
 
 
 def test_a_search_that_stalls_goes_on_with_the_larger_layer(quadruped: Robot, none: Controller):

@@ -35,7 +35,13 @@ from selfmodel.recovery import recover as module
 from selfmodel.recovery.next_trial import discriminating_controller
 from selfmodel.recovery.recover import RecoveryLoop, by_repair, diagnose_trials
 from selfmodel.recovery.repair import CandidateController, RepairSearch
-from selfmodel.recovery.result import Event, Recovery, SearchBegins, TrialScore
+from selfmodel.recovery.result import (
+    Event,
+    Recovery,
+    SearchBegins,
+    SelfModelWarning,
+    TrialScore,
+)
 from selfmodel.recovery.scores import Score
 from selfmodel.robot.designs import DESIGNS
 from selfmodel.robot.robot import Robot
@@ -271,6 +277,7 @@ class StubRepair:
     """A repair that returns the same candidates every time, and notes what it received."""
 
     evaluations = 7
+    scores = np.array([-9.0, -7.0])
 
     def __init__(self, candidates: Sequence[Controller]) -> None:
         self._candidates = candidates
@@ -286,7 +293,36 @@ class StubRepair:
         """Returns the candidates, with a fitness that is no score of one simulation."""
         self.hypotheses.append(tuple(map(str, hypotheses)))
         self.uncertainties.append(uncertainty())
-        return tuple(CandidateController(one, np.array([9.0, 7.0])) for one in self._candidates)
+        return tuple(CandidateController(one, self.scores) for one in self._candidates)
+
+
+def test_a_repair_whose_every_finalist_is_flattered_is_a_warning(quadruped: Robot):
+    events: list[Event] = []
+
+    class Flattered(StubRepair):
+        scores = np.array([90.0, 70.0])
+
+        def __call__(self, *given: object) -> tuple[CandidateController, ...]:
+            found = super().__call__(*given)
+            return tuple(dataclasses.replace(each, converged=False) for each in found)
+
+    repair = Flattered(random_controllers(quadruped, 3))
+    outcome = recovery(
+        quadruped,
+        settings=dataclasses.replace(TINY, trials=1),
+        on_event=events.append,
+        make_repair=lambda *_given: repair,
+    )
+
+    found = [text for text in outcome.warnings if "the self-model flatters" in text]
+    assert ["intact" in text for text in found] == [True, False]
+    step = quadruped.model.opt.timestep / 4
+    assert all(f"timestep={step:g}, or armature" in text for text in found)
+    assert {*found} <= {event.text for event in events if isinstance(event, SelfModelWarning)}
+    assert found[0] in repr(outcome)
+    assert outcome.to_dict()["warnings"] == list(outcome.warnings)
+    short = [text for text in outcome.warnings if "where 80.000 m was predicted" in text]
+    assert [text.split(":")[0] for text in short] == ["trial 00-before", "trial 02-recovery"]
 
 
 @pytest.fixture
@@ -337,7 +373,7 @@ def test_a_repair_is_for_the_diagnosed_robot_and_its_candidates_are_tried_in_tur
     before, after, *later = stubbed.recovery.predicted
     assert [before, *later] == [one for k, one in enumerate(stubbed.recovery.scores) if k != 1]
     assert math.isnan(after)
-    np.testing.assert_equal(stubbed.recovery.robust_means, (8.0, math.nan, 8.0, 8.0))
+    np.testing.assert_equal(stubbed.recovery.robust_means, (-8.0, math.nan, -8.0, -8.0))
     # A prediction and a score of each trial, each computed once; none was predicted of the second.
     assert stubbed.scored == ["intact", "intact", TRUTH, *[TRUTH, TRUTH] * 2]
 

@@ -24,6 +24,7 @@ from selfmodel.recovery.repair import (
     RepairSearch,
     RobustFitness,
     RobustRepair,
+    converged,
     from_repertoire,
     robust,
     rollouts_of,
@@ -246,6 +247,67 @@ def test_a_candidate_whose_simulations_mostly_diverge_is_none(
             found_by(Simulator(quadruped, 2), TINY)
     else:
         assert len(found_by(Simulator(quadruped, 2), TINY)) == number
+
+
+COARSE = np.array([9.0, 8.0, 7.0])
+
+
+@pytest.mark.parametrize(
+    ("fine", "kept", "is_converged"),
+    [
+        ([9.0, 8.0, 7.0], [0, 1, 2], True),
+        ([7.3, 6.5, 5.7], [0, 1, 2], True),
+        ([7.3, 6.3, 8.0], [0, 2], True),
+        ([1.0, -np.inf, 5.0], [2, 0, 1], False),
+    ],
+)
+def test_a_finalist_that_loses_a_fifth_at_a_quarter_of_the_time_step_is_dropped(
+    quadruped: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    fine: list[float],
+    kept: list[int],
+    *,
+    is_converged: bool,
+):
+    controllers = random_controllers(quadruped, 3)
+    finalists = [
+        CandidateController(*own)
+        for own in zip(controllers, COARSE[:, None] + [0] * 8, strict=True)
+    ]
+
+    def scored(fitness: RobustFitness, given: list, count: int, *_: object) -> np.ndarray:
+        robot = fitness.simulator.robot
+        assert robot.model.opt.timestep == quadruped.model.opt.timestep / 4
+        assert (given, count) == (controllers, 2)
+        return np.repeat(fine, count).reshape(-1, count)
+
+    monkeypatch.setattr(RobustFitness, "__call__", scored)
+    fitness = fitness_of(Simulator(quadruped, 1))
+    found = converged(finalists, fitness, 40, np.random.default_rng(0))
+
+    assert [each.controller for each in found] == [controllers[k] for k in kept]
+    assert {each.converged for each in found} == {is_converged}
+
+
+def test_finalists_meet_the_first_of_their_last_conditions_again(
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch
+):
+    scores: list[np.ndarray] = []
+
+    def spied(fitness: RobustFitness, *given: object) -> np.ndarray:
+        scores.append(whole(fitness, *given))
+        return scores[-1]
+
+    whole = RobustFitness.__call__
+    monkeypatch.setattr(RobustFitness, "__call__", spied)
+    monkeypatch.setattr(module, "comparisons_of", lambda _: ((8, 2), (4, 8)))
+    plain = found_by(Simulator(quadruped, 2), TINY)
+    assert (scores[-1].shape, scores[-2].shape) == ((4, 2), (4, 8))
+    assert not np.array_equal(scores[-1], scores[-2][:, :2])
+    monkeypatch.setattr(module, "FINER", 1)
+    same = found_by(Simulator(quadruped, 2), TINY)
+    np.testing.assert_array_equal(scores[-1], scores[-2])
+    assert {each.controller for each in plain} <= {each.controller for each in same}
 
 
 @pytest.mark.parametrize(("population", "generations"), [(2, 1), (3, 2)])

@@ -38,6 +38,8 @@ def test_a_report_has_every_section_and_the_numbers_of_the_result(run: Path, sub
     assert report.headline.startswith(f"The quadruped moved {result['score']['before']:.3f} m")
     assert f"moved {result['score']['recovered']:.3f} m at best in 1 trial since" in report.headline
     assert summary(subject.diagnosis)[0] in report.headline
+    warnings = {one for one in report.verdict if one.startswith("Warning: ")}
+    assert warnings == {f"Warning: {one}." for one in result["warnings"]} != set()
     assert f"True faults: {result['truth']}, at a reality gap of 0.1" in report.verdict[-1]
     trials = report.sections[0].items[1]
     assert [row[6] for row in trials.rows] == [one["score"] for one in result["trials"]]

@@ -221,6 +221,35 @@ def test_a_servo_follows_from_the_limits_of_its_joint_and_the_settings(
     assert servo(**limits) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    ("given", "limit"),
+    [
+        ({}, 5.0),
+        ({"kp": 400, "kd": 0.1}, 5.0),
+        ({"kp": 100, "kd": 0, "damping": 0, "velocity": {"kn*": 3}}, 3.0),
+        ({"kp": 400, "kd": 0.1, "velocity": 0}, math.inf),
+    ],
+)
+def test_a_servo_turns_no_faster_than_the_velocity_limit_whatever_its_gains(
+    given: dict, limit: float, tmp_path: Path
+):
+    text = urdf(link("a"), link("b"), joint("knee", "a", "b", kind="continuous", velocity=5))
+    model = load_mjcf(written(tmp_path, text), checked_settings({**given, "base": "fixed"})).model
+    data, speeds = mujoco.MjData(model), []
+    for _ in range(300):
+        data.ctrl[0] = math.pi
+        mujoco.mj_step(model, data)
+        speeds.append(float(data.qvel[0]))
+    assert max(speeds) < 1.001 * limit
+    assert max(speeds) > (0.8 * limit if math.isfinite(limit) else 10)
+
+
+def test_a_velocity_limit_of_nearly_nothing_is_refused(tmp_path: Path):
+    text = urdf(link("a"), link("b"), joint("knee", "a", "b", velocity=1e-200))
+    with pytest.raises(InputError, match=r"walker\.urdf: the simulation diverges"):
+        load_mjcf(written(tmp_path, text, 'base = "fixed"'))
+
+
 def test_what_no_robot_needs_is_left_out_with_a_note():
     odom = link("odom", 0) + joint("float", "odom", "trunk", kind="floating")
     tail = link("tail") + joint("tail", "trunk", "tail", lower=0, upper=0)

@@ -99,6 +99,15 @@ def assert_alike(one: mujoco.MjModel, other: mujoco.MjModel) -> None:
         )
 
 
+def test_a_time_step_of_many_digits_stays_exact(quadruped: Robot):
+    text = quadruped.mjcf.replace('timestep="0.005"', f'timestep="{1 / 240!r}"')
+    robot = dataclasses.replace(quadruped, mjcf=text, control_timestep=4 / 240)
+    fitted = with_parameters(robot, some(robot))
+
+    assert fitted.model.opt.timestep == robot.model.opt.timestep == 1 / 240
+    assert (fitted.substeps, fitted.control_timestep) == (4, 4 / 240)
+
+
 def test_the_mjcf_of_a_robot_contains_its_parameters(robot: Robot):
     before, parameters = bits(robot.model), some(robot)
     fitted = with_parameters(robot, parameters)

@@ -2,6 +2,7 @@
 
 import copy
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -180,6 +181,18 @@ def test_a_batch_fits_into_the_available_memory(quadruped: Robot, request_: Requ
     assert 1 < size <= batch_bytes() / needed
     assert batch_bytes() < available_memory()
     assert largest_batch(quadruped, request_, 10**9) == 1  # simulated alone
+
+
+def test_a_finer_robot_differs_in_the_length_of_its_physics_steps_alone(robot: Robot):
+    finer = Simulator(robot).finer(4).robot
+    assert (finer.substeps, finer.control_timestep) == (4 * robot.substeps, robot.control_timestep)
+    assert (finer.control_delay, finer.anatomy) == (robot.control_delay, robot.anatomy)
+    same = copy.copy(finer.model)
+    same.opt.timestep = robot.model.opt.timestep
+    bits = [np.empty(mujoco.mj_sizeModel(each), np.uint8) for each in (same, robot.model)]
+    for model, buffer in zip((same, robot.model), bits, strict=True):
+        mujoco.mj_saveModel(model, None, buffer)
+    np.testing.assert_array_equal(*bits)
 
 
 def test_a_cache_computes_every_key_once():

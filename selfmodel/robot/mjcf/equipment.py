@@ -61,8 +61,9 @@ def set_physics(work: Work) -> None:
         check_patterns(values, hinges)
         for joint in joints:
             value = value_of(values, joint.get("name", ""))
-            if value is not None:
-                joint.set(attribute, repr(value))
+            if value is not None:  # the rest of a damping grows with the speed
+                rest = joint.get(attribute, "").split()[1:]
+                joint.set(attribute, " ".join([repr(value), *rest]))
     if settings.timestep is not None:
         work.section("option").set("timestep", repr(settings.timestep))
     if settings.solref is not None:

@@ -72,10 +72,10 @@ def adapt_message(request: Message) -> Message:
     if root.tag == "robot":
         work = read_urdf(root, files, settings)
         work.settings = replace(settings, kp={}, kd={})  # its motors are servos with these gains
-    elif settings.effort or settings.pose:
+    elif settings.effort or settings.velocity or settings.pose:
         raise InputError(
-            "effort and pose are settings for a URDF: in an MJCF, motors have a forcerange, and a "
-            "<key> in <keyframe> has the pose"
+            "effort, velocity and pose are settings for a URDF: in an MJCF, motors have a "
+            "forcerange, joints a damping, and a <key> in <keyframe> has the pose"
         )
     else:
         work = read_mjcf(root, files, settings, path.name)
@@ -174,12 +174,13 @@ def _control_timestep(work: Work) -> float:
         )
     if wanted is None:
         return max(1, math.ceil(MIN_CONTROL_TIMESTEP / physics - 1e-9)) * physics
-    if not math.isclose(max(1, round(wanted / physics)) * physics, wanted, rel_tol=1e-9):
+    multiple = max(1, round(wanted / physics)) * physics
+    if not math.isclose(multiple, wanted, rel_tol=1e-5):  # 1/60 s in six digits
         raise InputError(
             f"control_timestep must be a multiple of the physics time step {physics} s, got "
             f"{wanted} s"
         )
-    return wanted
+    return wanted if math.isclose(multiple, wanted, rel_tol=1e-9) else multiple
 
 
 def check_compiles(mjcf: str, assets: Mapping[str, bytes], control_timestep: float) -> None:

@@ -64,6 +64,7 @@ class MjcfSettings:
             hinges become position servos.
         kd: Derivative gains of the same servos, N m s/rad.
         effort: Largest torques instead of the effort limits of a URDF, N m.
+        velocity: Largest speeds instead of the velocity limits of a URDF, rad/s; 0 for none.
         pose: Joint angles of the initial pose of a URDF, rad; of other joints, the angle in the
             range of the joint that is nearest to 0.
         armature: Inertias of rotors, seen at their hinges, kg m².
@@ -89,6 +90,7 @@ class MjcfSettings:
     kp: Positive = field(default_factory=dict)
     kd: NotNegative = field(default_factory=dict)
     effort: NotNegative = field(default_factory=dict)
+    velocity: NotNegative = field(default_factory=dict)
     pose: Angles = field(default_factory=dict)
     armature: NotNegative = field(default_factory=dict)
     damping: NotNegative = field(default_factory=dict)
@@ -177,6 +179,7 @@ _NEEDED: Mapping[str, str] = {
     "kp": f"{_GAIN}kp = 40 or kp = {{knee = 40}}",
     "kd": f"{_LIMIT}kd = 1 or kd = {{knee = 1}}",
     "effort": f"{_LIMIT}effort = 20 or effort = {{knee = 20}}",
+    "velocity": f"{_LIMIT}velocity = 6 or velocity = {{knee = 6}}",
     "armature": f"{_LIMIT}armature = 0.005 or armature = {{knee = 0.005}}",
     "damping": f"{_LIMIT}damping = 0.1 or damping = {{knee = 0.1}}",
     "friction": f"{_LIMIT}friction = 0.05 or friction = {{knee = 0.05}}",
@@ -190,7 +193,7 @@ _NEEDED: Mapping[str, str] = {
 }
 """What a setting needs, for error messages."""
 
-_BY_JOINT = ("kp", "kd", "effort", "armature", "damping", "friction", "reach")
+_BY_JOINT = ("kp", "kd", "effort", "velocity", "armature", "damping", "friction", "reach")
 """Settings for which one number is for all joints."""
 
 _MAX_QUOTED = 200

@@ -10,6 +10,7 @@ import numpy as np
 from selfmodel.errors import InputError
 from selfmodel.robot.mjcf.work import UniqueNames, Work, format_numbers
 from selfmodel.robot.mujoco_errors import loading_a_model
+from selfmodel.robot.robot import mjcf_of
 
 MIN_ITERATIONS = {"iterations": 100, "ls_iterations": 50}
 """Least iterations of a solver without warm start, MuJoCo's defaults, by option. A Unitree Go1 with
@@ -55,7 +56,7 @@ def expand(work: Work) -> None:
         with loading_a_model():
             spec = mujoco.MjSpec.from_string(work.text, assets=work.assets)
             spec.compile()
-            work.root = ET.fromstring(spec.to_xml())  # noqa: S314  # the text is from MuJoCo
+            work.root = ET.fromstring(mjcf_of(spec))  # noqa: S314  # the text is from MuJoCo
         _dissolve_frames(work)
         work.notes.append(
             f"MuJoCo wrote out the <{'>, <'.join(used)}> elements, with numbers of six digits"

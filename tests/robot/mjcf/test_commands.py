@@ -45,7 +45,9 @@ def test_the_parts_of_a_robot_are_shown(ant: Path, tmp_path: Path):
     assert {"break", "jam", "sensor", "motor", "friction"} <= {f["kind"] for f in told["faults"]}
     assert "8 angle sensors and 4 touch sensors were added" in told["notes"]
     assert all(name in shown for name in ("torso", "ankle_1_touch", "break:", "note: "))
-    assert max(map(len, shown.splitlines()[:-2])) <= 60
+    tables = [line for line in shown.splitlines() if not line.startswith("note: ")]
+    assert max(map(len, tables)) <= 60
+    assert "set timestep to 0.005" in told["notes"][-1], "1.96 m in place of 1.72 m"
 
 
 def test_settings_are_options(ant: Path, tmp_path: Path):

@@ -61,6 +61,16 @@ def test_the_physics_of_joints_and_contacts_is_that_of_the_settings(tmp_path: Pa
     assert not model.dof_damping[:6].any()
 
 
+@pytest.mark.parametrize("digits", [6, 16])
+def test_a_time_step_of_many_digits_may_be_written_with_few(digits: int, tmp_path: Path):
+    steps = f"timestep={1 / 240:.{digits}g}", f"control_timestep={4 / 240:.{digits}g}"
+    copied = f'{LEGS}<replicate count="1"><geom size="0.1" pos="9 0 0"/></replicate>'
+    for text in (mjcf(), mjcf(legs=copied)):
+        robot = loaded(tmp_path, text, *steps)
+        assert robot.substeps == 4
+        assert robot.control_timestep == pytest.approx(1 / 60, rel=1e-5)
+
+
 @pytest.mark.parametrize("remedy", ["timestep", "armature"])
 def test_stiff_servos_have_a_note_whose_remedies_end_it(remedy: str, tmp_path: Path):
     def notes(*given: str) -> list[str]:
