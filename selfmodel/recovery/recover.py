@@ -130,7 +130,8 @@ class RecoveryLoop:
             check_limit(limit, self.choose_comparator, still, robot)
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(robot)
-        self._repairs = [self._repair_in_simulator()]
+        self._repairs: list[repairs.Repair] = []
+        self._repair_in(self.simulator)
         self._means: dict[Controller, float] = {}
         self._predicted: list[float] = []
         self._robust_means: list[float] = []
@@ -167,25 +168,36 @@ class RecoveryLoop:
         """Whether a robot that is found intact keeps its controller."""
         return self._repairs[-1].keeps_intact
 
-    def _repair_in_simulator(self) -> repairs.Repair:
+    def _repair_in(self, simulator: Simulator) -> None:
+        """Makes the repair of a self-model, for which controllers are evolved from now on."""
+        self._repaired_robot = simulator.robot
         settings = self.settings.of_repair(self.repair_settings)
-        return self.make_repair(self.simulator, settings, self._design, self.score)
+        repair = self.make_repair(simulator, settings, self._design, self.score)
+        self._repairs.append(repair)
 
     def _evolved(
         self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
     ) -> tuple[repairs.CandidateController, ...]:
-        """Evolves controllers for hypotheses, best first; returns them best first."""
-        self.on_event(SearchBegins("repair", hypotheses[0]))
+        """Evolves controllers for hypotheses, best first; returns them best first.
+
+        If the self-model flatters all of them, they are evolved again at a finer time step, and so
+        are those of later repairs by this self-model.
+        """
         rng = random_stream(self.seed, "repair", len(self.diagnoses))
-        repair = self._repairs[-1]
-        candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
-        self._means.update({each.controller: each.mean for each in candidates})
-        if not candidates[0].converged:
+        while True:
+            self.on_event(SearchBegins("repair", hypotheses[0]))
+            repair = self._repairs[-1]
+            candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
+            if candidates[0].converged or self._repaired_robot is not self.simulator.robot:
+                break
             self._warn(
                 f"every finalist of the repair for {hypotheses[0]} loses more than a fifth of its "
-                f"score at a quarter of the physics time step: the self-model flatters; "
-                f"{advice(self.simulator.robot)}"
+                f"score at a quarter of the physics time step: the self-model flatters. Repairs "
+                f"have that time step from now on; {advice(self.simulator.robot)}"
             )
+            finer = self.simulator.robot.finer(repairs.FINER)
+            self._repair_in(Simulator(finer, self.simulator.threads, self.simulator.stats))
+        self._means.update({each.controller: each.mean for each in candidates})
         return candidates
 
     def _warn(self, text: str) -> None:
@@ -194,8 +206,8 @@ class RecoveryLoop:
 
     def _log_trial(self, robot: PhysicalRobot, stage: Stage, controller: Controller) -> None:
         foreseen = stage != "after"
-        robot_now = self.simulator.robot
-        predicted = self._simulated_score(controller, robot_now) if foreseen else math.nan
+        model = self._repaired_robot
+        predicted = self._simulated_score(controller, model) if foreseen else math.nan
         self._predicted.append(predicted)
         mean = self._means.get(controller, math.nan) if foreseen else math.nan
         self._robust_means.append(mean)
@@ -245,7 +257,7 @@ class RecoveryLoop:
         predicted = self._predicted[number] if math.isnan(mean) else mean
         tried = self.diagnoses[number - 2].best if number > 1 else found.hypothesis
         simulated = partial(self._simulated_score, found.trial.plan.controller)
-        text = shortfall(found, predicted, tried, self.simulator.robot, simulated)
+        text = shortfall(found, predicted, tried, self._repaired_robot, simulated)
         if text is not None:
             self._warn(text)
 
@@ -262,7 +274,7 @@ class RecoveryLoop:
             self.on_event(calibration)
             if calibration.robot is not nominal.robot:
                 self.simulator = Simulator(calibration.robot, nominal.threads, nominal.stats)
-                self._repairs.append(self._repair_in_simulator())
+                self._repair_in(self.simulator)
         rng = random_stream(self.seed, "posterior")
         settings = self.settings.of_repair(self.repair_settings)
         self._posterior = Posterior(self.simulator, healthy_trials, calibration, settings, rng)

@@ -296,8 +296,11 @@ class StubRepair:
         return tuple(CandidateController(one, self.scores) for one in self._candidates)
 
 
-def test_a_repair_whose_every_finalist_is_flattered_is_a_warning(quadruped: Robot):
+def test_if_every_finalist_is_flattered_it_is_a_warning_and_others_are_evolved_at_a_finer_step(
+    quadruped: Robot,
+):
     events: list[Event] = []
+    steps: list[float] = []
 
     class Flattered(StubRepair):
         scores = np.array([90.0, 70.0])
@@ -307,17 +310,25 @@ def test_a_repair_whose_every_finalist_is_flattered_is_a_warning(quadruped: Robo
             return tuple(dataclasses.replace(each, converged=False) for each in found)
 
     repair = Flattered(random_controllers(quadruped, 3))
+
+    def make_repair(simulator: Simulator, *_given: object) -> Flattered:
+        steps.append(simulator.robot.model.opt.timestep)
+        return repair
+
     outcome = recovery(
         quadruped,
         settings=dataclasses.replace(TINY, trials=1),
         on_event=events.append,
-        make_repair=lambda *_given: repair,
+        make_repair=make_repair,
     )
 
     found = [text for text in outcome.warnings if "the self-model flatters" in text]
-    assert ["intact" in text for text in found] == [True, False]
-    step = quadruped.model.opt.timestep / 4
-    assert all(f"timestep={step:g}, or armature" in text for text in found)
+    assert ["intact" in text for text in found] == [True]
+    step = quadruped.model.opt.timestep
+    assert all(f"timestep={step / 4:g}, or armature" in text for text in found)
+    assert [own / step for own in steps] == [1, 0.25]
+    assert repair.hypotheses[:2] == [("intact",)] * 2
+    assert len(repair.hypotheses) == 3, "the next repair is at the finer step alone"
     assert {*found} <= {event.text for event in events if isinstance(event, SelfModelWarning)}
     assert found[0] in repr(outcome)
     assert outcome.to_dict()["warnings"] == list(outcome.warnings)
