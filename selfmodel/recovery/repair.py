@@ -67,7 +67,7 @@ repair is larger: every candidate has one condition and then two."""
 VIABLE = 0.5
 """Smallest share of the last conditions in which the rollouts of a candidate remain finite."""
 
-HEADINGS = 0.3
+HEADINGS = 0.6
 """Standard deviation of the initial heading of rollouts of controllers that hold theirs, rad: what
 turns a physical robot is in no model, and such a controller has to turn it back."""
 
