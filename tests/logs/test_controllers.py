@@ -45,10 +45,10 @@ def designs(draw: st.DrawFn) -> Design:
     """Networks and CPGs of any size, with the paper's command ranges or others."""
     sensors, motors = draw(PARTS), draw(PARTS)
     some = st.lists(RANGE, min_size=len(motors), max_size=len(motors)).map(tuple)
-    own = st.just(()) | some
+    own = {"ranges": st.just(()) | some, "heading": st.booleans()}
     return draw(
-        st.builds(Network, st.just(sensors), st.just(motors), st.integers(0, 4), ranges=own)
-        | st.builds(Cpg, st.just(sensors), st.just(motors), st.floats(1e-4, 1), ranges=own)
+        st.builds(Network, st.just(sensors), st.just(motors), st.integers(0, 4), **own)
+        | st.builds(Cpg, st.just(sensors), st.just(motors), st.floats(1e-4, 1), **own)
     )
 
 
