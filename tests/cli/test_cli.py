@@ -44,7 +44,7 @@ def test_recover_prints_one_json_object_with_every_key(short: tuple[Path, dict])
         *("controller", "neurons", "correct", "score", "comparator_reason", "repair", "fell"),
         *("search", "repertoire", "model", "summary"),
         *({"detectable"} & set(told)),
-        *("doubt", "also_searched", "left_out", "cost"),
+        *("doubt", "also_searched", "left_out", "cost", "warnings"),
     }
     assert (told["robot"], told["case"], told["seed"], told["gap"]) == ("quadruped", 4, 0, 0)
     assert told["truth"] == "break:front_left_shoulder+sensor:front_right_touch"
