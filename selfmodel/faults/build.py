@@ -13,7 +13,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.robot.anatomy import Anatomy, Joint, added_steps, write_control_delay
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.mujoco_errors import mujoco_errors_as_input_errors
-from selfmodel.robot.robot import Robot
+from selfmodel.robot.robot import Robot, mjcf_of
 
 SpecEdit = Callable[[MjSpec], None]
 """Function that edits a specification, in place, before its compilation."""
@@ -106,7 +106,7 @@ def edited_mjcf(robot: Robot, hypothesis: Hypothesis) -> str:
             equality.active = int(model.eq_active0[equality.id])
         if added := added_steps(robot.control_delay, float(variant.added_delay[0])):
             write_control_delay(spec, robot.control_delay + added)
-        return str(spec.to_xml())
+        return mjcf_of(spec)
 
 
 def apply_faults(

@@ -5,39 +5,37 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.hexapod.robots import CONTROL_TIMESTEP, MODELS, urdf
 from selfmodel.arguments import robot_entry
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.robot.mjcf.settings import checked_settings
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.model_check import model_notes
 from selfmodel.studies import bodies
-from tests.helpers.robots.hexapod import EFFORT, VELOCITY, hexapod_urdf
 
 pytestmark = pytest.mark.search
 
-BULLET = {"timestep": 1 / 240, "control_timestep": 4 / 240}
-STIFF = {**BULLET, "kp": 40, "kd": 1.67}
-DAMPED = {**STIFF, "damping": EFFORT / VELOCITY, "velocity": 0}
-MENDED = {**DAMPED, "armature": 0.005, "solref": [0.01, 1]}
+DAMPED = MODELS["damped"]
+HARD = {**DAMPED, "solref": [0.005, 1]}
+FIXED = {"timestep": 1 / 240, "kp": 400, "kd": 17, "velocity": 0, "base": "fixed"}
 
 
 def hexapod(folder: Path, settings: dict) -> Robot:
     path = folder / "hexapod.urdf"
-    path.write_text(hexapod_urdf())
-    return load_mjcf(path, checked_settings(settings))
+    path.write_text(urdf())
+    given = {"control_timestep": CONTROL_TIMESTEP, **settings}
+    return load_mjcf(path, checked_settings(given))
 
 
 @pytest.mark.parametrize(
     ("settings", "advice"),
     [
-        ({}, []),
-        (STIFF, ["timestep", "armature"]),
+        *((MODELS[name], []) for name in ("import", "stiff", "servo", "rotor")),
         (DAMPED, ["timestep", "armature"]),
-        (MENDED, []),
-        ({**STIFF, "solref": [0.005, 1]}, ["timestep", "armature", "solref"]),
-        ({**BULLET, "kp": 400, "kd": 17, "velocity": 0, "base": "fixed"}, ["timestep", "armature"]),
+        (HARD, ["timestep", "armature", "solref"]),
+        (FIXED, ["timestep", "armature"]),
     ],
-    ids=["import", "stiff", "damped", "mended", "hard contacts", "fixed"],
+    ids=["import", "stiff", "servo", "rotor", "damped", "hard contacts", "fixed"],
 )
 def test_what_depends_on_the_time_step_is_said(settings: dict, advice: list[str], tmp_path: Path):
     notes = model_notes(hexapod(tmp_path, settings))
@@ -45,12 +43,11 @@ def test_what_depends_on_the_time_step_is_said(settings: dict, advice: list[str]
     assert ("base goes" in "".join(notes)) == (bool(notes) and "base" not in settings)
 
 
-@pytest.mark.parametrize("settings", [STIFF, DAMPED], ids=["stiff", "damped"])
 @pytest.mark.parametrize("remedy", ["timestep", "armature"])
-def test_what_a_note_advises_ends_it(settings: dict, remedy: str, tmp_path: Path):
-    text = " ".join(model_notes(hexapod(tmp_path, settings)))
+def test_what_a_note_advises_ends_it(remedy: str, tmp_path: Path):
+    text = " ".join(model_notes(hexapod(tmp_path, DAMPED)))
     (number,) = re.findall(rf"set {remedy}.*? to ([\d.]+)", text)
-    assert model_notes(hexapod(tmp_path, {**settings, remedy: float(number)})) == ()
+    assert model_notes(hexapod(tmp_path, {**DAMPED, remedy: float(number)})) == ()
 
 
 def test_nothing_is_said_of_the_robots_of_selfmodel(robot: Robot):
