@@ -27,8 +27,8 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.logs.repertoires import load_repertoire, save_repertoire
 from selfmodel.physical.simulated import SimulatedRobot
+from selfmodel.recovery.candidates import RobustFitness
 from selfmodel.recovery.map_elites import make_repertoire, simulated_evaluation
-from selfmodel.recovery.repair import RobustFitness
 from selfmodel.recovery.scores import UPRIGHT
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings

@@ -22,19 +22,17 @@ from selfmodel.errors import InputError
 from selfmodel.evolution import GenerationCallback
 from selfmodel.faults.build import build
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
-from selfmodel.recovery.cma_es import CmaEs
-from selfmodel.recovery.repair import (
-    FINALISTS,
-    JUDGED,
+from selfmodel.recovery.candidates import (
     CandidateController,
-    MakeSearch,
+    Candidates,
     RobustFitness,
-    comparisons_of,
     converged,
     robust,
-    run_search,
+    unflattered,
     viable,
 )
+from selfmodel.recovery.cma_es import CmaEs
+from selfmodel.recovery.repair import FINALISTS, JUDGED, MakeSearch, comparisons_of, run_search
 from selfmodel.recovery.scores import UPRIGHT, Score
 from selfmodel.settings import Settings
 from selfmodel.simulation.domain import DomainDistribution
@@ -66,6 +64,7 @@ class LayerRepair:
     Attributes:
         design: A layer, from which on larger ones are searched; or a policy with a network, whose
             last layer is fine-tuned.
+        parts: Physics steps in place of each; see ``unflattered``.
     """
 
     simulator: Simulator
@@ -74,6 +73,7 @@ class LayerRepair:
     score: Score = UPRIGHT
     keeps_intact: ClassVar[bool] = True
     evaluations: int = field(default=0, init=False)
+    parts: int = field(default=1, init=False)
     _sizes: Sequence[Design] = field(default=(), init=False)
 
     def __call__(
@@ -85,7 +85,19 @@ class LayerRepair:
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
         """Returns layers that are better than none, best first, or else that of zeros."""
-        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty())
+        search = partial(self._searched, hypotheses, uncertainty(), seeds, rng, on_generation)
+        return unflattered(self, search)
+
+    def _searched(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        uncertainty: DomainDistribution,
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> tuple[Candidates, Candidates]:
+        """Returns all layers, and the best of those that keep their scores at a finer step."""
+        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty)
         self._sizes = self._sizes or self._smallest_first(hypotheses[0])
         known = tried = [one for one in seeds if one.design in self._sizes]
         begin = max([self._sizes.index(one.design) for one in tried], default=0)
@@ -102,11 +114,13 @@ class LayerRepair:
         rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
         finite = viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
         kept = converged(finite, fitness, self.settings.steps, again)
-        better = takewhile(lambda one: one.controller != finite[-1].controller, kept)
-        found = tuple(better) or kept[:1]
-        return tuple(
-            replace(one, controller=small.get(one.controller, one.controller)) for one in found
-        )
+        better = tuple(takewhile(lambda one: one.controller != finite[-1].controller, kept))
+
+        def at_its_size(some: Candidates) -> Candidates:
+            own = (small.get(one.controller, one.controller) for one in some)
+            return tuple(replace(one, controller=its) for one, its in zip(some, own, strict=True))
+
+        return at_its_size(finite), at_its_size(better or kept[:1])
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
         """Returns the designs of changes of the controller, by their size."""

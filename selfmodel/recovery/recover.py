@@ -23,6 +23,7 @@ from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.physical.interface import PhysicalRobot
 from selfmodel.recovery import repair as repairs
+from selfmodel.recovery.candidates import Candidates
 from selfmodel.recovery.falls import fall_of
 from selfmodel.recovery.result import (
     Event,
@@ -131,7 +132,7 @@ class RecoveryLoop:
         # From the nominal robot: the numbers of the calibrated model are rounded.
         self._design = self.design or network_for(robot)
         self._repairs: list[repairs.Repair] = []
-        self._repair_in(self.simulator)
+        self._make_repair()
         self._means: dict[Controller, float] = {}
         self._predicted: list[float] = []
         self._robust_means: list[float] = []
@@ -157,7 +158,7 @@ class RecoveryLoop:
         self._diagnose(search)
         return self._result(comparator, calibration, search)
 
-    def repaired(self) -> tuple[repairs.CandidateController, ...]:
+    def repaired(self) -> Candidates:
         """Evolves controllers that compensate for the last diagnosis; returns them best first."""
         diagnosis = self.diagnoses[-1]
         uncertainty = partial(self._posterior.after, self.trials, diagnosis.best)
@@ -168,36 +169,29 @@ class RecoveryLoop:
         """Whether a robot that is found intact keeps its controller."""
         return self._repairs[-1].keeps_intact
 
-    def _repair_in(self, simulator: Simulator) -> None:
-        """Makes the repair of a self-model, for which controllers are evolved from now on."""
-        self._repaired_robot = simulator.robot
+    def _make_repair(self) -> None:
+        """Makes the repair of the self-model."""
+        self._repaired_robot = self.simulator.robot
         settings = self.settings.of_repair(self.repair_settings)
-        repair = self.make_repair(simulator, settings, self._design, self.score)
+        repair = self.make_repair(self.simulator, settings, self._design, self.score)
         self._repairs.append(repair)
 
     def _evolved(
         self, hypotheses: Sequence[Hypothesis], uncertainty: Callable[[], DomainDistribution]
-    ) -> tuple[repairs.CandidateController, ...]:
-        """Evolves controllers for hypotheses, best first; returns them best first.
-
-        If the self-model flatters all of them, they are evolved again at a finer time step, and so
-        are those of later repairs by this self-model.
-        """
+    ) -> Candidates:
+        """Evolves controllers for hypotheses, best first; returns them best first."""
+        self.on_event(SearchBegins("repair", hypotheses[0]))
         rng = random_stream(self.seed, "repair", len(self.diagnoses))
-        while True:
-            self.on_event(SearchBegins("repair", hypotheses[0]))
-            repair = self._repairs[-1]
-            candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
-            if candidates[0].converged or self._repaired_robot is not self.simulator.robot:
-                break
-            self._warn(
-                f"every finalist of the repair for {hypotheses[0]} loses more than a fifth of its "
-                f"score at a quarter of the physics time step: the self-model flatters. Repairs "
-                f"have that time step from now on; {advice(self.simulator.robot)}"
-            )
-            finer = self.simulator.robot.finer(repairs.FINER)
-            self._repair_in(Simulator(finer, self.simulator.threads, self.simulator.stats))
+        repair, robot = self._repairs[-1], self.simulator.robot
+        candidates = repair(hypotheses, uncertainty, self.controllers, rng, self.on_event)
         self._means.update({each.controller: each.mean for each in candidates})
+        if (parts := candidates[0].parts) > 1 and self._repaired_robot is robot:
+            self._repaired_robot = robot.finer(parts)
+            self._warn(
+                f"every finalist of the repair for {hypotheses[0]} lost more than a fifth of its "
+                f"score at a quarter of the physics time step: the self-model flatters. Repairs "
+                f"have that time step from now on; {advice(robot)}"
+            )
         return candidates
 
     def _warn(self, text: str) -> None:
@@ -274,7 +268,7 @@ class RecoveryLoop:
             self.on_event(calibration)
             if calibration.robot is not nominal.robot:
                 self.simulator = Simulator(calibration.robot, nominal.threads, nominal.stats)
-                self._repair_in(self.simulator)
+                self._make_repair()
         rng = random_stream(self.seed, "posterior")
         settings = self.settings.of_repair(self.repair_settings)
         self._posterior = Posterior(self.simulator, healthy_trials, calibration, settings, rng)

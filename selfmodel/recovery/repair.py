@@ -12,6 +12,7 @@ import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -19,16 +20,24 @@ import numpy as np
 from selfmodel import evolution
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.errors import WorkError
 from selfmodel.evolution import Evolution, GenerationCallback, GenomeSearch
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.candidates import (
+    CandidateController,
+    Candidates,
+    RobustFitness,
+    converged,
+    divergence,
+    robust,
+    unflattered,
+    viable,
+)
 from selfmodel.recovery.cma_es import SEED_DEVIATION, CmaEs
-from selfmodel.recovery.falls import fallen
 from selfmodel.recovery.repertoire import Repertoire
 from selfmodel.recovery.scores import DISPLACEMENT, UPRIGHT, Score, scores_of
 from selfmodel.robot.designs import network_for
 from selfmodel.settings import Settings
-from selfmodel.simulation.domain import DomainDistribution, draw_samples
+from selfmodel.simulation.domain import DomainDistribution
 from selfmodel.simulation.simulator import Run, Simulator, cached_rows
 
 FIRST_COST, COST = 2.8, 0.8
@@ -64,44 +73,9 @@ JUDGING = 0.08
 """Cost of both comparisons relative to the evaluations of the paper's repair EA. That of a small
 repair is larger: every candidate has one condition and then two."""
 
-VIABLE = 0.5
-"""Smallest share of the last conditions in which the rollouts of a candidate remain finite."""
-
 HEADINGS = 0.6
 """Standard deviation of the initial heading of rollouts of controllers that hold theirs, rad: what
 turns a physical robot is in no model, and such a controller has to turn it back."""
-
-FINER, LOSS = 4, 0.2
-"""Physics steps in place of each under which the last candidates are simulated again, and the share
-of its score that one of them may lose by that. The conditions are the first quarter of the last
-ones, so that the physics steps are as many as those of the last comparison."""
-
-TAIL = 0.25
-"""Fraction of the conditions, those with the lowest scores, that count as the lower tail."""
-
-
-@dataclass(frozen=True, eq=False)
-class CandidateController:
-    """A controller for the next trial, and its simulated score under each condition.
-
-    There is a single score from a repair that simulates the self-model alone.
-
-    Attributes:
-        controller: The controller.
-        scores: Score under each condition; negative infinity for a rollout that diverged.
-        converged: Whether it keeps its score at a quarter of the physics time step; see
-            ``converged``. True of a repair that does not simulate that.
-    """
-
-    controller: Controller
-    scores: FloatArray
-    converged: bool = True
-
-    @property
-    def mean(self) -> float:
-        """Mean score of the rollouts that did not diverge; NaN if all did."""
-        finite = self.scores[np.isfinite(self.scores)]
-        return float(np.mean(finite)) if len(finite) else math.nan
 
 
 class Repair(Protocol):
@@ -187,7 +161,7 @@ class RepairSearch:
         self.evaluations += search.evaluations
         if search.best_fitness == -np.inf:
             none = f"none with {search.evaluations} controllers"
-            raise _divergence(self.simulator, hypothesis, none)
+            raise divergence(self.simulator, hypothesis, none)
         survivors = zip(*search.survivors, strict=True)
         scores = {Controller(design, one): score for one, score in survivors if score > -np.inf}
         return tuple(CandidateController(one, np.array([score])) for one, score in scores.items())
@@ -199,40 +173,13 @@ class RepairSearch:
         return scores_of(self.score, self.simulator.robot, [runs[0][0]], columns)[:, 0]
 
 
-@dataclass(frozen=True, eq=False)
-class RobustFitness:
-    """Scores of controllers under random conditions, common to all controllers of a call.
-
-    The conditions have indistinguishable hypotheses in turn, and an uncertain model.
-    """
-
-    simulator: Simulator
-    score: Score
-    hypotheses: Sequence[Hypothesis]
-    uncertainty: DomainDistribution
-
-    def __call__(
-        self, controllers: Sequence[Controller], count: int, steps: int, rng: np.random.Generator
-    ) -> FloatArray:
-        """Returns scores, ``(controllers, count)``; negative infinity for a diverged rollout."""
-        conditions = draw_samples(self.hypotheses, self.uncertainty, count, rng)
-        faults, record = [each.hypothesis for each in conditions], self.score.record
-        until = None
-        if self.score.ends_at_fall:
-            until = fallen(self.simulator.robot, faults * len(controllers))
-            record = tuple(dict.fromkeys([*record, *UPRIGHT.record]))
-        outcome = self.simulator.run_under(
-            conditions, self.uncertainty, controllers, steps, record, until=until
-        )
-        return scores_of(self.score, self.simulator.robot, faults, outcome)
-
-
 @dataclass(eq=False)
 class RobustRepair:
     """Repair under uncertainty; a ``Repair`` whose cost follows from the paper's numbers.
 
     Attributes:
         make_search: Makes the search for genomes.
+        parts: Physics steps in place of each; see ``unflattered``.
     """
 
     simulator: Simulator
@@ -242,6 +189,7 @@ class RobustRepair:
     make_search: MakeSearch = CmaEs
     keeps_intact: ClassVar[bool] = False
     evaluations: int = field(default=0, init=False)
+    parts: int = field(default=1, init=False)
 
     def __call__(
         self,
@@ -260,7 +208,19 @@ class RobustRepair:
         if self.design.observes:
             start = replace(drawn.start, heading=HEADINGS)
             drawn = replace(drawn, start=start)
-        fitness = RobustFitness(self.simulator, self.score, hypotheses, drawn)
+        search = partial(self._searched, hypotheses, drawn, seeds, rng, on_generation)
+        return unflattered(self, search)
+
+    def _searched(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        uncertainty: DomainDistribution,
+        seeds: Sequence[Controller],
+        rng: np.random.Generator,
+        on_generation: GenerationCallback,
+    ) -> tuple[Candidates, Candidates]:
+        """Returns the candidates, and those of them that keep their scores at a finer step."""
+        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty)
         comparisons = comparisons_of(self.settings)
         compared = sum(candidates * conditions for candidates, conditions in comparisons)
         known = [controller for controller in seeds if controller.design == self.design]
@@ -287,7 +247,7 @@ class RobustRepair:
             best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
             candidates, scores = [candidates[i] for i in best], scores[best]
         finite = viable(candidates, scores, fitness, search.evaluations)
-        return converged(finite, fitness, self.settings.steps, again)
+        return finite, converged(finite, fitness, self.settings.steps, again)
 
 
 def run_search(
@@ -338,76 +298,6 @@ def run_search(
         return halves + math.ceil(max(0.0, total - max(spent, halved)) / (size * steps))
 
     evolution.evolve(search, scores, on_generation, generations_left, noisy=True)
-
-
-def viable(
-    controllers: Sequence[Controller],
-    scores: FloatArray,
-    fitness: RobustFitness,
-    evaluations: int,
-) -> tuple[CandidateController, ...]:
-    """Returns the candidates whose rollouts remained finite under most conditions.
-
-    Args:
-        controllers: Controllers, best first.
-        scores: Their scores, ``(controllers, conditions)``.
-        fitness: What scored them.
-        evaluations: Number of controllers evaluated by the search, for the error.
-
-    Raises:
-        WorkError: None did.
-    """
-    finite = np.isfinite(scores)
-    rows = np.flatnonzero(finite.mean(axis=1) >= VIABLE).tolist()
-    if not rows:
-        share = f"{np.count_nonzero(finite)} of {finite.size}"
-        best_of = f"with the best {len(finite)} of {evaluations} controllers"
-        raise _divergence(fitness.simulator, fitness.hypotheses[0], f"{share} {best_of}")
-    return tuple(CandidateController(controllers[i], scores[i]) for i in rows)
-
-
-def converged(
-    candidates: Sequence[CandidateController],
-    fitness: RobustFitness,
-    steps: int,
-    rng: np.random.Generator,
-) -> tuple[CandidateController, ...]:
-    """Returns the candidates that keep their scores at a quarter of the physics time step.
-
-    A search finds the controllers that a model flatters: what a stiff servo or a massless rotor
-    does at a coarse time step is no motion of a robot. If none keeps its score, all are returned,
-    the best ones at a quarter of the step first, as not converged.
-
-    Args:
-        candidates: Candidates, best first.
-        fitness: What scored them.
-        steps: Control steps of a rollout.
-        rng: Random number generator in the state in which their conditions were drawn.
-    """
-    finer = replace(fitness, simulator=fitness.simulator.finer(FINER))
-    conditions = max(1, len(candidates[0].scores) // FINER)
-    before = robust(np.array([each.scores[:conditions] for each in candidates]))
-    after = robust(finer([each.controller for each in candidates], conditions, steps, rng))
-    keep = before - after <= LOSS * abs(before)
-    if keep.any():
-        return tuple(candidates[i] for i in np.flatnonzero(keep).tolist())
-    order = np.argsort(-after, kind="stable").tolist()
-    return tuple(replace(candidates[i], converged=False) for i in order)
-
-
-def robust(scores: FloatArray) -> FloatArray:
-    """Returns the mean of the mean score and of the mean of the lower tail, ``(controllers,)``.
-
-    ``scores`` are ``(controllers, conditions)``. A rollout that diverged counts as worse than all
-    others by 1; a controller of which all did has negative infinity.
-    """
-    finite = np.isfinite(scores)
-    if not finite.any():
-        return np.full(len(scores), -np.inf)
-    known = np.where(finite, scores, scores[finite].min() - 1.0)
-    tail = np.sort(known, axis=1)[:, : max(1, round(TAIL * scores.shape[1]))]
-    values = (known.mean(axis=1) + tail.mean(axis=1)) / 2
-    return np.asarray(np.where(finite.any(axis=1), values, -np.inf))
 
 
 def rollouts_of(settings: Settings, *, known: bool) -> int:
@@ -482,10 +372,3 @@ def from_repertoire(repertoire: Repertoire) -> MakeSearch:
         )
 
     return make
-
-
-def _divergence(simulator: Simulator, hypothesis: Hypothesis, finite: str) -> WorkError:
-    return WorkError(
-        f"expected finite simulations of {simulator.robot.name} as {hypothesis}, got {finite}: "
-        f"check the model, such as its physics time step, masses and motors"
-    )

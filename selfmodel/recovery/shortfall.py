@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from selfmodel.faults.hypothesis import Hypothesis
+from selfmodel.recovery.candidates import FINER, LOSS
 from selfmodel.recovery.falls import fall_text
-from selfmodel.recovery.repair import FINER, LOSS
 from selfmodel.recovery.result import TrialScore
 from selfmodel.recovery.scores import value_text
 from selfmodel.robot.robot import Robot

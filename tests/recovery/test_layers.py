@@ -11,8 +11,8 @@ from selfmodel.controllers.controller import Controller
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.progress import ignore
+from selfmodel.recovery.candidates import CandidateController, RobustFitness
 from selfmodel.recovery.layers import LayerRepair, layered
-from selfmodel.recovery.repair import CandidateController, RobustFitness
 from selfmodel.recovery.scores import DISPLACEMENT
 from selfmodel.recovery.uncertainty import assumed_uncertainty
 from selfmodel.robot.robot import Robot

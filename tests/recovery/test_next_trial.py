@@ -18,6 +18,7 @@ from selfmodel.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.recovery import next_trial as disagreement
+from selfmodel.recovery.candidates import CandidateController
 from selfmodel.recovery.next_trial import (
     EARLY_STEPS,
     Disagreement,
@@ -27,7 +28,7 @@ from selfmodel.recovery.next_trial import (
     discriminating_controller,
 )
 from selfmodel.recovery.recover import RecoveryLoop, by_repair
-from selfmodel.recovery.repair import CandidateController, untried_mutants
+from selfmodel.recovery.repair import untried_mutants
 from selfmodel.recovery.result import DiscriminatingTrial, Event
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings

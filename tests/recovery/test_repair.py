@@ -14,19 +14,22 @@ from selfmodel.evolution import Evolution, Generation, GenerationCallback
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.progress import ignore
-from selfmodel.recovery import repair as module
+from selfmodel.recovery import candidates, repair as module
+from selfmodel.recovery.candidates import (
+    CandidateController,
+    RobustFitness,
+    converged,
+    robust,
+    unflattered,
+)
 from selfmodel.recovery.repair import (
     COST,
     FIRST_COST,
     SHORT_STEPS,
-    CandidateController,
     MakeRepair,
     RepairSearch,
-    RobustFitness,
     RobustRepair,
-    converged,
     from_repertoire,
-    robust,
     rollouts_of,
 )
 from selfmodel.recovery.scores import DISPLACEMENT, SCORES, Score, upright_within
@@ -253,27 +256,20 @@ COARSE = np.array([9.0, 8.0, 7.0])
 
 
 @pytest.mark.parametrize(
-    ("fine", "kept", "is_converged"),
+    ("fine", "kept"),
     [
-        ([9.0, 8.0, 7.0], [0, 1, 2], True),
-        ([7.3, 6.5, 5.7], [0, 1, 2], True),
-        ([7.3, 6.3, 8.0], [0, 2], True),
-        ([1.0, -np.inf, 5.0], [2, 0, 1], False),
+        ([9.0, 8.0, 7.0], [0, 1, 2]),
+        ([7.3, 6.5, 5.7], [0, 1, 2]),
+        ([7.3, 6.3, 8.0], [0, 2]),
+        ([1.0, -np.inf, 5.0], []),
     ],
 )
 def test_a_finalist_that_loses_a_fifth_at_a_quarter_of_the_time_step_is_dropped(
-    quadruped: Robot,
-    monkeypatch: pytest.MonkeyPatch,
-    fine: list[float],
-    kept: list[int],
-    *,
-    is_converged: bool,
+    quadruped: Robot, monkeypatch: pytest.MonkeyPatch, fine: list[float], kept: list[int]
 ):
     controllers = random_controllers(quadruped, 3)
-    finalists = [
-        CandidateController(*own)
-        for own in zip(controllers, COARSE[:, None] + [0] * 8, strict=True)
-    ]
+    scores = COARSE[:, None] + [0] * 8
+    finalists = tuple(CandidateController(*own) for own in zip(controllers, scores, strict=True))
 
     def scored(fitness: RobustFitness, given: list, count: int, *_: object) -> np.ndarray:
         robot = fitness.simulator.robot
@@ -286,7 +282,28 @@ def test_a_finalist_that_loses_a_fifth_at_a_quarter_of_the_time_step_is_dropped(
     found = converged(finalists, fitness, 40, np.random.default_rng(0))
 
     assert [each.controller for each in found] == [controllers[k] for k in kept]
-    assert {each.converged for each in found} == {is_converged}
+
+
+@pytest.mark.parametrize(
+    ("kept", "parts", "searches"),
+    [([True], 1, 1), ([False, True], 4, 2), ([False, False], 4, 2)],
+)
+def test_a_search_whose_finalists_are_all_dropped_is_repeated_at_that_step_and_stays_there(
+    quadruped: Robot, kept: list[bool], parts: int, searches: int
+):
+    class Stub:
+        simulator, parts = Simulator(quadruped, 1), 1
+
+    repair, steps = Stub(), list[float]()
+    one = (CandidateController(random_controllers(quadruped, 1)[0], np.ones(1)),)
+
+    def search() -> tuple[tuple, tuple]:
+        steps.append(quadruped.model.opt.timestep / repair.simulator.robot.model.opt.timestep)
+        return one, one if kept[len(steps) - 1] else ()
+
+    (found,) = unflattered(repair, search)
+    assert (found.controller, found.parts, repair.parts) == (one[0].controller, parts, parts)
+    assert steps == [1, 4][:searches]
 
 
 def test_finalists_meet_the_first_of_their_last_conditions_again(
@@ -304,7 +321,7 @@ def test_finalists_meet_the_first_of_their_last_conditions_again(
     plain = found_by(Simulator(quadruped, 2), TINY)
     assert (scores[-1].shape, scores[-2].shape) == ((4, 2), (4, 8))
     assert not np.array_equal(scores[-1], scores[-2][:, :2])
-    monkeypatch.setattr(module, "FINER", 1)
+    monkeypatch.setattr(candidates, "FINER", 1)
     same = found_by(Simulator(quadruped, 2), TINY)
     np.testing.assert_array_equal(scores[-1], scores[-2])
     assert {each.controller for each in plain} <= {each.controller for each in same}
