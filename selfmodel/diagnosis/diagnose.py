@@ -22,7 +22,12 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.diagnosis import Candidate, Change, Cost, Diagnosis, Doubt
 from selfmodel.diagnosis.direct_evidence import evident
 from selfmodel.diagnosis.joints import with_joint_faults
-from selfmodel.diagnosis.losses import LimitReachedError, LossFunction, LossTable, Timeline
+from selfmodel.diagnosis.losses import (
+    LimitReachedError,
+    LossFunction,
+    LossTable,
+    Timeline,
+)
 from selfmodel.diagnosis.problem import Calibrate, Problem
 from selfmodel.diagnosis.search import (
     LocalSearch,

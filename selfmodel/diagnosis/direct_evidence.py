@@ -164,13 +164,14 @@ def observed_faults(
 
 
 def standing_joints(trials: Sequence[Trial], anatomy: Anatomy) -> frozenset[str]:
-    """Returns the joints that stand at the end of the trials though their motors are commanded.
+    """Returns the joints that stand although their motors are commanded to move.
 
-    The last trial that says so of a joint counts, whether it stands or moves.
+    They stand in a whole trial, or at its end, where a fault may have begun. The last trial that
+    says so of a joint counts, whether it stands or moves.
     """
     standing = set[str]()
-    for trial in trials:
-        evidence = _evidence_of(_end(trial), anatomy, "").joints
+    for part in (each for trial in trials for each in (trial, _end(trial))):
+        evidence = _evidence_of(part, anatomy, "").joints
         for joint in anatomy.joints:
             motions = [one for one in evidence if one.joint == joint.name]
             if any(one.motion == "moves" for one in motions):

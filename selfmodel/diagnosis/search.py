@@ -130,14 +130,19 @@ class LocalSearch:
     def refined(self, known: Iterable[Hypothesis]) -> Hypothesis:
         """Returns the best hypothesis in which every fault is required by the trials.
 
-        The search starts from the known ones, the best single faults and ``INTACT``.
+        The search starts from the known ones, the best single faults and ``INTACT``; or from the
+        known ones alone if joints stand under commands, and the trials require one of them. Those
+        that predict the trials as well as ``INTACT`` predicts the healthy ones are then the optima.
         """
         fitted = partial(with_fitted_severities, space=self._space)
         levels = partial(fitted, losses=self.coarse, zooms=0)
-        proposed = dict.fromkeys([*known, INTACT, *self.best_single_faults[:STARTS]])
         step = partial(followed, stage="refinement", observer=self.problem.observer, parts=3)
-        starts = dict.fromkeys(self.pruned(levels(start)) for start in step([*proposed], before=0))
-        local_optima = {
+        proposed = [*dict.fromkeys(known)]
+        starts = dict.fromkeys(self.pruned(levels(start)) for start in step(proposed, before=0))
+        if not (self.problem.standing and any(starts)):
+            further = [INTACT, *self.best_single_faults[:STARTS]]
+            starts |= dict.fromkeys(self.pruned(levels(start)) for start in further)
+        local_optima = {start for start in starts if self._is_evident(start)} or {
             optimum for start in step([*starts], before=1) for optimum in self.local_optima(start)
         }
         refits = {
@@ -147,6 +152,16 @@ class LocalSearch:
         best = self.pruned(fitted(chosen_of(refits, self.losses), losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
+
+    def _is_evident(self, hypothesis: Hypothesis) -> bool:
+        """Returns whether faults that stop joints predict the trials as the healthy ones are."""
+        if not self.problem.standing or not len(hypothesis):
+            return False
+        losses, reference = self.losses([hypothesis])[0], self.problem.reference
+        return (
+            reference is not None
+            and significance.excess_over_healthy(losses, reference) < significance.MIN_Z
+        )
 
     def total_loss(self, hypothesis: Hypothesis) -> float:
         """Returns the sum of the losses of a hypothesis on the trials."""

@@ -10,6 +10,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.faults import notation
 from selfmodel.faults.hypothesis import Hypothesis, canonical
+from selfmodel.faults.joints import JAMMED, JAMMED_AT_ANGLE
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.registry import notation_kinds, suitable
 from selfmodel.robot.anatomy import Anatomy
@@ -85,8 +86,18 @@ class HypothesisSpace:
         return notation.parse(text, self.anatomy, notation_kinds(self.kinds))
 
     def canonical(self, faults: Iterable[Fault]) -> Hypothesis:
-        """Returns the canonical form of a set of faults; see ``hypothesis.canonical``."""
-        return canonical(faults, self.anatomy)
+        """Returns the canonical form of a set of faults; see ``hypothesis.canonical``.
+
+        Jams of all joints of a leg that was observed to be locked are that one fault.
+        """
+        found = canonical(faults, self.anatomy)
+        jammed = {one.part for one in found.faults if one.kind in (JAMMED, JAMMED_AT_ANGLE)}
+        whole = [
+            leg
+            for leg in (self._shown.values() if len(jammed) > 1 else ())
+            if jammed.issuperset(joint.name for joint in self.anatomy.limbs[leg.part])
+        ]
+        return canonical([*found.faults, *whole], self.anatomy) if whole else found
 
     def parts(self, kind: FaultKind) -> tuple[str, ...]:
         """Returns the parts of a kind, in the order of the third value of a gene."""
@@ -125,7 +136,7 @@ class HypothesisSpace:
 
     @cached_property
     def _shown(self) -> dict[tuple[FaultKind, str], Fault]:
-        """The observed faults that no level stands for."""
+        """The observed locked legs: no level stands for their angles."""
         return {(fault.kind, fault.part): fault for fault in self.observed if fault.angles}
 
     def decode(self, genome: FloatArray) -> Hypothesis:

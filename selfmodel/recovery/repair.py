@@ -73,7 +73,7 @@ JUDGING = 0.08
 """Cost of both comparisons relative to the evaluations of the paper's repair EA. That of a small
 repair is larger: every candidate has one condition and then two."""
 
-HEADINGS = 0.6
+HEADINGS = 0.3
 """Standard deviation of the initial heading of rollouts of controllers that hold theirs, rad: what
 turns a physical robot is in no model, and such a controller has to turn it back."""
 

@@ -32,9 +32,10 @@ smallest one of a suspicious joint, rad: the ratio of a joint that rests is that
 MAX_BIAS = 0.04
 """Largest absolute mean error of a joint, rad."""
 
-MIN_Z, WORST = 3.0, 3
-"""Standard errors by which a correction must predict the segments better; and joints with the
-largest ratios, of which an exchange of columns includes one."""
+MIN_Z, WORST, OTHERS = 3.0, 3, 3
+"""Standard errors by which a correction must predict the segments better; joints with the largest
+ratios, which a correction is about; and joints with the next ones, with which they may have been
+exchanged: both of an exchange are predicted badly."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def suspicion(segments: SegmentErrors, fit: Fit) -> Suspicion | None:
     worst, leaning = int(np.argmax(ratios)), int(np.argmax(np.abs(biases)))
     leans = abs(biases[leaning]) > MAX_BIAS
     if ratios[worst] > MAX_RATIO or leans:
-        correction = _best_correction(segments, fit, np.argsort(-ratios)[:WORST])
+        correction = _best_correction(segments, fit, np.argsort(-ratios))
         if correction is not None:
             return correction
     if ratios[worst] > MAX_RATIO and abs(biases[worst]) <= MAX_BIAS:
@@ -122,9 +123,10 @@ def _best_correction(segments: SegmentErrors, fit: Fit, worst: IndexArray) -> Su
 def _corrections(
     robot: Robot, worst: IndexArray
 ) -> Iterator[tuple[Suspicion, IndexArray, IndexArray]]:
-    """Yields a change of each sign, and exchanges with a joint of ``worst``.
+    """Yields changes of the signs of the worst joints, and exchanges with others.
 
-    Each is the joint that it is about, and the columns of joints and of motors.
+    Each is the joint that it is about, and the columns of joints and of motors. The numbers of the
+    joints begin with the worst.
     """
     names = robot.anatomy.hinges
     joints, motors = np.arange(len(names)) + 1, np.arange(robot.model.nu) + 1
@@ -141,14 +143,15 @@ def _corrections(
     def cause(joint: int, change: str) -> Suspicion:
         return Suspicion(names[joint], f"with {change} it is predicted better")
 
-    for number, driven in enumerate(motors_of):
+    suspects: list[int] = worst[: WORST + OTHERS].tolist()
+    for number in suspects[:WORST]:
         angle, sign = flipped(joints, np.array([number])), "the other sign of its angle"
         yield cause(number, sign), angle, motors
-        yield cause(number, f"{sign} and command"), angle, flipped(motors, driven)
-    for pair in combinations(range(len(names)), 2):
-        if not set(pair) & set(worst.tolist()):
-            continue
-        first, second = pair if pair[0] in worst else pair[::-1]
+        yield cause(number, f"{sign} and command"), angle, flipped(motors, motors_of[number])
+    for first, second in combinations(suspects, 2):
+        if first not in suspects[:WORST]:
+            break
+        pair = first, second
         angles, other = swapped(joints, np.array(pair)), names[second]
         yield cause(first, f"the angles of {other}"), angles, motors
         both = [motors_of[number] for number in pair]

@@ -67,6 +67,7 @@ class Synthetic(Problem):
         self.space, self.settings = space, Settings(genes=most)
         self.trials, self.healthy_trials, self._observed = ["damaged"], [], ["healthy"]
         self.losses, self.observer, self.calibrate = losses, ignore, None
+        self.standing = frozenset[str]()
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
         self.table = SimpleNamespace(by_hinge=self._by_hinge)

@@ -16,6 +16,7 @@ from selfmodel.diagnosis.direct_evidence import (
     standing_joints,
 )
 from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.notation import parse
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trial import Trial
 
@@ -23,7 +24,7 @@ STEPS = 300
 KNEE, SENSOR = "front_left_knee", "front_left_touch"
 
 
-def trial(robot: Robot, knee: np.ndarray | float, commanded: float = 1.0) -> Trial:
+def trial(robot: Robot, knee: np.ndarray | float, commanded: np.ndarray | float = 1.0) -> Trial:
     """A trial in which all joints swing but for one knee."""
     swing = np.sin(np.arange(STEPS) * 0.1)[:, np.newaxis]
     positions = 0.4 * swing * np.ones(len(robot.anatomy.hinges))
@@ -79,6 +80,8 @@ def test_the_last_trial_with_commands_says_whether_a_joint_stands(quadruped: Rob
 
     assert standing(stands) == standing(moves, stands) == standing(stands, rests) == {KNEE}
     assert standing(moves) == standing(rests) == standing(stands, moves) == set()
+    ends_at_rest = 1.0 * (np.arange(STEPS) < STEPS // 2)
+    assert standing(trial(quadruped, 0.3, ends_at_rest)) == {KNEE}
 
 
 def test_what_stands_is_jammed_and_a_leg_of_which_all_joints_stand_locked_or_lost(
@@ -103,6 +106,12 @@ def test_what_stands_is_jammed_and_a_leg_of_which_all_joints_stand_locked_or_los
         f"{jam}+leg:front_left=locked-0.1/0.3",
         f"break:front_left_shoulder+{jam}",
     ]
+    space = replace(
+        HypothesisSpace.of(kinds_of("default"), anatomy),
+        observed=observed_faults([leg], anatomy, standing_joints([leg], anatomy)),
+    )
+    both = space.canonical(parse("jam:front_left_shoulder+jam:front_left_knee=0.1", anatomy).faults)
+    assert str(both) == "leg:front_left=locked-0.1/0.3"
     assert shown(leg, "paper") == []  # a jam at 0 alone, and no jam at an angle
     assert shown(trial(quadruped, 0.3, commanded=0)) == []
 
