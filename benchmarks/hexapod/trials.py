@@ -7,18 +7,15 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 import selfmodel
 from benchmarks.hexapod.environment import HexapodEnvironment
 from benchmarks.hexapod.robots import LEGS, STEPS, self_model
 from benchmarks.other_engine.environment import physical_robot
-from benchmarks.other_engine.recovery import in_mujoco
+from benchmarks.other_engine.recovery import heading_change, in_mujoco
 from selfmodel import Controller, Diagnosis, EnvironmentRobot, Settings, Simulator, Trial
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.falls import falls_of
-from selfmodel.rotation import directions
 from selfmodel.studies.study import Row
 
 FINER = 4
@@ -130,12 +127,10 @@ def recovered(bench: Bench, key: Row, work: Path) -> Row:
 
 def _walk(key: Row, trial: Trial) -> Row:
     """Returns displacement, m, change of heading, degrees, and whether the robot fell."""
-    ahead = directions(trial.trajectory["base_orientation"])
-    heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     fall = falls_of(model_of(key["model"]), INTACT, trial.trajectory)
     return {
         "walked": round(trial.displacement, 2),
-        "heading": round(float(np.degrees(heading[-1] - heading[0])), 1),
+        "heading": heading_change(trial.trajectory),
         "fell": bool(fall < trial.trajectory.steps),
     }
 

@@ -27,6 +27,7 @@ def main() -> None:
     recover.add_argument("--steps", type=int, default=paper.steps, help="control steps of a trial")
     recover.add_argument("--population", type=int, default=paper.population)
     recover.add_argument("--generations", type=int, default=paper.generations)
+    recover.add_argument("--design", default="network", help="of the controllers")
     recover.add_argument("--threads", type=int, default=0, help="0 for all processors")
     add("table", help="print the table of some recoveries").add_argument(
         "rows", type=Path, nargs="+", help="files of the lines of recover"
@@ -66,6 +67,7 @@ def _run(options: argparse.Namespace) -> None:
                 options.seed,
                 options.out,
                 settings=settings,
+                design=options.design,
                 threads=options.threads,
             )
             print(json.dumps(row), flush=True)

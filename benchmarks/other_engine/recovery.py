@@ -20,11 +20,12 @@ from selfmodel.logs import load_controller
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.result import Recovery
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import directions
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import is_correct
 from selfmodel.tasks import ROBOTS
-from selfmodel.trials.trajectory import collect, forward_displacement
+from selfmodel.trials.trajectory import Trajectory, collect, forward_displacement
 from selfmodel.version import __version__
 
 Row = dict[str, Any]
@@ -32,7 +33,14 @@ PAPER = Settings()
 
 
 def recovered(
-    name: str, case: int, seed: int, folder: Path, *, settings: Settings, threads: int
+    name: str,
+    case: int,
+    seed: int,
+    folder: Path,
+    *,
+    settings: Settings,
+    design: str = "network",
+    threads: int,
 ) -> Row:
     """Runs a recovery of a robot in PyBullet from a case of Table I, and returns its row."""
     entry = ROBOTS[name]
@@ -44,6 +52,7 @@ def recovered(
         "truth": notation,
         "seed": seed,
         "settings": dataclasses.asdict(settings),
+        "design": design,
         "reality": dataclasses.asdict(reality),
         "version": __version__,
     }
@@ -59,6 +68,7 @@ def recovered(
                 robot,
                 folder,
                 settings=settings,
+                design=design,
                 seed=seed,
                 threads=threads,
             )
@@ -87,6 +97,7 @@ def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) ->
                 "hypothesis": str(tried),
                 "displacement": trial.displacement,
                 "simulated": simulated,
+                "heading": heading_change(trial.trajectory),
                 "upright": bool(
                     falls_of(robot, INTACT, trial.trajectory) == trial.trajectory.steps
                 ),
@@ -94,6 +105,13 @@ def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) ->
             for trial, tried, simulated in trials
         ],
     }
+
+
+def heading_change(trajectory: Trajectory) -> float:
+    """Returns the turn to the left from the first step to the last, degrees; 720 for two rounds."""
+    ahead = directions(trajectory["base_orientation"])
+    heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    return round(float(np.degrees(heading[-1] - heading[0])), 1)
 
 
 def _simulated(recovery: Recovery, nominal: Simulator) -> Iterator[float | None]:
