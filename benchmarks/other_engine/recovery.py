@@ -139,22 +139,26 @@ def in_mujoco(
 def transfer_lines(
     robot: Robot, gaits: Sequence[Path], seeds: Sequence[int], steps: int = PAPER.steps
 ) -> Iterator[str]:
-    """Yields a Markdown table, line by line: a row per gait, m in a trial of some steps."""
+    """Yields a Markdown table, line by line: a row per gait, m in a trial of some steps.
+
+    In brackets is the turn to the left in PyBullet, degrees.
+    """
     realities = [ideal_reality(robot), *(draw_reality(robot, seed) for seed in seeds)]
     names = ["gait", "MuJoCo", "PyBullet, ideal", *(f"PyBullet, robot {seed}" for seed in seeds)]
     yield f"| {' | '.join(names)} |"
     yield "|---" * len(names) + "|"
     for path in gaits:
         gait = load_controller(path)
-        found = [in_mujoco(Simulator(robot, threads=1), INTACT, gait, steps) or 0.0]
-        found += [_in_bullet(robot, gait, reality, steps) for reality in realities]
-        yield f"| {path.stem} | {' | '.join(f'{value:.1f}' for value in found)} |"
+        simulated = in_mujoco(Simulator(robot, threads=1), INTACT, gait, steps) or 0.0
+        walked = [_in_bullet(robot, gait, reality, steps) for reality in realities]
+        yield f"| {path.stem} | {simulated:.1f} | {' | '.join(walked)} |"
 
 
-def _in_bullet(robot: Robot, gait: Controller, reality: Reality, steps: int) -> float:
+def _in_bullet(robot: Robot, gait: Controller, reality: Reality, steps: int) -> str:
     with BulletEnvironment(robot, reality) as environment:
         samples = physical_robot(environment, robot).run(gait, steps)
-        return float(forward_displacement(collect(robot.anatomy.names, samples)))
+        walk = collect(robot.anatomy.names, samples)
+    return f"{float(forward_displacement(walk)):.1f} ({heading_change(walk):.0f})"
 
 
 HEADINGS = (
