@@ -10,7 +10,7 @@ from selfmodel.arguments import AUTO, KindSource, RobotSource, TrialSource
 from selfmodel.controllers.controller import Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
 from selfmodel.diagnosis.comparator import Comparator
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnose import DiagnosticSearch, check_known
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.errors import InputError, check_type, items_of, real_number, whole_number
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -434,6 +434,7 @@ def set_up_diagnosis(
             f"{damaged[0].path} is to be explained and was recorded before the failure, and "
             f"{healthy[0].path}, given as healthy, after it: swap them"
         )
+    check_known(hypothesis, settings)
     chosen, count = choose_comparator(robot, [*healthy, *damaged]), thread_count(threads)
     on_event(chosen)
     fitted = partial(arguments.fitted, robot, threads=count, observer=on_event, known={})

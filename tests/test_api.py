@@ -67,6 +67,18 @@ def test_a_diagnosis_begins_from_what_is_known_and_has_as_many_faults_as_its_gen
         assert {len(one) for one in found} == {0, 1}
 
 
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        ("break:front_left_knee+friction=0.4", "at most 1 faults .* got 2 in break:.*: allow more"),
+        ("neuron:0", "no diagnosis may propose neuron:0: leave it out"),
+    ],
+)
+def test_a_hypothesis_from_which_no_search_can_begin_is_refused(known: str, said: str):
+    with pytest.raises(InputError, match=said):
+        diagnosis(hypothesis=known, settings=dataclasses.replace(SMALL, genes=1))
+
+
 def recovered(folder: Path, **options: object) -> selfmodel.Recovery:
     """A small recovery without a calibration."""
     healthy = selfmodel.simulated_robot("quadruped")

@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.heading import HeadingHold, observes
+from selfmodel.controllers.heading import HOLDS, HeadingHold, observes
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
@@ -76,7 +76,7 @@ class Cpg(Design):
         """Numbers of sensors and motors and the time step as text."""
         return (
             f"a CPG of {len(self.sensors)} sensors and {len(self.motors)} motors with steps of "
-            f"{self.timestep:g} s"
+            f"{self.timestep:g} s{HOLDS * self.heading}"
         )
 
     def summary(self, genome: FloatArray) -> str:

@@ -13,6 +13,9 @@ from selfmodel.rotation import directions
 MAX_TURN = 0.5
 """Largest turn that is distinguished, rad: a stride is then doubled at most, or gone."""
 
+HOLDS = ", which holds its heading"
+"""What the description of a design with a heading hold says."""
+
 
 class HeadingHold:
     """The heading hold of many robots; without genes, it observes and changes nothing.

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.heading import HeadingHold, observes
+from selfmodel.controllers.heading import HOLDS, HeadingHold, observes
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
@@ -46,7 +46,7 @@ class Network(Design):
         """Numbers of sensors, hidden neurons and motors as text."""
         return (
             f"a network of {len(self.sensors)} sensors, {self.hidden} hidden neurons and "
-            f"{len(self.motors)} motors"
+            f"{len(self.motors)} motors{HOLDS * self.heading}"
         )
 
     def summary(self, _genome: FloatArray) -> str:

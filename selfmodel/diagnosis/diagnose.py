@@ -318,6 +318,17 @@ class Split(NamedTuple):
     piece: int
 
 
+def check_known(hypothesis: Hypothesis, settings: Settings) -> None:
+    """Raises ``InputError`` for a hypothesis from which no search can begin."""
+    if len(hypothesis) > settings.genes:
+        raise InputError(
+            f"expected at most {settings.genes} faults (genes) in the hypothesis to begin from, "
+            f"got {len(hypothesis)} in {hypothesis}: allow more, or leave some out"
+        )
+    if hidden := [fault for fault in hypothesis.faults if not fault.kind.searchable]:
+        raise InputError(f"no diagnosis may propose {hidden[0]}: leave it out of the hypothesis")
+
+
 def best_split(
     before: Sequence[Hypothesis],
     after: Sequence[Hypothesis],

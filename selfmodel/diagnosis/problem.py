@@ -56,7 +56,8 @@ class Problem:
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
         observer: Called with the progress of each stage.
-        standing: Joints that stand in the trials though they are commanded to move.
+        standing: Joints that stand in the trials though they are commanded to move, with which the
+            search begins; none if the comparator does not predict segments.
     """
 
     table: LossTable
@@ -75,8 +76,10 @@ class Problem:
 
     def __post_init__(self) -> None:
         trials, anatomy = [part.rows for part in self.trials], self.space.anatomy
-        self.standing = standing_joints(trials, anatomy)
-        shown = observed_faults(trials, anatomy, self.standing)
+        standing = standing_joints(trials, anatomy)
+        # A comparator that reads no encoders would owe its diagnoses to them.
+        self.standing = standing if self.table.uses_segments(trials) else frozenset()
+        shown = observed_faults(trials, anatomy, standing)
         space = replace(self.space, observed=shown, left_out=frozenset())
         moving = {*LOCKED_LEG.parts(space.anatomy)} - {fault.part for fault in shown}
         self.space = self._told_apart(space.without(LOCKED_LEG, moving))

@@ -136,8 +136,9 @@ class HypothesisSpace:
 
     @cached_property
     def _shown(self) -> dict[tuple[FaultKind, str], Fault]:
-        """The observed locked legs: no level stands for their angles."""
-        return {(fault.kind, fault.part): fault for fault in self.observed if fault.angles}
+        """The observed locked legs, where they are searched: no level stands for their angles."""
+        legs = [fault for fault in self.observed if fault.angles and fault.kind in self.kinds]
+        return {(fault.kind, fault.part): fault for fault in legs}
 
     def decode(self, genome: FloatArray) -> Hypothesis:
         """Returns the hypothesis of a genome, values in [0, 1), ``(genes * GENE_VALUES,)``."""
@@ -199,7 +200,12 @@ class HypothesisSpace:
             if fault.severity not in fault.kind.degenerates_alone_to
             for severity in (*fault.kind.degenerates_to, *fault.kind.degenerates_alone_to)
         ]
-        return self._others(hypothesis, [*fewer, *simpler])
+        unposed = [
+            (*faults[:i], replace(fault, angles=()), *faults[i + 1 :])
+            for i, fault in enumerate(faults)
+            if fault.angles
+        ]
+        return self._others(hypothesis, [*fewer, *simpler, *unposed])
 
     def _others(
         self, hypothesis: Hypothesis, changed: Iterable[Sequence[Fault]]

@@ -110,11 +110,16 @@ class Jammed(JointFault):
         jammed at 0 and at another angle is jammed at 0.
         """
         if other.kind in (FAILED_SENSOR, SENSOR_GAIN):
-            sensor, angles = anatomy.sensor(other.part), _nearest_to_zero(anatomy.joint(fault.part))
-            return sensor.hinge in angles and sensor.reading(angles[sensor.hinge]) == 0
+            return _reads_zero(other, _nearest_to_zero(anatomy.joint(fault.part)), anatomy)
         if other.part == fault.part and other.kind == JAMMED_AT_ANGLE:
             return True
         return JAMMED_AT_ANGLE.absorbs(fault, other, anatomy)
+
+
+def _reads_zero(fault: Fault, angles: Mapping[str, float], anatomy: Anatomy) -> bool:
+    """Returns whether the sensor of a fault reads 0 of a hinge welded at one of the angles."""
+    sensor = anatomy.sensor(fault.part)
+    return sensor.hinge in angles and sensor.reading(angles[sensor.hinge]) == 0
 
 
 def _weld(variant: "ModelVariant", anatomy: Anatomy, angles: Mapping[str, float]) -> None:
@@ -152,16 +157,19 @@ class LockedLeg(FaultKind):
 
     def apply(self, variant: "ModelVariant", anatomy: Anatomy, fault: Fault) -> None:
         """Welds the hinges."""
+        _weld(variant, anatomy, self._angles(fault, anatomy))
+
+    def _angles(self, fault: Fault, anatomy: Anatomy) -> dict[str, float]:
         angles = _nearest_to_zero(*anatomy.limbs[fault.part])
-        if fault.angles:
-            angles = dict(zip(angles, fault.angles, strict=True))
-        _weld(variant, anatomy, angles)
+        return dict(zip(angles, fault.angles, strict=True)) if fault.angles else angles
 
     def absorbs(self, fault: Fault, other: Fault, anatomy: Anatomy) -> bool:
         """Returns whether the other fault is one of a joint of the limb that a jam is or absorbs.
 
         A joint of the limb that has come off stays a fault of its own.
         """
+        if other.kind in (FAILED_SENSOR, SENSOR_GAIN):
+            return _reads_zero(other, self._angles(fault, anatomy), anatomy)
         if other.part not in {joint.name for joint in anatomy.limbs[fault.part]}:
             return False
         jam = Fault(JAMMED_AT_ANGLE, other.part)
@@ -323,6 +331,7 @@ JAMMED_AT_ANGLE = JammedAtAngle(
 LOCKED_LEG = LockedLeg(
     name="leg",
     prefix="locked",
+    unit="rad",
     words="the leg {part} is stuck",
 )
 WEAK_MOTOR = WeakMotor(

@@ -47,10 +47,9 @@ def parse(
         kind, part = fault.kind, fault.part
         earlier = first.setdefault((kind.keyword, part, kind.prefix), fault)
         if earlier != fault:
-            values = (one.angles or one.severity for one in (earlier, fault))
             raise InputError(
                 f"{text!r} gives {kind.keyword}{':' if part else ''}{part} two severities, "
-                f"{' and '.join(map(repr, values))}: keep one of the terms"
+                f"{earlier} and {fault}: keep one of the terms"
             )
     return canonical(faults, anatomy)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmodel.controllers.controller import CommandSource, Controller, Design
 from selfmodel.diagnosis.choice import ChosenComparator, ComparatorChoice
-from selfmodel.diagnosis.diagnose import DiagnosticSearch
+from selfmodel.diagnosis.diagnose import DiagnosticSearch, check_known
 from selfmodel.diagnosis.diagnosis import Diagnosis
 from selfmodel.diagnosis.losses import check_limit, still_trial
 from selfmodel.diagnosis.problem import Calibrate
@@ -126,6 +126,7 @@ class RecoveryLoop:
         """
         robot = self.simulator.robot
         HypothesisSpace.of(self.kinds, robot.anatomy)  # refused before any trial
+        check_known(self.hypothesis, self.settings)
         if (limit := self.settings.max_simulated_steps) is not None:
             still = still_trial(robot, self.settings.steps)
             check_limit(limit, self.choose_comparator, still, robot)
@@ -247,8 +248,7 @@ class RecoveryLoop:
 
     def _warn_of_shortfall(self, number: int, found: TrialScore) -> None:
         """Warns of a new trial with less than half of the score that was predicted."""
-        mean = self._robust_means[number]
-        predicted = self._predicted[number] if math.isnan(mean) else mean
+        predicted = float(np.fmin(self._robust_means[number], self._predicted[number]))
         tried = self.diagnoses[number - 2].best if number > 1 else found.hypothesis
         simulated = partial(self._simulated_score, found.trial.plan.controller)
         text = shortfall(found, predicted, tried, self._repaired_robot, simulated)

@@ -75,7 +75,7 @@ class TrialScore:
 
 @dataclass(frozen=True)
 class SelfModelWarning:
-    """Sign that the self-model foresees more than the robot does, with the likely cause."""
+    """A trial far below its predicted score, or a self-model that flatters; the likely cause."""
 
     text: str
 

@@ -121,6 +121,8 @@ class Anatomy:
             word if word and words.count(word) == 1 else chain[0]
             for word, chain in zip(words, chains, strict=True)
         ]
+        if len(set(names)) < len(names):
+            names = [chain[0] for chain in chains]
         limbs = [tuple(joints[name] for name in chain) for chain in chains]
         return dict(zip(names, limbs, strict=True))
 

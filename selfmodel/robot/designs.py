@@ -3,12 +3,16 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 
+import mujoco
+import numpy as np
+
 from selfmodel.controllers.controller import Design
 from selfmodel.controllers.cpg import Cpg
 from selfmodel.controllers.network import HIDDEN_NEURONS, MAX_HIDDEN_NEURONS, Network
 from selfmodel.errors import InputError, typed
 from selfmodel.robot.actuators import command_ranges
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import directions
 
 
 @typed
@@ -21,12 +25,13 @@ def network_for(robot: Robot, hidden: int | None = None, *, heading: bool = Fals
         heading: Whether the network holds its heading.
 
     Raises:
-        InputError: The number of hidden neurons is out of range, or a motor has no command range.
+        InputError: The number of hidden neurons is out of range, a motor has no command range, or
+            the robot cannot hold its heading.
     """
     neurons = HIDDEN_NEURONS if hidden is None else hidden
     if not 1 <= neurons <= MAX_HIDDEN_NEURONS:
         raise InputError(f"a network has 1 to {MAX_HIDDEN_NEURONS} hidden neurons, got {neurons}")
-    names = robot.anatomy.names
+    names = _checked(robot, heading=heading).anatomy.names
     ranges = command_ranges(robot.model)
     return Network(names.sensors, names.motors, neurons, ranges=ranges, heading=heading)
 
@@ -41,16 +46,32 @@ def cpg_for(robot: Robot, hidden: int | None = None, *, heading: bool = False) -
         heading: Whether the CPG holds its heading.
 
     Raises:
-        InputError: A number of hidden neurons is given, or a motor has no command range.
+        InputError: A number of hidden neurons is given, a motor has no command range, or the robot
+            cannot hold its heading.
     """
     if hidden is not None:
         raise InputError(
             f"a CPG has no hidden neurons, got --neurons {hidden}: leave --neurons out"
         )
-    names = robot.anatomy.names
+    names = _checked(robot, heading=heading).anatomy.names
     ranges = command_ranges(robot.model)
     timestep = robot.control_timestep
     return Cpg(names.sensors, names.motors, timestep, ranges=ranges, heading=heading)
+
+
+def _checked(robot: Robot, *, heading: bool) -> Robot:
+    """Returns a robot that can hold its heading, if it is to."""
+    model = robot.model
+    joint = int(model.body(robot.root).jntadr[0])
+    first = int(model.jnt_qposadr[joint]) + 3
+    is_free = joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+    ahead = directions(model.qpos0[first : first + 4])[:2] if is_free else np.zeros(2)
+    if heading and not np.allclose(ahead, (1, 0), atol=0.01):
+        raise InputError(
+            f"expected a robot with a free base whose x axis points forward in its initial pose, "
+            f"to hold its heading, got {robot.name}: leave +heading out"
+        )
+    return robot
 
 
 DESIGNS: Mapping[str, Callable[[Robot, int | None], Design]] = {

@@ -7,6 +7,7 @@ import pytest
 
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.controllers.heading import HeadingHold
+from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair import HEADINGS, RobustRepair
 from selfmodel.recovery.uncertainty import assumed_uncertainty
@@ -15,6 +16,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.rotation import directions
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.tasks import entry
 
 BOTH = pytest.mark.parametrize("name", ["network", "cpg"])
 
@@ -56,6 +58,13 @@ def test_straight_ahead_the_commands_are_those_without_a_hold_and_always_in_the_
     np.testing.assert_array_equal(straight, commands(plain, own, [0.0])[:, 0])
     assert (np.ptp(left, axis=0) > np.ptp(straight, axis=0)).any()
     assert (np.abs(left) <= np.pi / 4).all()
+
+
+@BOTH
+@pytest.mark.parametrize("body", ["suite-walker-walk", "suite-swimmer-swimmer6"])
+def test_a_robot_that_cannot_hold_a_heading_is_refused(name: str, body: str):
+    with pytest.raises(InputError, match=f"a free base whose x axis .* got {body}: leave \\+head"):
+        DESIGNS[f"{name}+heading"](entry(body).robot(), None)
 
 
 @BOTH

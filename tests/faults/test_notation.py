@@ -52,10 +52,19 @@ def test_what_a_hypothesis_prints_parses_back_to_it(name: str, data: st.DataObje
         ("leg:front_left=locked0.1", "for each of front_left_shoulder, front_left_knee, .* '0.1'"),
         ("leg:front_left=locked0.1/x", "front_left_knee' needs a number .* got 'x'"),
         ("leg:front_left=locked0.1/2", "front_left_knee' needs a number .* got '2'"),
-        ("leg:front_left+leg:front_left=locked0.1/0", r"two severities, 0.0 and \(0.1, 0.0\)"),
-        ("slope=0.1+slope=0.2", "gives slope two severities, 0.1 and 0.2"),
-        ("jam:front_left_knee+jam:front_left_knee=0.2", "two severities, 0.0 and 0.2"),
-        ("jam:front_left_knee=0.1+jam:front_left_knee=0.2", "two severities, 0.1 and 0.2"),
+        (
+            "leg:front_left+leg:front_left=locked0.1/0",
+            "two severities, .*=locked and .*/0.0:",
+        ),
+        ("slope=0.1+slope=0.2", "gives slope two severities, slope=0.1 and slope=0.2"),
+        (
+            "jam:front_left_knee+jam:front_left_knee=0.2",
+            "two severities, jam:.* and .*=0.2:",
+        ),
+        (
+            "jam:front_left_knee=0.1+jam:front_left_knee=0.2",
+            "two severities, .*=0.1 and .*=0.2:",
+        ),
     ],
 )
 def test_a_malformed_notation_says_which_term_and_why(text: str, said: str):

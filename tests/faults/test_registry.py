@@ -12,7 +12,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.kind import Fault, FaultKind
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, PAPER_KINDS, cases_of
-from selfmodel.robot.anatomy import Anatomy
+from selfmodel.robot.anatomy import Anatomy, Joint
 from selfmodel.robot.contacts import reaches_ground
 from selfmodel.robot.model_variant import ModelVariant
 from selfmodel.robot.robot import Robot
@@ -172,6 +172,20 @@ def test_a_limb_is_lost_whole_and_leaves_the_others(body: Robot):
 )
 def test_a_limb_has_the_name_that_its_joints_share(name: str, limbs: str):
     assert list(entry(name).robot().anatomy.limbs) == limbs.split()
+
+
+def test_limbs_of_one_name_have_those_of_their_first_joints():
+    def limb(*names: str) -> list[Joint]:
+        joint = dataclasses.replace(entry("quadruped").robot().anatomy.joints[0])
+        beyond = [frozenset(names[k + 1 :]) for k in range(len(names))]
+        return [
+            dataclasses.replace(joint, name=name, descendants=own)
+            for name, own in zip(names, beyond, strict=True)
+        ]
+
+    joints = (*limb("a_1", "a_2"), *limb("a", "x"))
+    anatomy = dataclasses.replace(entry("quadruped").robot().anatomy, joints=joints)
+    assert list(anatomy.limbs) == ["a_1", "a"]
 
 
 def test_what_a_body_cannot_have_is_left_out():
