@@ -10,7 +10,8 @@ of distances is 10 % larger. The local search:
 1. **Starts**: the best hypotheses of the EA or of the last diagnosis, the empty hypothesis, and the
    ``STARTS`` best single faults by the surrogate comparator, one per kind and part. Severities are
    those of the best levels by the surrogate (``with_fitted_severities``), and they are pruned: most
-   end in the same few hypotheses.
+   end in the same few hypotheses. Where joints stand under commands, the hypotheses that stop them
+   are the only starts, if the trials require them.
 2. **Descent** over the neighbours with one fault more, replaced, or less: the surrogate selects
    ``SHORTLIST_SIZE`` of them, the comparator chooses the best, with its best levels, until the
    total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A

@@ -430,3 +430,17 @@ def test_a_mean_is_not_taken_across_what_predicts_worse():
     mean = with_mean_severities(friction(0.2), valleys, SPACE)
 
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
+
+
+@pytest.mark.parametrize("more", ["", "+sensor:back_left_touch"])
+def test_a_search_from_standing_joints_looks_further_only_where_they_do_not_explain(more: str):
+    known = said("jam:front_left_knee")
+    truth = said(f"{known}{more}")
+    problem = Synthetic(SPACE, additive(truth))
+    problem.standing = frozenset(["front_left_knee"])
+    problem.reference = np.full(PIECES, 0.01)
+    search = LocalSearch(problem)
+
+    assert search.refined([known]) == truth
+    others = search.compared - {INTACT, known}
+    assert bool(others) == bool(more)
