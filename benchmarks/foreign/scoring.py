@@ -251,7 +251,8 @@ def terms(faults: Iterable[str]) -> Terms:
         if keyword != "intact":
             prefix = re.match("[a-z]+", value)  # sensor:NAME=gain0.5 is of the kind sensor-gain
             name = f"{keyword}-{prefix[0]}" if prefix else keyword
-            name = "encoder-slip" if name == "encoder-offset-slip" else name
+            name = {"encoder-offset-slip": "encoder-slip", "leg-locked": "leg"}.get(name, name)
+            number = None if name == "leg" else number  # a leg has angles
             found[name, "" if keyword == "payload" else part] = float(number[0]) if number else None
     return found
 

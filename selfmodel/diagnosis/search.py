@@ -133,7 +133,7 @@ class LocalSearch:
 
         The search starts from the known ones, the best single faults and ``INTACT``; or from the
         known ones alone if joints stand under commands, and the trials require one of them. Those
-        that predict the trials as well as ``INTACT`` predicts the healthy ones are then the optima.
+        that predict the trials as well as ``INTACT`` predicts the healthy ones need no more faults.
         """
         fitted = partial(with_fitted_severities, space=self._space)
         levels = partial(fitted, losses=self.coarse, zooms=0)
@@ -143,7 +143,8 @@ class LocalSearch:
         if not (self.problem.standing and any(starts)):
             further = [INTACT, *self.best_single_faults[:STARTS]]
             starts |= dict.fromkeys(self.pruned(levels(start)) for start in further)
-        local_optima = {start for start in starts if self._is_evident(start)} or {
+        evident = [start for start in starts if self._is_evident(start)]
+        local_optima = {self.pruned(self._descended(one, self._exchanged)) for one in evident} or {
             optimum for start in step([*starts], before=1) for optimum in self.local_optima(start)
         }
         refits = {
@@ -229,10 +230,15 @@ class LocalSearch:
 
     def _replaced(self, current: Hypothesis) -> list[Hypothesis]:
         """The hypotheses with a promising fault in the place of one fault."""
-        faults, more = current.faults, self._with_one_more(current)
+        more = self._with_one_more(current)
+        added = [fault for one in more for fault in one.faults if fault not in current.faults]
+        return self._exchanged(current, added[:PROMISING])
+
+    def _exchanged(self, current: Hypothesis, added: Sequence[Fault] = ()) -> list[Hypothesis]:
+        """The hypotheses with one of the best faults alone, or of others, in one's place."""
+        faults = current.faults
         singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
-        added = [fault for one in more for fault in one.faults if fault not in faults]
-        promising = dict.fromkeys([*singles, *added[:PROMISING]])
+        promising = dict.fromkeys([*singles, *added])
         changed = [
             self._space.canonical([*faults[:i], *faults[i + 1 :], fault])
             for i in range(len(faults))

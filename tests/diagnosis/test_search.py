@@ -432,15 +432,27 @@ def test_a_mean_is_not_taken_across_what_predicts_worse():
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
 
 
-@pytest.mark.parametrize("more", ["", "+sensor:back_left_touch"])
-def test_a_search_from_standing_joints_looks_further_only_where_they_do_not_explain(more: str):
-    known = said("jam:front_left_knee")
-    truth = said(f"{known}{more}")
-    problem = Synthetic(SPACE, additive(truth))
+@pytest.mark.parametrize(
+    ("truth", "sizes"),
+    [("jam:front_left_knee", {0, 1}), ("jam:front_left_knee+sensor:back_left_touch", {0, 1, 2, 3})],
+)
+def test_a_search_from_standing_joints_adds_faults_only_where_they_do_not_explain(
+    truth: str, sizes: set[int]
+):
+    problem = Synthetic(SPACE, additive(said(truth)))
     problem.standing = frozenset(["front_left_knee"])
     problem.reference = np.full(PIECES, 0.01)
     search = LocalSearch(problem)
 
-    assert search.refined([known]) == truth
-    others = search.compared - {INTACT, known}
-    assert bool(others) == bool(more)
+    assert search.refined([said("jam:front_left_knee")]) == said(truth)
+    assert {len(one) for one in search.compared} == sizes
+
+
+def test_a_fault_that_stops_a_joint_gives_way_to_one_that_predicts_better():
+    problem = Synthetic(SPACE, additive(said("break:front_left_knee"), floor=1e-3))
+    problem.standing = frozenset(["front_left_shoulder"])
+    problem.reference = np.full(PIECES, 1e3)  # any hypothesis predicts as well
+    search = LocalSearch(problem)
+    search.pruned = lambda hypothesis: hypothesis
+
+    assert search.refined([said("break:front_left_shoulder")]) == said("break:front_left_knee")
