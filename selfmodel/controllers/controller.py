@@ -19,6 +19,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.playback import Playback, PlaybackBatch
 from selfmodel.errors import InputError, check_type, typed
+from selfmodel.rotation import directions
 
 TARGET_RANGE = np.pi / 4
 """Half range of the paper's motor targets about 0, rad."""
@@ -257,3 +258,39 @@ class CommandScaler:
         np.multiply(outputs, self._half, out=commands)
         if self._centre is not None:
             commands += self._centre
+
+
+MAX_TURN = 0.5
+"""Largest turn that a heading hold distinguishes, rad: a stride is then doubled, or gone."""
+
+HOLDS = ", which holds its heading"
+"""What the description of a design with a heading hold says."""
+
+
+class HeadingHold:
+    """The heading hold of many robots: their strides change as they turn, to go straight.
+
+    Every motor has a gene, by which its stride grows while the robot is turned to the left of the
+    forward direction, and shrinks while it is turned to the right, or the other way round. Neither
+    touch nor angle sensors tell a robot that it walks in a curve. Without genes, it observes and
+    changes nothing.
+
+    Attributes:
+        observed: Orientation of the base, w x y z, ``(n, 4)``; see ``ControllerBatch.observed``.
+    """
+
+    def __init__(self, genes: FloatArray) -> None:
+        self._genes = genes
+        self.observed = {name: np.zeros((len(genes), 4)) for name in observes(genes.shape[1])}
+
+    def scale(self, outputs: FloatArray) -> None:
+        """Scales the strides of the next control step, ``(n, motors)``."""
+        for orientation in self.observed.values():
+            ahead = directions(orientation)
+            turn = np.arctan2(ahead[:, 1], ahead[:, 0])
+            outputs *= 1 + self._genes * np.clip(turn / MAX_TURN, -1, 1)[:, np.newaxis]
+
+
+def observes(genes: int) -> tuple[str, ...]:
+    """Returns the signals that a heading hold of some genes observes."""
+    return ("base_orientation",) if genes else ()

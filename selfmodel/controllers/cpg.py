@@ -17,8 +17,13 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.heading import HOLDS, HeadingHold, observes
+from selfmodel.controllers.controller import (
+    HOLDS,
+    CommandScaler,
+    Design,
+    HeadingHold,
+    observes,
+)
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
 """Bounds of the stride frequency, Hz. A leg of 0.1 to 1 m has a natural pendulum frequency of 0.5
@@ -42,7 +47,7 @@ class Cpg(Design):
 
     Attributes:
         timestep: Control time step, s.
-        heading: Whether the amplitudes hold the heading; see ``heading``.
+        heading: Whether the amplitudes hold the heading; see ``HeadingHold``.
 
     Raises:
         ValueError: The time step is out of range, or the ranges do not fit the motors.

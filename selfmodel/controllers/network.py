@@ -7,8 +7,13 @@ from typing import ClassVar
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.controllers.controller import CommandScaler, Design
-from selfmodel.controllers.heading import HOLDS, HeadingHold, observes
+from selfmodel.controllers.controller import (
+    HOLDS,
+    CommandScaler,
+    Design,
+    HeadingHold,
+    observes,
+)
 
 HIDDEN_NEURONS = 3
 """Hidden neurons of the paper's network."""
@@ -21,7 +26,7 @@ MAX_HIDDEN_NEURONS = 100
 class Network(Design):
     """Design of a recurrent network with one hidden layer of ``hidden`` neurons.
 
-    With ``heading``, the outputs hold it; see ``heading``.
+    With ``heading``, the outputs hold it; see ``HeadingHold``.
     """
 
     name: ClassVar[str] = "network"

@@ -31,9 +31,10 @@ from selfmodel.recovery.result import (
     SearchBegins,
     SelfModelWarning,
     TrialScore,
+    advice,
+    shortfall,
 )
 from selfmodel.recovery.scores import UPRIGHT, Score, check_measurable, observed_in, scores_of
-from selfmodel.recovery.shortfall import advice, shortfall
 from selfmodel.recovery.uncertainty import Posterior, assumed_uncertainty
 from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot

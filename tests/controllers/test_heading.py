@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.controllers.heading import HeadingHold
+from selfmodel.controllers.controller import Controller, Design, HeadingHold, draw_genomes
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.recovery.repair import HEADINGS, RobustRepair

@@ -7,9 +7,8 @@ import pytest
 
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.recovery.result import TrialScore
+from selfmodel.recovery.result import TrialScore, shortfall
 from selfmodel.recovery.scores import DISPLACEMENT
-from selfmodel.recovery.shortfall import shortfall
 from selfmodel.robot.robot import Robot
 from tests.helpers.gaits import gait, logged
 
