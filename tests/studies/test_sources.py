@@ -116,7 +116,8 @@ def test_an_edited_plug_in_makes_its_own_cells_again_and_its_earlier_rows_leave_
     write(folder, my_work=SCRIPT.format(factor=1), own_way="VALUE = 1", other_way="VALUE = 2")
     first = study_in(folder)
     assert first[1] == ""
-    write(folder, own_way="VALUE = 3")
+    # Of another size: the bytecode of a source is that of its second and size.
+    write(folder, own_way="VALUE = 1 + 2")
     begun, said, rows = study_in(folder)
 
     names = [f"way=own_way-seed={seed}" for seed in range(3)]
@@ -145,7 +146,7 @@ def test_a_table_has_no_rows_of_two_sources_of_a_plug_in(folder: Path):
     write(folder, my_work=SCRIPT.format(factor=1), own_way="VALUE = 1", other_way="VALUE = 2")
     study_in(folder)
     shutil.copytree(folder / "study" / "runs", folder / "runs")
-    write(folder, own_way="VALUE = 3")
+    write(folder, own_way="VALUE = 1 + 2")
     _, _, rows = study_in(folder)
     shutil.copytree(folder / "runs", folder / "study" / "runs", dirs_exist_ok=True)
     with pytest.raises(InputError, match=r"with own_way.py .*: a table is of one version of each"):
