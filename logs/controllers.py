@@ -139,7 +139,7 @@ _GRAPH = ("input", "output", "inputs", "outputs", "nodes")
 def _own_arrays(design: Design) -> dict[str, NDArray[Any]]:
     if design.name in KINDS:
         number = KINDS[design.name][1]
-        holds = {"heading": np.array(object=True)} if design.observes else {}
+        holds = {"heading": np.array(object=True)} if design.heading else {}
         return {number: np.array(getattr(design, number)), **holds}
     from selfmodel.controllers.compensation import Compensated  # noqa: PLC0415  # few controllers are one
     from selfmodel.controllers.graph import Graph  # noqa: PLC0415  # few controllers are one

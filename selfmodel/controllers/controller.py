@@ -31,6 +31,9 @@ TASK_PREFIX = "task:"
 """Prefix of the name of a signal that is the observation of a task of dm_control's suite, before a
 key of ``selfmodel.robot.observations``."""
 
+HEADING = ("base_orientation",)
+"""Signals that a heading hold observes."""
+
 Ranges = tuple[tuple[float, float], ...]
 """Centre and half width of the command range per motor, in the motor's unit: rad for a position
 servo, rad/s for a velocity servo, a fraction of the largest torque for many torque motors."""
@@ -63,6 +66,7 @@ class Design(ABC):
         sensors: Names of the inputs, in order.
         motors: Names of the outputs, in order.
         ranges: Command range of each motor; the paper's for all by default.
+        heading: Whether it holds its heading; see ``HeadingHold``.
 
     Raises:
         ValueError: The number of ranges is not the number of motors, or a range is not finite or
@@ -74,6 +78,7 @@ class Design(ABC):
     sensors: tuple[str, ...]
     motors: tuple[str, ...]
     ranges: Ranges = field(default=(), kw_only=True)
+    heading: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         motors, ranges = self.motors, self.ranges or (PAPER_RANGE,) * len(self.motors)
@@ -100,7 +105,7 @@ class Design(ABC):
     @property
     def observes(self) -> tuple[str, ...]:
         """Signals that it observes besides the readings."""
-        return ()
+        return HEADING * self.heading
 
     @property
     def neutral(self) -> tuple[float, ...]:
@@ -281,7 +286,7 @@ class HeadingHold:
 
     def __init__(self, genes: FloatArray) -> None:
         self._genes = genes
-        self.observed = {name: np.zeros((len(genes), 4)) for name in observes(genes.shape[1])}
+        self.observed = {name: np.zeros((len(genes), 4)) for name in HEADING * bool(genes.shape[1])}
 
     def scale(self, outputs: FloatArray) -> None:
         """Scales the strides of the next control step, ``(n, motors)``."""
@@ -289,8 +294,3 @@ class HeadingHold:
             ahead = directions(orientation)
             turn = np.arctan2(ahead[:, 1], ahead[:, 0])
             outputs *= 1 + self._genes * np.clip(turn / MAX_TURN, -1, 1)[:, np.newaxis]
-
-
-def observes(genes: int) -> tuple[str, ...]:
-    """Returns the signals that a heading hold of some genes observes."""
-    return ("base_orientation",) if genes else ()

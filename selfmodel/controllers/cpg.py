@@ -11,7 +11,7 @@ quadruped locomotion* (ICRA 2008).
 
 import math
 from collections.abc import Mapping, Sequence, Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -22,7 +22,6 @@ from selfmodel.controllers.controller import (
     CommandScaler,
     Design,
     HeadingHold,
-    observes,
 )
 
 MIN_FREQUENCY, MAX_FREQUENCY = 0.5, 4.0
@@ -47,7 +46,6 @@ class Cpg(Design):
 
     Attributes:
         timestep: Control time step, s.
-        heading: Whether the amplitudes hold the heading; see ``HeadingHold``.
 
     Raises:
         ValueError: The time step is out of range, or the ranges do not fit the motors.
@@ -56,7 +54,6 @@ class Cpg(Design):
     name: ClassVar[str] = "cpg"
 
     timestep: float
-    heading: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,11 +67,6 @@ class Cpg(Design):
     def weights(self) -> int:
         """Length of a genome: 33 for the paper's quadruped, 67 for its hexapod."""
         return 1 + (3 + self.heading) * len(self.motors) + len(self.sensors)
-
-    @property
-    def observes(self) -> tuple[str, ...]:
-        """The orientation of the base, of a CPG that holds its heading."""
-        return observes(self.heading)
 
     @property
     def description(self) -> str:

@@ -1,7 +1,7 @@
 """Recurrent network: the paper's controller design."""
 
 from collections.abc import Mapping, Sequence, Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +12,6 @@ from selfmodel.controllers.controller import (
     CommandScaler,
     Design,
     HeadingHold,
-    observes,
 )
 
 HIDDEN_NEURONS = 3
@@ -32,7 +31,6 @@ class Network(Design):
     name: ClassVar[str] = "network"
 
     hidden: int = HIDDEN_NEURONS
-    heading: bool = field(default=False, kw_only=True)
 
     @property
     def weights(self) -> int:
@@ -40,11 +38,6 @@ class Network(Design):
         return self.hidden * (len(self.sensors) + 1 + self.hidden) + len(self.motors) * (
             self.hidden + 1 + self.heading
         )
-
-    @property
-    def observes(self) -> tuple[str, ...]:
-        """The orientation of the base, of a network that holds its heading."""
-        return observes(self.heading)
 
     @property
     def description(self) -> str:

@@ -20,8 +20,6 @@ import numpy as np
 from selfmodel import evolution
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
-from selfmodel.controllers.cpg import Cpg
-from selfmodel.controllers.network import Network
 from selfmodel.evolution import Evolution, GenerationCallback, GenomeSearch
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.recovery.candidates import (
@@ -207,7 +205,7 @@ class RobustRepair:
         not. A candidate whose rollouts diverged under most conditions is left out.
         """
         drawn = uncertainty()
-        if isinstance(self.design, Network | Cpg) and self.design.heading:
+        if self.design.heading:
             start = replace(drawn.start, heading=HEADINGS)
             drawn = replace(drawn, start=start)
         search = partial(self._searched, hypotheses, drawn, seeds, rng, on_generation)
