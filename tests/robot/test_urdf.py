@@ -134,7 +134,7 @@ def posed(model: mujoco.MjModel, angles: dict[str, float]) -> mujoco.MjData:
 def test_any_tree_has_the_bodies_of_mujocos_importer_to_the_last_digits(text: str, seed: int):
     keep = '<mujoco><compiler fusestatic="false"/></mujoco></robot>'
     theirs = mujoco.MjModel.from_xml_string(text.replace("</robot>", keep))
-    ours = mujoco.MjModel.from_xml_string(converted(text, base="fixed").text)
+    ours = mujoco.MjModel.from_xml_string(converted(text, base="fixed", armature={"*": 0.0}).text)
     names = [theirs.joint(j).name for j in range(theirs.njnt)]
     angles = dict(zip(names, np.random.default_rng(seed).uniform(-2, 2, len(names)), strict=True))
     there, here = posed(theirs, angles), posed(ours, angles)
@@ -244,9 +244,29 @@ def test_a_servo_turns_no_faster_than_the_velocity_limit_whatever_its_gains(
     assert max(speeds) > (0.8 * limit if math.isfinite(limit) else 10)
 
 
+@pytest.mark.parametrize(
+    ("limits", "given", "expected"),
+    [
+        ({"effort": 20, "velocity": 5}, {}, 0.04),
+        ({"effort": 20, "velocity": 5}, {"velocity": 10}, 0.02),
+        ({"effort": 20, "velocity": 5}, {"armature": 0.3}, 0.3),
+        ({"effort": 20, "velocity": 5}, {"armature": 0}, 0.0),
+        ({"effort": 20, "velocity": 0}, {}, 0.0),
+    ],
+)
+def test_the_rotor_of_a_servo_follows_from_its_limits_or_is_given(
+    limits: dict, given: dict, expected: float, tmp_path: Path
+):
+    text = urdf(link("a"), link("b"), joint("knee", "a", "b", **limits))
+    robot = load_mjcf(written(tmp_path, text), checked_settings({**given, "base": "fixed"}))
+    assert robot.model.dof_armature[0] == pytest.approx(expected)
+    said = [note for note in robot.notes if f"armature {expected:.2g} kg m²" in note]
+    assert bool(said) == (expected > 0)
+
+
 def test_a_velocity_limit_of_nearly_nothing_is_refused(tmp_path: Path):
     text = urdf(link("a"), link("b"), joint("knee", "a", "b", velocity=1e-200))
-    with pytest.raises(InputError, match=r"walker\.urdf: the simulation diverges"):
+    with pytest.raises(InputError, match=r"walker\.urdf: .*armature"):
         load_mjcf(written(tmp_path, text, 'base = "fixed"'))
 
 
