@@ -17,6 +17,7 @@ from .scores import (
     DISPLACEMENT as DISPLACEMENT,
     ENERGY as ENERGY,
     STEPS as STEPS,
+    STRAIGHT as STRAIGHT,
     Score as Score,
     upright_within as upright_within,
 )

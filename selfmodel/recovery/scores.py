@@ -23,6 +23,7 @@ from selfmodel.physical.interface import ObservedRobot, PhysicalRobot
 from selfmodel.recovery.falls import falls_of, first_lasting, steps_in
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
+from selfmodel.rotation import directions
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import NotRecordedError, Trajectory, forward_displacement
@@ -143,9 +144,24 @@ def _displacement(_robot: Robot, _hypothesis: Hypothesis, trajectory: Trajectory
 
 def _upright(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     x = trajectory["base_position"][..., 0]
+    return np.asarray(_before_fall(x, robot, hypothesis, trajectory) - x[..., 0])
+
+
+def _before_fall(
+    values: FloatArray, robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory
+) -> FloatArray:
+    """Returns values, ``(..., steps)``, at the last step before the robot falls, ``(...)``."""
     last = np.maximum(falls_of(robot, hypothesis, trajectory) - 1, 0)
-    end = np.take_along_axis(x, last[..., np.newaxis], axis=-1)[..., 0]
-    return np.asarray(end - x[..., 0])
+    return np.take_along_axis(values, last[..., np.newaxis], axis=-1)[..., 0]
+
+
+def _straight(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
+    ahead = directions(trajectory["base_orientation"])
+    headings = held(np.arctan2(ahead[..., 1], ahead[..., 0]), axis=-1)
+    turns = np.abs(np.unwrap(headings, axis=-1))
+    share = np.minimum(_before_fall(turns, robot, hypothesis, trajectory) / np.pi, 1.0)
+    distance = _upright(robot, hypothesis, trajectory)
+    return np.asarray(distance - share * np.abs(distance))
 
 
 def _upright_less_work(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
@@ -204,6 +220,13 @@ orientation, or lower than ``FALLEN_HEIGHT`` of its standing height. What follow
 nothing: a controller that tips the robot over and crawls on its back earns what it walked before.
 """
 
+STRAIGHT = _metres("straight", UPRIGHT.record, _straight, ends_at_fall=True)
+"""Displacement up to the first fall, m, less its share that is the last turn over 180 degrees.
+
+The turn is that of the base from the forward direction, in which a robot stands at first. A curve
+that costs a displacement little, such as 15 degrees, is longer on a physical robot.
+"""
+
 ENERGY = _metres(
     "energy",
     (*UPRIGHT.record, "joint_efforts", "joint_velocities"),
@@ -234,7 +257,7 @@ A foot comes down when it stands after it swung; see ``STEP_TIME``. Steps on the
 """
 
 SCORES: Mapping[str, Score] = MappingProxyType(
-    {score.name: score for score in (DISPLACEMENT, UPRIGHT, ENERGY, STEPS)}
+    {score.name: score for score in (DISPLACEMENT, UPRIGHT, STRAIGHT, ENERGY, STEPS)}
 )
 """Scores by name."""
 

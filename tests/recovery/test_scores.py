@@ -20,6 +20,7 @@ from selfmodel.recovery.scores import (
     ENERGY,
     LARGEST,
     SCORES,
+    STRAIGHT,
     UPRIGHT,
     WORK_WEIGHT,
     Score,
@@ -176,6 +177,27 @@ def test_height_is_measured_from_the_ground_of_the_hypothesis(quadruped: Robot):
     for hypothesis in (slope, INTACT):
         expected = UPRIGHT.of(quadruped, hypothesis, still)
         assert upright_within(5, 2).of(quadruped, hypothesis, still) == expected
+
+
+@pytest.mark.parametrize("fall", [20, 12])
+@pytest.mark.parametrize("way", [2.0, -2.0])
+@pytest.mark.parametrize("degrees", [-90, 0, 45, 180, 350])
+def test_a_run_is_worth_less_the_more_the_robot_has_turned_at_its_last_step_upright(
+    quadruped: Robot, degrees: int, way: float, fall: int
+):
+    steps = np.arange(20)
+    tilts = np.where(steps < fall, 0.0, np.pi).tolist()
+    x, heights = way * steps / (fall - 1), [quadruped.standing_height] * 20
+    run = walked(quadruped, x.tolist(), tilts, heights)
+    upward = Rotation.from_quat(run["base_orientation"][0], scalar_first=True)
+    headings = np.radians(degrees) * steps[:, np.newaxis] / (fall - 1)
+    turned = Rotation.from_euler("z", headings) * upward
+    run["base_orientation"][0] = turned.as_quat(scalar_first=True)
+    run["base_orientation"][0, 3] = np.nan  # a reading that was lost
+
+    (distance,), (score,) = (one.of(quadruped, INTACT, run) for one in (UPRIGHT, STRAIGHT))
+    assert distance == pytest.approx(way)
+    assert score == pytest.approx(way - abs(way) * min(1, abs(degrees) / 180))
 
 
 @pytest.mark.parametrize("name", SCORES)
