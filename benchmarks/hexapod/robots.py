@@ -52,15 +52,16 @@ _SERVO: Mapping[str, Any] = {"kp": 40.0, "kd": 5 / 3, "timestep": 1 / 240}
 _DAMPED: Mapping[str, Any] = {**_SERVO, "damping": EFFORT / VELOCITY, "velocity": 0}
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "import": {"timestep": 0.0025},
-    "stiff": {"timestep": 0.0025, "kp": 4 * EFFORT / 0.5},
+    "soft": {"timestep": 0.0025, "kp": EFFORT / 0.5},
+    "stiff": {"timestep": 0.0025, "kp": 4 * EFFORT / 0.125},
     "servo": _SERVO,
     "damped": _DAMPED,
     "rotor": {**_DAMPED, "armature": 0.005, "solref": [0.01, 1.0]},
 }
 """Settings of each self-model: as imported, but with a time step that divides the control step; of
-four times the stiffness; with gains as Bullet's motors have them at their time step: a speed
-that would end a tenth of the error in a step; with damping at which the effort reaches the
-velocity limit in place of that limit; and with rotors and harder contacts."""
+a quarter and of four times the stiffness; with gains as Bullet's motors have them at their time
+step: a speed that would end a tenth of the error in a step; with damping at which the effort
+reaches the velocity limit in place of that limit; and with rotors and harder contacts."""
 
 GAIN = 0.1
 """Position gain of Bullet's motors by default; ``servo`` has kp / kd = gain / time step."""

@@ -90,8 +90,8 @@ class _JointSearch:
     """Choice of the faults of joints, beginning with a hypothesis."""
 
     def __init__(self, start: Hypothesis, search: LocalSearch) -> None:
-        self._start, self._problem, self._losses = start, search.problem, search.losses
-        self._space, self._hopeless = search.problem.space, search.hopeless
+        self._start, self._search, self._losses = start, search, search.losses
+        self._problem, self._space = search.problem, search.problem.space
 
     def replaced(self, current: Hypothesis, joint: str) -> Hypothesis:
         """The hypothesis with the best fault of a joint in the place of its present ones."""
@@ -161,10 +161,15 @@ class _JointSearch:
         if np.isnan(self._problem.of_joint(joint, [current])).all():
             return []
         others = [fault for fault in current.faults if fault not in _faults_at(joint, current)]
+        there = [
+            fault
+            for fault in self._space.coarse_candidates
+            if fault.kind.is_of_joint and fault.part == joint
+        ]
+        hopeless = self._search.hopeless([self._space.canonical([fault]) for fault in there])
         by_kind: dict[str, list[Hypothesis]] = {}
-        for fault in self._space.coarse_candidates:
-            is_there = fault.kind.is_of_joint and fault.part == joint
-            if is_there and fault not in self._hopeless:
+        for fault in there:
+            if fault not in hopeless:
                 hypothesis = self._space.canonical([*others, fault])
                 if len(hypothesis) > len(others):
                     by_kind.setdefault(fault.kind.name, []).append(hypothesis)

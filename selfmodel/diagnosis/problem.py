@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import significance
 from selfmodel.diagnosis.direct_evidence import observed_faults, standing_joints
 from selfmodel.diagnosis.losses import LossTable, Parts
 from selfmodel.errors import InputError
@@ -171,6 +172,26 @@ class Problem:
         Encoders that are lost in the trials to explain are left out of the healthy ones.
         """
         return np.concatenate(self._references) if self._references else None
+
+    def is_evident(self, hypothesis: Hypothesis) -> bool:
+        """Returns whether joints stand, and a hypothesis predicts the trials as the healthy ones.
+
+        That is, as well as the empty hypothesis predicts the healthy trials.
+        """
+        if not self.standing or not len(hypothesis) or self.reference is None:
+            return False
+        excess = significance.excess_over_healthy(self.losses([hypothesis])[0], self.reference)
+        return excess < significance.MIN_Z
+
+    @cached_property
+    def of_standing(self) -> list[Fault]:
+        """Coarse candidates that may stop the joints that stand: of these and of their limbs."""
+        parts = {*self.standing}
+        for name, limb in self.space.anatomy.limbs.items():
+            joints = {joint.name for joint in limb}
+            if not self.standing.isdisjoint(joints):
+                parts |= {name, *joints}
+        return [fault for fault in self.space.coarse_candidates if fault.part in parts]
 
     @property
     def hardest(self) -> FloatArray | None:

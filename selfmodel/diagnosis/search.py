@@ -143,8 +143,8 @@ class LocalSearch:
         if not (self.problem.standing and any(starts)):
             further = [INTACT, *self.best_single_faults[:STARTS]]
             starts |= dict.fromkeys(self.pruned(levels(start)) for start in further)
-        evident = [start for start in starts if self._is_evident(start)]
-        local_optima = {self.pruned(self._descended(one, self._exchanged)) for one in evident} or {
+        evident = [start for start in starts if self.problem.is_evident(start)]
+        local_optima = {self.pruned(self._descended(one, self._restood)) for one in evident} or {
             optimum for start in step([*starts], before=1) for optimum in self.local_optima(start)
         }
         refits = {
@@ -154,16 +154,6 @@ class LocalSearch:
         best = self.pruned(fitted(chosen_of(refits, self.losses), losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
-
-    def _is_evident(self, hypothesis: Hypothesis) -> bool:
-        """Returns whether faults that stop joints predict the trials as the healthy ones are."""
-        if not self.problem.standing or not len(hypothesis):
-            return False
-        losses, reference = self.losses([hypothesis])[0], self.problem.reference
-        return (
-            reference is not None
-            and significance.excess_over_healthy(losses, reference) < significance.MIN_Z
-        )
 
     def total_loss(self, hypothesis: Hypothesis) -> float:
         """Returns the sum of the losses of a hypothesis on the trials."""
@@ -232,13 +222,16 @@ class LocalSearch:
         """The hypotheses with a promising fault in the place of one fault."""
         more = self._with_one_more(current)
         added = [fault for one in more for fault in one.faults if fault not in current.faults]
-        return self._exchanged(current, added[:PROMISING])
-
-    def _exchanged(self, current: Hypothesis, added: Sequence[Fault] = ()) -> list[Hypothesis]:
-        """The hypotheses with one of the best faults alone, or of others, in one's place."""
-        faults = current.faults
         singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
-        promising = dict.fromkeys([*singles, *added])
+        return self._exchanged(current, [*singles, *added[:PROMISING]])
+
+    def _restood(self, current: Hypothesis) -> list[Hypothesis]:
+        """The hypotheses with another fault of a limb that stands in the place of one fault."""
+        return self._exchanged(current, self.problem.of_standing)
+
+    def _exchanged(self, current: Hypothesis, others: Sequence[Fault]) -> list[Hypothesis]:
+        """The hypotheses with one of some other faults in the place of one fault."""
+        faults, promising = current.faults, dict.fromkeys(others)
         changed = [
             self._space.canonical([*faults[:i], *faults[i + 1 :], fault])
             for i in range(len(faults))
@@ -248,14 +241,16 @@ class LocalSearch:
 
     def _with_one_more(self, current: Hypothesis) -> list[Hypothesis]:
         """The hypotheses with one fault more that is not hopeless, best first by the surrogate."""
-        known = {*current.faults, *self.hopeless}
+        known = {*current.faults, *self.hopeless(self._space.with_one_more(INTACT))}
         more = self._space.with_one_more(current)
         return self._by_surrogate([one for one in more if not known.issuperset(one.faults)])
 
-    @cached_property
-    def hopeless(self) -> set[Fault]:
-        """Faults that alone have ``LOSS_RATIO`` times the loss of none, by the surrogate."""
-        intact, *rows = self.coarse([INTACT, *(singles := self._space.with_one_more(INTACT))])
+    def hopeless(self, singles: Sequence[Hypothesis]) -> set[Fault]:
+        """Returns the faults that alone have ``LOSS_RATIO`` times the loss of none.
+
+        The losses are those of the surrogate.
+        """
+        intact, *rows = self.coarse([INTACT, *singles])
         limit = significance.LOSS_RATIO * intact.mean() + significance.NEGLIGIBLE_LOSS
         return {
             fault

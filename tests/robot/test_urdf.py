@@ -206,13 +206,14 @@ def servo(kind: str = "revolute", given: dict | None = None, **limits: float) ->
 @pytest.mark.parametrize(
     ("limits", "expected"),
     [
-        ({"lower": -1.5, "upper": 0.75, "effort": 20}, [40, 2, 20, -1.5, 0.75]),
-        ({"lower": -0.1, "upper": 0.3, "effort": 20}, [100, 2, 20, -0.1, 0.3]),
-        ({"velocity": 1e6}, [20, 0.4, 10, -1, 1]),
-        ({"velocity": 0}, [20, 2, 10, -1, 1]),
-        ({"kind": "continuous"}, [20, 1, 10, -math.pi, math.pi]),
+        ({"lower": -1.5, "upper": 0.75, "effort": 20}, [160, 3.2, 20, -1.5, 0.75]),
+        ({"lower": -0.1, "upper": 0.1, "effort": 20}, [200, 4, 20, -0.1, 0.1]),
+        ({"velocity": 1e6}, [80, 1.6, 10, -1, 1]),
+        ({"velocity": 4}, [80, 2.5, 10, -1, 1]),
+        ({"velocity": 0}, [80, 8, 10, -1, 1]),
+        ({"kind": "continuous"}, [80, 1.6, 10, -math.pi, math.pi]),
         ({"given": {"kp": 5, "kd": {"kn*": 0.5}, "effort": 3}}, [5, 0.5, 3, -1, 1]),
-        ({"effort": 0, "given": {"effort": {"knee": 7}}}, [14, 0.7, 7, -1, 1]),
+        ({"effort": 0, "given": {"effort": {"knee": 7}}}, [56, 1.12, 7, -1, 1]),
     ],
 )
 def test_a_servo_follows_from_the_limits_of_its_joint_and_the_settings(
