@@ -432,20 +432,17 @@ def test_a_mean_is_not_taken_across_what_predicts_worse():
     assert degree_of(mean) == pytest.approx(0.2, abs=0.05)
 
 
+@pytest.mark.parametrize("healthy_loss", [0.01, 1e3])
 @pytest.mark.parametrize(
-    ("truth", "sizes"),
-    [("jam:front_left_knee", {0, 1}), ("jam:front_left_knee+sensor:back_left_touch", {0, 1, 2, 3})],
+    "truth", ["jam:front_left_knee", "jam:front_left_knee+sensor:back_left_touch"]
 )
-def test_a_search_from_standing_joints_adds_faults_only_where_they_do_not_explain(
-    truth: str, sizes: set[int]
-):
+def test_a_search_from_standing_joints_finds_what_is_beside_them(truth: str, healthy_loss: float):
     problem = Synthetic(SPACE, additive(said(truth)))
     problem.standing = frozenset(["front_left_knee"])
-    problem.reference = np.full(PIECES, 0.01)
+    problem.reference = np.full(PIECES, healthy_loss)
     search = LocalSearch(problem)
 
     assert search.refined([said("jam:front_left_knee")]) == said(truth)
-    assert {len(one) for one in search.compared} == sizes
 
 
 def test_a_fault_that_stops_a_joint_gives_way_to_one_that_predicts_better():
