@@ -187,8 +187,8 @@ def _network(
         return Function(name, function, 0, file.batched)
     if not name or Path(name).name != name:
         raise InputError(
-            f"{named}: expected a network beside this file, or package.module:function, got "
-            f"{name!r}: copy it here"
+            f"{named}: expected network, the name of a file beside this one or a "
+            f"package.module:function, got {name!r}: copy the file here, and name it"
         )
     return read_network(folder / name, file.activation, file.last)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.operators import BY_SHAPE, OPERATORS, TENSOR_FACTORS, Arguments
+from selfmodel.errors import unknown_name
 
 MAX_NODES = 1000
 """Largest number of operators of a graph."""
@@ -89,7 +90,9 @@ class Graph:
         self._check_names()
         for name, tensor in self.tensors.items():
             if not np.isfinite(tensor).all():
-                raise ValueError(f"the tensor {name} has numbers that are not finite")
+                raise ValueError(
+                    f"the tensor {name} has numbers that are not finite: train or export it again"
+                )
         tensors = {name: frozen(tensor) for name, tensor in self.tensors.items()}
         object.__setattr__(self, "tensors", MappingProxyType(tensors))
         for name, width in (("", self.inputs), *((s.input, s.width) for s in self.states)):
@@ -121,10 +124,7 @@ class Graph:
         known = {self.input, *(state.input for state in self.states), *self.tensors}
         for node in self.nodes:
             if node.operator not in OPERATORS:
-                raise ValueError(
-                    f"the operator {node.operator} is not supported, which are "
-                    f"{', '.join(sorted(OPERATORS))}"
-                )
+                raise unknown_name("operator", node.operator, sorted(OPERATORS))
             if missing := [name for name in node.inputs if name and name not in known]:
                 raise ValueError(f"{missing[0]} is used by {node.operator} before it is computed")
             for name, value in node.attributes:

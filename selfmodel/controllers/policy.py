@@ -171,7 +171,7 @@ class Policy(Design):
             raise ValueError("expected a preset or terms of an observation, got none")
         for term in self.interface.terms:
             if term.name not in TERMS:
-                raise ValueError(f"the term {term.name} is unknown: it may be {', '.join(TERMS)}")
+                raise unknown_name("term", term.name, TERMS)
             for numbers in (term.scale, term.offset):
                 if len(numbers) not in (1, self.width(term.name)):
                     raise ValueError(
@@ -183,7 +183,8 @@ class Policy(Design):
         own, motors = self.interface, len(self.interface.action.motors)
         if self.graph.outputs != motors:
             raise ValueError(
-                f"the network has {self.graph.outputs} outputs, and there are {motors} motors"
+                f"the network has {self.graph.outputs} outputs, and there are {motors} motors: "
+                f"name those that it commands, in its order, as motors of action"
             )
         size = self.inputs
         if isinstance(self.graph, Graph) and self.graph.inputs != size:
@@ -191,7 +192,7 @@ class Policy(Design):
             times = f", {own.history} times" if own.history > 1 else ""
             raise ValueError(
                 f"the network has {self.graph.inputs} inputs, and its terms {size} ({widths}"
-                f"{times})"
+                f"{times}): give those of its training, and its history"
             )
 
     @property

@@ -129,7 +129,7 @@ def test_a_preset_fits_a_network_of_its_size(tmp_path: Path, quadruped: Robot, p
             '[[observation]]\nterms = "gravity"',
             "unknown field `terms`|missing required field `term`",
         ),
-        ('[[observation]]\nterm = "height"', "the term height is unknown"),
+        ('[[observation]]\nterm = "height"', "unknown term 'height'"),
         ('[[observation]]\nterm = "gravity"\nscale = nan', "scale"),
         ('[[observation]]\nterm = "gravity"\nscale = inf', "scale"),
         (
@@ -144,7 +144,7 @@ def test_a_preset_fits_a_network_of_its_size(tmp_path: Path, quadruped: Robot, p
         ("velocity = ", "expected a policy file as TOML: "),
         (
             'activation = "Swish"',
-            "network.npz: expected a network.*operator Swish is not supported",
+            "network.npz: expected a network.*operator 'Swish'",
         ),
     ],
 )
@@ -162,7 +162,7 @@ def test_a_file_with_a_mistake_is_refused_and_the_mistake_named(
 def test_a_network_in_another_folder_is_refused(tmp_path: Path, quadruped: Robot, name: str):
     path = tmp_path / "policy.toml"
     path.write_text(f'network = "{name}"')
-    with pytest.raises(InputError, match=r"policy.toml: expected a network beside this file"):
+    with pytest.raises(InputError, match=r"policy.toml: expected network.*beside this one"):
         read_policy(path, quadruped)
 
 
@@ -250,7 +250,7 @@ def cell(text: str, width: int = 4, layers: int = 1) -> bytes:
         (cell('GRU<hidden_size=4, direction="reverse">'), "direction reverse of GRU is not supp"),
         (cell("GRU<hidden_size=7>"), "expected weights of the hidden size, which are of 4"),
         (edited(without_weights), "expected a network as ONNX"),
-        (onnx_bytes("y = Erf(x)", {}, 6, 6), "the operator Erf is not supported"),
+        (onnx_bytes("y = Erf(x)", {}, 6, 6), "unknown operator 'Erf'"),
     ],
 )
 def test_an_onnx_file_that_is_no_whole_network_is_refused(tmp_path: Path, data: bytes, match: str):
