@@ -202,8 +202,8 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     """Returns the most similar names; a file may have too many or too long ones to compare."""
     if len(name) > _LONGEST_COMPARED or len(names) > _MOST_COMPARED:
         return []
-    short = [one for one in names if len(one) <= _LONGEST_COMPARED]
-    return difflib.get_close_matches(name, short, n=3, cutoff=0.5)
+    short = {one.casefold(): one for one in names if len(one) <= _LONGEST_COMPARED}
+    return [short[one] for one in difflib.get_close_matches(name.casefold(), short, cutoff=0.5)]
 
 
 def listed(names: Sequence[str], most: int = 200) -> str:
