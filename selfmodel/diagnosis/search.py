@@ -133,8 +133,8 @@ class LocalSearch:
 
         The search starts from the known ones, the best single faults and ``INTACT``; or from the
         known ones alone if joints stand under commands, and the trials require one of them. Those
-        that predict the trials as well as ``INTACT`` predicts the healthy ones are descended from
-        by few neighbours; a dead sensor may be beside them all the same.
+        that predict the trials as well as ``INTACT`` predicts the healthy ones are compared by few
+        neighbours; a dead sensor may be beside the best of them all the same.
         """
         fitted = partial(with_fitted_severities, space=self._space)
         levels = partial(fitted, losses=self.coarse, zooms=0)
@@ -145,9 +145,11 @@ class LocalSearch:
             further = [INTACT, *self.best_single_faults[:STARTS]]
             starts |= dict.fromkeys(self.pruned(levels(start)) for start in further)
         evident = [start for start in starts if self.problem.is_evident(start)]
-        local_optima = {self._beside(one) for one in evident} or {
-            optimum for start in step([*starts], before=1) for optimum in self.local_optima(start)
-        }
+        local_optima = (
+            {self._beside(evident)}
+            if evident
+            else {one for start in step([*starts], before=1) for one in self.local_optima(start)}
+        )
         refits = {
             self.pruned(fitted(optimum, losses=self.coarse))
             for optimum in step([*local_optima], before=2)
@@ -226,14 +228,18 @@ class LocalSearch:
         singles = [single.faults[0] for single in self.best_single_faults[:PROMISING]]
         return self._exchanged(current, [*singles, *added[:PROMISING]])
 
-    def _beside(self, evident: Hypothesis) -> Hypothesis:
-        """The pruned end of a descent by faults more, and by others that stop what stands."""
+    def _beside(self, evident: Sequence[Hypothesis]) -> Hypothesis:
+        """The best of some hypotheses by which joints stand, and what is beside it, pruned."""
+
+        def others(current: Hypothesis) -> list[Hypothesis]:
+            return self._exchanged(current, self.problem.of_standing)
 
         def neighbours(current: Hypothesis) -> list[Hypothesis]:
             more = self._by_surrogate(self._space.with_one_more(current))[:SHORTLIST_SIZE]
-            return [*more, *self._exchanged(current, self.problem.of_standing)]
+            return [*more, *others(current)]
 
-        return self.pruned(self._descended(evident, neighbours))
+        best = min((self._descended(one, others) for one in evident), key=self.total_loss)
+        return self.pruned(self._descended(best, neighbours))
 
     def _exchanged(self, current: Hypothesis, others: Sequence[Fault]) -> list[Hypothesis]:
         """The hypotheses with one of some other faults in the place of one fault."""
