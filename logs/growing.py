@@ -19,6 +19,9 @@ from selfmodel.logs.robots import describe_difference
 from selfmodel.trials.signals import SIGNALS, Names
 from selfmodel.trials.trajectory import Sample, StepTiming
 
+_NAMING = ("/joint_states", "/sensors", COMMANDS)
+"""Topics whose messages have the names of the signals."""
+
 _HEAD = 9
 """Bytes of a record before its content: its kind, and the length of the content."""
 
@@ -56,7 +59,9 @@ class GrowingLog:
     def __enter__(self) -> Self:
         self._file = self.path.open("rb")
         if self._file.read(len(MAGIC)) != MAGIC:
-            raise errors.NotMcapError(self.path, "this is not MCAP", advice=errors.ANOTHER)
+            self._file.close()
+            what = "this is not an MCAP file"
+            raise errors.NotMcapError(self.path, what, advice=errors.ANOTHER)
         return self
 
     def __exit__(
@@ -76,16 +81,17 @@ class GrowingLog:
             what = f"the file is damaged: {failure or type(failure).__name__}"
             advice = errors.salvage_it(self.path)
             raise self._contents.error(what, errors.CorruptError, advice) from failure
-        if not self._topics and COMMANDS in self._contents.topics:
+        found = self._contents.topics
+        if not self._topics and all(one in found and found[one].payloads for one in _NAMING):
             self._topics = self._checked_topics()
-        held = [self._contents.topics[topic.name].payloads for topic in self._topics]
+        held = [found[one.name].payloads if one.name in found else [] for one in self._topics]
         count, rows = min(map(len, held), default=0), dict[Part, FloatArray]()
         if not count:
             return []
         for topic, payloads in zip(self._topics, held, strict=True):
             with self._contents.mismatch(f"on {topic.name}"):
                 rows |= topic.unpack(topic.template.decode(payloads[:count])[1])
-        for messages in self._contents.topics.values():
+        for messages in found.values():
             del messages.payloads[:count], messages.times[:count]
         self._steps += count
         return [self._sample(rows, k, self._steps - count + k) for k in range(count)]

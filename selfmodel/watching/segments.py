@@ -19,6 +19,7 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import completed_trial
 from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.estimation import known_rows
 from selfmodel.trials.trajectory import Sample, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
@@ -65,7 +66,10 @@ def last_segment(robot: Robot, comparator: SegmentPrediction, trial: Trial) -> P
         prepared = comparator.prepare(completed_trial(robot, trial))
     steps = piece_steps_of(prepared)
     if steps is None or steps[-1:, 1].tolist() != [trial.trajectory.steps - 1]:
-        raise TrialRefusedError("a step is late")
+        rows = {s: trial.trajectory[s][-1 - comparator.horizon :] for s in comparator.state}
+        lacking = [signal for signal, own in rows.items() if not known_rows(signal, own).all()]
+        reason = f"{lacking[0]} was not observed" if lacking else "a step is late"
+        raise TrialRefusedError(reason)
     return prepared
 
 
