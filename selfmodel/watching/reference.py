@@ -66,6 +66,10 @@ class Reference:
     lowest: FloatArray
     highest: FloatArray
 
+    def usual_score(self, channel: int) -> float:
+        """Returns the median held-out score of a channel."""
+        return float(self.scores[len(self.scores) // 2, channel])
+
     def log_e_values(self, scores: FloatArray) -> FloatArray:
         """Returns the logarithms of the e-values of a segment; 0 for what was not observed."""
         counts = [
@@ -138,13 +142,14 @@ def reference_of(
             f"halves have {MIN_HELD_OUT} segments without late steps, got {count}: record more"
         )
     lowest, highest, speeds = _extent([trial.trajectory for trial in trials])
-    signals = len(channels) - len(robot.anatomy.names.hinges) - len(robot.anatomy.names.sensors)
+    names, scores = robot.anatomy.names, np.concatenate(stretches)
+    first_signal = len(names.hinges) + len(names.sensors)
     return Reference(
         robot=simulator.robot,
         channels=channels,
-        scores=np.sort(np.concatenate(stretches), axis=0),
+        scores=np.sort(scores, axis=0),
         margins=_margins(stretches),
-        loss=float(np.median(np.concatenate(stretches)[:, -signals:].sum(axis=1))),
+        loss=float(np.median(scores[:, first_signal:].sum(axis=1))),
         speeds=speeds,
         lowest=lowest,
         highest=highest,

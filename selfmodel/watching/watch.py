@@ -39,6 +39,9 @@ which they cover a part is another one."""
 MAX_LISTED = 8
 """Causes that a finding lists, at most, the best first."""
 
+FEW = 4
+"""Causes that are left, at most, when they are said before the end."""
+
 
 class Watch:
     """Watches a robot step by step, as its control loop or its trial log gives them.
@@ -145,22 +148,28 @@ class Watch:
                 reason = error.reason
         self._pause = PAUSE if reason else max(self._pause - 1, 0)
         if self._pause:
+            self._detector = Detector(self._run_length)  # what came before may be another motion
             return self._said("not judged", reason)
         self._recent.append((self._time, self._part(newest)))
         if not self._detector.update(self._reference.log_e_values(scores)):
             return self._said("watching")
-        onset, ends = self._detector.onset(), [end for end, _ in self._recent]
+        onset, shown_by = self._detector.onset(), self._detector.shown_by()
+        ends = [end for end, _ in self._recent]
         age, oldest, newest_age = (min(one, len(ends) - 1) for one in onset)
         length = self._step * self._horizon
+        # The change may not have shown at first, or while the robot was not judged.
+        before = ends[max(len(ends) - 2 - oldest, 0)] - length
         self._status = "changed"
         self._change = Finding(
             self._time,
             "changed",
             onset=round(ends[-1 - age] - length, 6),
-            earliest=round(ends[-1 - oldest] - 2 * length, 6),  # it may not have shown at first
+            earliest=round(before, 6),
             latest=ends[-1 - newest_age],
-            shown_by=tuple(self._reference.channels[k] for k in self._detector.shown_by()),
+            shown_by=tuple(self._reference.channels[k] for k in shown_by),
         )
+        hinges = range(len(self.robot.anatomy.hinges))
+        self._usual = {k: self._reference.usual_score(k) for k in shown_by if k in hinges}
         # The first segment that shows it may be one in which it began.
         self._recent = deque(list(self._recent)[len(ends) - age :], MAX_PIECES)
         return [self._change, *self._compared()]
@@ -181,22 +190,23 @@ class Watch:
             return []
         if self._bank is None:
             since = self._window.trial(len(segments) * self._horizon + 1)
-            self._bank = Bank(self._simulator, self._comparator, self._space, since)
+            self._bank = Bank(self._simulator, self._comparator, self._space, since, self._usual)
         remaining = self._bank.remaining(segments)
         is_last = len(segments) >= MAX_PIECES
         if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
             return self._ended(remaining, self._bank.intact_loss(segments))
         named = tuple(rated.hypothesis.without_severities for rated in remaining)
-        is_new = set(named) != set(self._named)
+        if len(named) > FEW or set(named) == set(self._named):
+            return []
         self._named = named
-        return [self._about("changed", remaining)] if is_new else []
+        return [self._about("changed", remaining)]
 
     def _ended(self, remaining: Sequence[Rated], intact: float) -> list[Finding]:
         best = remaining[0]
         if best.hypothesis == INTACT:
             self._forget()
             return self._said("watching")
-        left = share_left(best.loss, intact, self._reference.loss)
+        left = share_left(best.loss, intact, self._reference.loss + sum(self._usual.values()))
         if left is not None and left > MAX_LEFT:
             reason = f"no single fault explains more than {1 - MAX_LEFT:.0%} of the errors"
             return [self._about("unexplained", remaining, reason)]
