@@ -25,7 +25,7 @@ from selfmodel.studies.study import Row
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.watching import Finding
 
-HEALTHY, HEALTHY_PERIOD = 60.0, 5.0
+HEALTHY, HEALTHY_PERIOD = 80.0, 10.0
 """Length of each of the two healthy trials, and time of a gait in them, s."""
 
 PERIOD = 30.0

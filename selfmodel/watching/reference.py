@@ -7,9 +7,10 @@ up to n + 1. The expected value of a healthy score is 1 if it is exchangeable wi
 conformal p-value r / (n + 1), and the calibrator that is proportional to 1 / p).
 
 Neighbouring segments depend on each other, and gaits differ in how well they are predicted. So a
-score is first divided by a **margin** of its channel: the smallest with which stretches of the
-healthy trials, compared with all other stretches, have products of e-values that are 1 or less in
-the mean, over 1 to ``DEPENDENT`` segments.
+score is first divided by a **margin** of its channel: the smallest with which no stretch of the
+healthy trials is evidence against them. Of each stretch, compared with all other stretches, the
+products of 1 to ``DEPENDENT`` neighbouring e-values have an expected value of at most 1, that of a
+log-normal distribution with the mean and the variance of their logarithms.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +34,7 @@ MIN_HELD_OUT = 80
 """Held-out segments, at least: with fewer, no single segment is much evidence."""
 
 STRETCH = 40
-"""Segments of a stretch that is compared with the others: about as long as a gait is kept."""
+"""Segments of a stretch that is compared with the others: 5 s at 100 Hz, as long as a gait."""
 
 DEPENDENT = 8
 """Segments, at most, whose e-values are multiplied to set a margin: a second."""
@@ -165,15 +166,16 @@ def _margins(stretches: Sequence[FloatArray]) -> FloatArray:
 
 
 def _is_enough(margin: float, stretches: Sequence[FloatArray]) -> bool:
-    """Returns whether products of e-values of each stretch against the others are small enough."""
-    products: list[list[float]] = [[] for _ in range(DEPENDENT)]
+    """Returns whether no stretch is evidence against the others."""
     for number, own in enumerate(stretches):
         others = np.sort(np.concatenate([*stretches[:number], *stretches[number + 1 :]]))
         above = len(others) - np.searchsorted(others, _allowed(own, margin))
         sums = np.append(0.0, np.cumsum(_log_e_values(above, len(others))))
-        for length in range(1, min(DEPENDENT, len(own)) + 1):
-            products[length - 1] += np.exp(sums[length:] - sums[:-length]).tolist()
-    return all(np.mean(each) <= 1.0 for each in products if each)
+        for length in range(1, DEPENDENT + 1):
+            logs = sums[length:] - sums[:-length]
+            if logs.mean() + logs.var() / 2 > 0.0:
+                return False
+    return True
 
 
 def _allowed(scores: FloatArray, margin: FloatArray | float) -> FloatArray:
