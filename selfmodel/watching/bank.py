@@ -22,16 +22,17 @@ class Bank:
     """Hypotheses of one fault about a robot that changed, and ``INTACT``.
 
     Jams are at the angles at which the encoders end, and legs of which all joints stand may be
-    locked. The loss is that of the comparator plus that of the hinges that show the change: a fault
-    of a joint changes the motion of that joint most. Hypotheses that are clearly worse than the
-    best one are left out, and not simulated again.
+    locked. Two hypotheses are compared by the loss of the comparator plus that of the hinges that
+    show the change, as far as both predict them: a fault of a joint changes the motion of that
+    joint most. Those that are clearly worse than the best one are left out, and not simulated
+    again.
 
     Args:
         simulator: The self-model.
         comparator: Comparator of the last segment of a trial.
         space: Hypotheses about the robot.
         since: The steps since the change, as a trial.
-        usual: Losses of a healthy robot at the hinges that show the change, by column.
+        hinges: Columns of the hinges that show the change.
     """
 
     def __init__(
@@ -40,15 +41,16 @@ class Bank:
         comparator: Comparator,
         space: HypothesisSpace,
         since: Trial,
-        usual: Mapping[int, float],
+        hinges: Sequence[int],
     ) -> None:
-        self._table, self._usual = LossTable(simulator, comparator), usual
+        self._table, self._hinges = LossTable(simulator, comparator), list(hinges)
         anatomy = space.anatomy
         standing = standing_joints([since], anatomy)
         observed = observed_faults([since], anatomy, standing)
         moving = {*LOCKED_LEG.parts(anatomy)} - {fault.part for fault in observed}
         space = replace(space, observed=observed).without(LOCKED_LEG, moving)
         self._left = [INTACT, *space.with_one_more(INTACT)]
+        self._losses: Mapping[Hypothesis, FloatArray] = {}
 
     def remaining(self, segments: Sequence[TrialPart]) -> list[Rated]:
         """Returns the hypotheses that are not significantly worse than the best, best first.
@@ -56,29 +58,30 @@ class Bank:
         Of those that differ in severities alone, the best one is returned. ``segments`` are those
         since the change, all of them: what was simulated before is known.
         """
-        losses = self._losses(self._left, segments)
-        order = np.argsort(losses.sum(axis=1), kind="stable").tolist()
-        best, rated, left = losses[order[0]], dict[object, Rated](), []
-        for k in order:
-            one, lead = self._left[k], significance.lead(best, losses[k])
+        every = list(dict.fromkeys([*self._left, INTACT]))
+        losses, by_hinge = (
+            self._table.losses(every, segments),
+            self._table.by_hinge(every, segments),
+        )
+        at_hinges = np.array(by_hinge)[:, :, self._hinges]
+        # The first row is of the comparator, the others are of hinges, (1 + hinges, pieces).
+        rows = np.concatenate([losses[:, np.newaxis], at_hinges.swapaxes(1, 2)], axis=1)
+        self._losses = dict(zip(every, rows, strict=True))
+        order = sorted(self._left, key=lambda one: float(self._losses[one][0].sum()))
+        best = order[0]
+        for one in order:
+            own, other = self.compared(one, best)
+            best = one if own.sum() < other.sum() else best
+        leads = {one: significance.lead(*self.compared(best, one)) for one in [best, *order]}
+        self._left = [one for one, lead in leads.items() if lead < significance.MIN_Z_OF_CHANGE]
+        rated = dict[object, Rated]()
+        for one, lead in leads.items():
             if lead < significance.MIN_Z:
-                rated.setdefault(one.without_severities, Rated(one, float(losses[k].mean())))
-            if lead < significance.MIN_Z_OF_CHANGE:
-                left.append(one)
-        self._left = left
+                loss = float(self._losses[one][0].mean())
+                rated.setdefault(one.without_severities, Rated(one, loss))
         return list(rated.values())
 
-    def intact_loss(self, segments: Sequence[TrialPart]) -> float:
-        """Returns the mean loss without a fault."""
-        return float(self._losses([INTACT], segments).mean())
-
-    def _losses(
-        self, hypotheses: Sequence[Hypothesis], segments: Sequence[TrialPart]
-    ) -> FloatArray:
-        losses = self._table.losses(hypotheses, segments)
-        by_hinge = self._table.by_hinge(hypotheses, segments)
-        if by_hinge is not None:
-            for column, usual in self._usual.items():  # a detached hinge is not predicted
-                own = by_hinge[:, :, column]
-                losses = losses + np.where(np.isnan(own), usual, own)
-        return losses
+    def compared(self, one: Hypothesis, other: Hypothesis) -> FloatArray:
+        """Returns the losses by which two hypotheses are compared, ``(2, pieces)``."""
+        both = np.array([self._losses[one], self._losses[other]])
+        return np.asarray(np.where(np.isnan(both).any(axis=0), 0.0, both).sum(axis=1))

@@ -67,10 +67,6 @@ class Reference:
     lowest: FloatArray
     highest: FloatArray
 
-    def usual_score(self, channel: int) -> float:
-        """Returns the median held-out score of a channel."""
-        return float(self.scores[len(self.scores) // 2, channel])
-
     def log_e_values(self, scores: FloatArray) -> FloatArray:
         """Returns the logarithms of the e-values of a segment; 0 for what was not observed."""
         counts = [
@@ -135,7 +131,9 @@ def reference_of(
                 continue
             # A healthy robot may lack a value at times, and its watch says nothing then.
             held_out.append(np.where(np.isnan(scores), np.inf, scores))
-        stretches += [np.array(held_out[k : k + STRETCH]) for k in range(0, len(held_out), STRETCH)]
+        if held_out:
+            count = max(1, round(len(held_out) / STRETCH))
+            stretches += np.array_split(np.array(held_out), count)
     if (count := sum(map(len, stretches))) < MIN_HELD_OUT:
         seconds = 2 * MIN_HELD_OUT * comparator.horizon * robot.control_timestep
         raise InputError(
@@ -171,7 +169,7 @@ def _is_enough(margin: float, stretches: Sequence[FloatArray]) -> bool:
         others = np.sort(np.concatenate([*stretches[:number], *stretches[number + 1 :]]))
         above = len(others) - np.searchsorted(others, _allowed(own, margin))
         sums = np.append(0.0, np.cumsum(_log_e_values(above, len(others))))
-        for length in range(1, DEPENDENT + 1):
+        for length in range(1, min(DEPENDENT, len(own)) + 1):
             logs = sums[length:] - sums[:-length]
             if logs.mean() + logs.var() / 2 > 0.0:
                 return False

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from selfmodel import arguments
 from selfmodel.arguments import KindSource, RobotSource, TrialSource
+from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
@@ -168,8 +169,6 @@ class Watch:
             latest=ends[-1 - newest_age],
             shown_by=tuple(self._reference.channels[k] for k in shown_by),
         )
-        hinges = range(len(self.robot.anatomy.hinges))
-        self._usual = {k: self._reference.usual_score(k) for k in shown_by if k in hinges}
         # The first segment that shows it may be one in which it began.
         self._recent = deque(list(self._recent)[len(ends) - age :], MAX_PIECES)
         return [self._change, *self._compared()]
@@ -190,23 +189,26 @@ class Watch:
             return []
         if self._bank is None:
             since = self._window.trial(len(segments) * self._horizon + 1)
-            self._bank = Bank(self._simulator, self._comparator, self._space, since, self._usual)
+            channels, hinges = self._reference.channels, self.robot.anatomy.hinges
+            shown = [channels.index(name) for name in self._change.shown_by if name in hinges]
+            self._bank = Bank(self._simulator, self._comparator, self._space, since, shown)
         remaining = self._bank.remaining(segments)
         is_last = len(segments) >= MAX_PIECES
         if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
-            return self._ended(remaining, self._bank.intact_loss(segments))
+            return self._ended(remaining, self._bank.compared(remaining[0].hypothesis, INTACT))
         named = tuple(rated.hypothesis.without_severities for rated in remaining)
         if len(named) > FEW or set(named) == set(self._named):
             return []
         self._named = named
         return [self._about("changed", remaining)]
 
-    def _ended(self, remaining: Sequence[Rated], intact: float) -> list[Finding]:
-        best = remaining[0]
-        if best.hypothesis == INTACT:
+    def _ended(self, remaining: Sequence[Rated], compared: FloatArray) -> list[Finding]:
+        """Returns the last finding about a change; ``compared`` is the best with ``INTACT``."""
+        if remaining[0].hypothesis == INTACT:
             self._forget()
             return self._said("watching")
-        left = share_left(best.loss, intact, self._reference.loss + sum(self._usual.values()))
+        best, intact = compared.mean(axis=1).tolist()
+        left = share_left(best, intact, self._reference.loss)
         if left is not None and left > MAX_LEFT:
             reason = f"no single fault explains more than {1 - MAX_LEFT:.0%} of the errors"
             return [self._about("unexplained", remaining, reason)]
