@@ -159,13 +159,13 @@ class Watch:
         age, oldest, newest_age = (min(one, len(ends) - 1) for one in onset)
         length = self._step * self._horizon
         # The change may not have shown at first, or while the robot was not judged.
-        before = ends[max(len(ends) - 2 - oldest, 0)] - length
+        before = ends[: len(ends) - 1 - oldest]
         self._status = "changed"
         self._change = Finding(
             self._time,
             "changed",
             onset=round(ends[-1 - age] - length, 6),
-            earliest=round(before, 6),
+            earliest=round(before[-1] - length, 6) if before else 0.0,
             latest=ends[-1 - newest_age],
             shown_by=tuple(self._reference.channels[k] for k in shown_by),
         )
