@@ -1,7 +1,7 @@
 """Findings: what a watch says, when something about the robot changes."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from selfmodel.faults.hypothesis import Hypothesis
 
@@ -9,8 +9,6 @@ Status = Literal["watching", "not judged", "changed", "explained", "ambiguous", 
 """``watching``: the robot is as it was in the healthy trials. ``not judged``: they do not cover
 what it does. ``changed``: an alarm, whose cause is sought. The others end a watch: one fault is
 left, several are, or none explains what is seen."""
-
-STATUSES: tuple[Status, ...] = get_args(Status)
 
 
 @dataclass(frozen=True)

@@ -188,8 +188,8 @@ def _log_e_values(above: IndexArray, count: int) -> FloatArray:
 
 
 def _extent(trajectories: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Returns the lowest and the highest command, and the largest speed, of each motor."""
+    """Returns the lowest and highest command and the largest speed of each motor; NaN if none."""
     commands = np.concatenate([rows["commands"] for rows in trajectories])
     speeds = np.concatenate([command_speeds(rows) for rows in trajectories])
-    lowest, highest = np.nanmin(commands, axis=0), np.nanmax(commands, axis=0)
-    return lowest, highest, np.asarray(np.nanmax(speeds, axis=0, initial=0.0))
+    lowest, highest = (one.reduce(commands, axis=0) for one in (np.fmin, np.fmax))
+    return lowest, highest, np.asarray(np.fmax.reduce(speeds, axis=0))

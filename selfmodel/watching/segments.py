@@ -20,14 +20,15 @@ from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import completed_trial
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.estimation import known_rows
+from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import Sample, collect
 from selfmodel.trials.trial import Trial, TrialPlan
 
 WINDOW = 12
 """Segments of the window, at most: 1.4 s at 100 Hz, in which the noise of an encoder shows."""
 
-_UNWATCHED = "commands"
-"""Signal of a comparator whose loss needs the controller's state, which a window does not have."""
+_COMMANDS: Signal = "commands"
+"""A signal whose loss needs the controller's state, which a window does not have: no score."""
 
 
 class Window:
@@ -66,7 +67,10 @@ def last_segment(robot: Robot, comparator: SegmentPrediction, trial: Trial) -> P
         prepared = comparator.prepare(completed_trial(robot, trial))
     steps = piece_steps_of(prepared)
     if steps is None or steps[-1:, 1].tolist() != [trial.trajectory.steps - 1]:
-        rows = {s: trial.trajectory[s][-1 - comparator.horizon :] for s in comparator.state}
+        rows = {
+            s: trial.trajectory[s][-1 - comparator.horizon :]
+            for s in (*comparator.state, _COMMANDS)
+        }
         lacking = [signal for signal, own in rows.items() if not known_rows(signal, own).all()]
         reason = f"{lacking[0]} was not observed" if lacking else "a step is late"
         raise TrialRefusedError(reason)
@@ -92,7 +96,7 @@ def scores_of(
     hinges = cast("FloatArray", losses.by_hinge)[0, -1]
     logged = trial.trajectory["sensors"][-comparator.horizon :]
     errors = np.abs(result.trajectory["sensors"][0, -1, 1:] - logged).mean(axis=0)
-    by_signal = {name: loss for name, loss in losses.by_signal.items() if name != _UNWATCHED}
+    by_signal = {name: loss for name, loss in losses.by_signal.items() if name != _COMMANDS}
     signals = [float(loss[0, -1]) for loss in by_signal.values()]
     names = trial.trajectory.names
     scores = np.where(result.diverged[0], np.inf, np.concatenate([hinges, errors, signals]))

@@ -73,13 +73,40 @@ def test_a_gait_that_no_healthy_trial_has_is_not_judged(watch: Watch, quadruped:
     assert "in the healthy trials at" in found.reason
 
 
-def test_steps_without_the_state_are_not_judged(watch: Watch, healthy: list[Sample]):
-    unknown = {"base_orientation": np.full(4, np.nan)}
-    blind = [replace(one, values={**one.values, **unknown}) for one in healthy[200:400]]
+@pytest.mark.parametrize("signal", ["base_orientation", "commands"])
+def test_steps_that_lack_a_signal_are_not_judged(watch: Watch, healthy: list[Sample], signal: str):
+    lost = {signal: np.full_like(healthy[0].values[signal], np.nan)}
+    blind = [replace(one, values={**one.values, **lost}) for one in healthy[200:400]]
     said = findings(watch, [*healthy[:200], *blind])
 
     assert [found.status for found in said] == ["watching", "not judged"]
-    assert "base_orientation" in said[-1].reason
+    assert said[-1].reason == f"{signal} was not observed"
+
+
+def test_an_encoder_that_is_lost_is_no_change(watch: Watch, healthy: list[Sample]):
+    only = np.where(np.arange(8) == 2, np.nan, 1.0)
+    joints = ("joint_positions", "joint_velocities")
+    lost = [
+        replace(one, values={**one.values, **{name: only * one.values[name] for name in joints}})
+        for one in healthy[200:500]
+    ]
+
+    assert [found.status for found in findings(watch, [*healthy[:200], *lost])] == ["watching"]
+
+
+def test_a_robot_without_odometry_is_watched_by_its_onboard_sensors(
+    quadruped: Robot, healthy: list[Sample]
+):
+    unknown = {name: np.full(3, np.nan) for name in ("base_position", "base_linear_velocity")}
+    seen, failed = (
+        [replace(one, values={**one.values, **unknown}) for one in samples]
+        for samples in (healthy, stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 200))
+    )
+    watch = Watch(quadruped, trial_of(quadruped, seen), kinds="body", calibrate=False)
+    *_, last = findings(watch, [*seen[:BEFORE], *failed[BEFORE:]])
+
+    assert last.status == "explained"
+    assert str(last.remaining[0].hypothesis).startswith("jam:back_right_knee")
 
 
 def test_healthy_trials_that_are_too_short_are_refused(quadruped: Robot, healthy: list[Sample]):
