@@ -49,14 +49,13 @@ class Finding:
         return {**vars(self), "shown_by": list(self.shown_by), "remaining": remaining}
 
     def __str__(self) -> str:
-        parts = [f"{self.time:8.2f} s  {self.status}"]
+        clauses = [self.reason] if self.reason else []
         if self.onset is not None:
-            parts.append(f"since t = {self.onset:.2f} s ({self.earliest:.2f} to {self.latest:.2f})")
-        if self.reason:
-            parts.append(self.reason)
+            since = f"since t = {self.onset:.2f} s ({self.earliest:.2f} to {self.latest:.2f})"
+            clauses.insert(0, since)
         if self.remaining:
-            named = "; ".join(rated.hypothesis.words for rated in self.remaining)
-            parts.append(named)
+            clauses.append("; ".join(rated.hypothesis.words for rated in self.remaining))
         elif self.shown_by:
-            parts.append(f"shown by {', '.join(self.shown_by)}")
-        return ": ".join([parts[0], ", ".join(parts[1:])]) if len(parts) > 1 else parts[0]
+            clauses.append(f"shown by {', '.join(self.shown_by)}")
+        said = f"{self.time:8.2f} s  {self.status}"
+        return f"{said}: {', '.join(clauses)}" if clauses else said
