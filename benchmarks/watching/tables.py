@@ -9,20 +9,23 @@ from benchmarks.foreign.scoring import rate
 from selfmodel.studies.study import Row
 from selfmodel.studies.tables import markdown_of, table_of
 
+HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
+"""Column of each part of what names a line."""
+
 
 def table(rows: Sequence[Row]) -> str:
     """Returns a table of the healthy robots, and one of the faults."""
     parts = []
     for command, columns, names in (
         ("healthy", _healthy, ("robot", "gap", "gaits")),
-        ("faults", _faults, ("robot", "gap", "case")),
+        ("faults", _faults, ("robot", "case")),
     ):
         groups: dict[tuple[str, ...], list[Row]] = {}
         for row in rows:
             if row["command"] == command:
                 groups.setdefault(tuple(str(row[name]) for name in names), []).append(row)
         lines = [
-            {**dict(zip(names, name, strict=True)), **columns(chosen)}
+            {**dict(zip((HEADINGS[one] for one in names), name, strict=True)), **columns(chosen)}
             for name, chosen in sorted(groups.items())
         ]
         if lines:
