@@ -1,7 +1,7 @@
 """Error of short predictions from many logged states."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 
@@ -11,7 +11,14 @@ from selfmodel.arrays import BoolArray, FloatArray, IndexArray
 from selfmodel.comparators import encoders, readings
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis.comparator import Losses, Prepared, TrialRefusedError
-from selfmodel.simulation.requests import MAX_CHAIN, chained, command_steps, cut_segments
+from selfmodel.simulation.requests import (
+    MAX_CHAIN,
+    WARM_UP,
+    Segments,
+    chained,
+    command_steps,
+    cut_segments,
+)
 from selfmodel.trials.estimation import (
     BASE,
     JOINTS,
@@ -71,6 +78,8 @@ class SegmentPrediction:
         horizon: Control steps of a segment.
         max_segments: Segments of a short trial, at most, evenly spread over it.
         density: Segments per control step of a longer trial.
+        only_last: Whether only the last segment of a trial is compared, as of a robot that is
+            watched, and predicted beside it what it continues from.
     """
 
     name: str
@@ -78,6 +87,7 @@ class SegmentPrediction:
     horizon: int = 12
     max_segments: int = 80
     density: float = 0.08
+    only_last: bool = False
 
     @property
     def surrogate(self) -> "SegmentPrediction":
@@ -91,6 +101,25 @@ class SegmentPrediction:
         Segments with a late step, and those that warm up a chain, are predicted, because later ones
         may continue from their end, and have no loss.
         """
+        prepared, starts, steady, chains = self._prepared(trial)
+        if self.only_last:
+            last = prepared(slice(-1, None), 1)
+            if isinstance(last.request, Segments) and last.request.independent:
+                return last
+            warm_up = max(1, round(WARM_UP / (self.horizon * trial.trajectory.timestep)))
+            return prepared(slice(-1 - warm_up, None), 1)
+        whole = prepared(slice(None), chains)
+        if chains == 1 or trial.trajectory.time[-1] <= MAX_CHAIN:
+            return whole
+        size = len(starts) // chains
+        parts = [slice(first, first + size) for first in range(0, len(starts), size)]
+        sections = [prepared(own, 1) for own in parts if steady[own].any()]
+        return dataclasses.replace(whole, sections=sections)
+
+    def _prepared(
+        self, trial: Trial
+    ) -> tuple[Callable[[slice, int], Prepared], IndexArray, BoolArray, int]:
+        """Returns a function that prepares some segments in chains, and what ``_starts`` does."""
         trajectory, horizon = trial.trajectory, self.horizon
         states = estimated_states(trajectory, self.state)
         starts, steady, chains = self._starts(trial, states)
@@ -138,13 +167,7 @@ class SegmentPrediction:
             piece_steps = (begins[:, np.newaxis] + np.array([0, horizon]))[steady[own]]
             return Prepared(request, partial(losses, own=own), piece_steps)
 
-        whole = prepared(slice(None), chains)
-        if chains == 1 or trajectory.time[-1] <= MAX_CHAIN:
-            return whole
-        size = len(starts) // chains
-        parts = [slice(first, first + size) for first in range(0, len(starts), size)]
-        sections = [prepared(own, 1) for own in parts if steady[own].any()]
-        return dataclasses.replace(whole, sections=sections)
+        return prepared, starts, steady, chains
 
     def _starts(
         self, trial: Trial, states: Mapping[Signal, FloatArray]

@@ -139,7 +139,7 @@ MAGIC = b"\x89MCAP0\r\n"
 MAX_BYTES = 2**31
 """Largest size of a log, bytes; a quadruped's trial of 10 s takes 0.5 MB."""
 
-_FAILURES = (
+FAILURES = (
     exceptions.McapError,
     ValueError,  # a wrong checksum or digest, and text that is not UTF-8
     RuntimeError,  # lz4
@@ -224,8 +224,10 @@ def read_undamaged(path: Path, unread: Collection[str] = ()) -> tuple[Contents, 
         raise InputError(f"{path}: expected a log file, got {what}: {errors.ANOTHER}")
     data, contents = read_file(path, "a log file", MAX_BYTES), Contents(path)
     try:
-        _gather(data, contents, unread)
-    except _FAILURES as failure:
+        gatherer = Gatherer(contents, unread)
+        for record in verified_records(data):
+            gatherer.add(record)
+    except FAILURES as failure:
         return contents, _explained(data, failure, contents)
     return contents, None
 
@@ -287,25 +289,31 @@ def _check_sum(data: bytes, start: int, end: int, what: str) -> None:
         raise ValueError(f"the checksum of its {what} is wrong")
 
 
-def _gather(data: bytes, contents: Contents, unread: Collection[str]) -> None:
-    """Adds the records of a file to its contents; raises one of ``_FAILURES`` at damage."""
-    schemas: dict[int, mcap.Schema] = {0: mcap.Schema(0, b"", "", "")}
-    channels: dict[int, Messages] = {}
-    for record in verified_records(data):
+class Gatherer:
+    """Adds the records of a file, one after the other, to its contents."""
+
+    def __init__(self, contents: Contents, unread: Collection[str] = ()) -> None:
+        self.contents, self._unread = contents, unread
+        self._schemas: dict[int, mcap.Schema] = {0: mcap.Schema(0, b"", "", "")}
+        self._channels: dict[int, Messages] = {}
+
+    def add(self, record: mcap.McapRecord) -> None:
+        """Adds a record."""
+        contents = self.contents
         match record:
             case mcap.Message():
-                messages = channels[record.channel_id]
+                messages = self._channels[record.channel_id]
                 messages.payloads.append(record.data)
                 messages.times.append((record.log_time, record.publish_time))
             case mcap.Schema():
-                schemas[record.id] = record
-            case mcap.Channel() if record.id not in channels:  # they are repeated at the end
-                schema = schemas[record.schema_id]
+                self._schemas[record.id] = record
+            case mcap.Channel() if record.id not in self._channels:  # repeated at the end
+                schema = self._schemas[record.schema_id]
                 messages = Messages(schema.name, schema.data, record.message_encoding)
-                channels[record.id] = messages
+                self._channels[record.id] = messages
                 if (record.topic, schema.name) != (records.SEALS, records.SEAL_TYPE):
                     _add_once(contents.topics, record.topic, messages)
-            case mcap.Metadata() if record.name not in unread:
+            case mcap.Metadata() if record.name not in self._unread:
                 texts = record.metadata
                 if record.name.startswith(records.OWN):
                     texts = records.without_digest(record.name, texts)

@@ -259,7 +259,7 @@ def read_trajectory(
             f"its messages have {names.sensors} and {names.motors}"
         )
     parts: dict[Part, FloatArray] = {}
-    for topic in topics(names, record.root, driven=_names_on(contents, COMMANDS)):
+    for topic in topics(names, record.root, driven=names_on(contents, COMMANDS)):
         parts |= _rows(contents, topic, record, steps)
     time = np.arange(steps, dtype=np.float64) * record.control_timestep
     return Trajectory(names, frozen(time), {signal: frozen(parts[signal]) for signal in SIGNALS})
@@ -270,7 +270,7 @@ def read_names(contents: Contents, record: records.TrialRecord) -> Names:
 
     A record with the names of the motors precedes those in the commands.
     """
-    motors = _names_on(contents, COMMANDS)
+    motors = names_on(contents, COMMANDS)
     if record.motors:
         with contents.mismatch("the motors in its record cannot be read"):
             named = msgspec.json.decode(record.motors, type=tuple[str, ...])
@@ -279,13 +279,14 @@ def read_names(contents: Contents, record: records.TrialRecord) -> Names:
             raise contents.error(what)
         motors = named
     return Names(
-        sensors=_names_on(contents, "/sensors"),
+        sensors=names_on(contents, "/sensors"),
         motors=motors,
-        hinges=_names_on(contents, "/joint_states"),
+        hinges=names_on(contents, "/joint_states"),
     )
 
 
-def _names_on(contents: Contents, topic: str) -> tuple[str, ...]:
+def names_on(contents: Contents, topic: str) -> tuple[str, ...]:
+    """Returns the names in the first message of a topic."""
     payload = _messages(contents, topic).payloads[0]
     with contents.mismatch(f"on {topic}"):
         return names_in(payload)

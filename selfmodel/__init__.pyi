@@ -43,3 +43,4 @@ from .testing.contract import ContractError as ContractError
 from .trials.trajectory import Trajectory as Trajectory
 from .trials.trial import Trial as Trial
 from .version import __version__ as __version__
+from .watching.watch import Watch as Watch

@@ -14,7 +14,17 @@ LINKED = ("tasks", "comparators", "logs")
 
 ROOMS = (
     *("controllers", "trials", "robot", "faults", "simulation", "physical", "diagnosis"),
-    *("recovery", *LINKED, "plugins", "arguments", "testing", "studies", "recording", "api"),
+    *(
+        "recovery",
+        *LINKED,
+        "plugins",
+        "arguments",
+        "testing",
+        "studies",
+        "recording",
+        "watching",
+        "api",
+    ),
     *("report", "cli"),
 )
 """The rooms, in the order in which data flows: each may import itself and the rooms before it. Some

@@ -25,6 +25,7 @@ PUBLIC = {
     *("calibrate", "diagnose", "Diagnosis", "recover", "Recovery", "replay", "Settings"),
     *("Comparator", "check_comparator", "check_fault_kind", "check_score", "check_next_trial"),
     *("check_design", "check_search", "load_policy", "export_diagnosis", "ContractError"),
+    "Watch",
     "__version__",
 }
 

@@ -121,7 +121,7 @@ def _stated(machine: Robot, faults: Faults, motions: list[Motion]) -> Faults:
     )
 
 
-def _phase(
+def phase_of(
     start: float, machine: Robot, faults: Faults, model: Callable[..., mujoco.MjModel]
 ) -> Phase:
     """Returns a phase of a trial with the effects of the faults outside the model."""
@@ -147,10 +147,10 @@ def _gaits(machine: Robot, case: Case, plan: Plan, faults: Faults) -> list[Gait]
     kind = "network" if wrong or rng.random() < 1 / 3 else "playback"
     kind = kind if machine.has_odometry else "stride"
     gaits = [draw_gait(machine, kind, rng) for _ in range(CANDIDATES)]
-    return _by_displacement(machine, plan, gaits, faults if case.group == "outside" else ())[:GAITS]
+    return by_displacement(machine, plan, gaits, faults if case.group == "outside" else ())[:GAITS]
 
 
-def _by_displacement(
+def by_displacement(
     machine: Robot, plan: Plan, gaits: list[Gait], outside: Faults = ()
 ) -> list[Gait]:
     """Returns gaits by their displacement of the robot without gap and faults, the largest first.
@@ -160,7 +160,7 @@ def _by_displacement(
     perfect = draw_gap(machine, 0.0, plan.stream("gap"))
 
     def moved(model: mujoco.MjModel, gait: Gait, present: Faults) -> Motion:
-        phase = _phase(0.0, machine, present, lambda _angles: model)
+        phase = phase_of(0.0, machine, present, lambda _angles: model)
         return simulate(machine, [phase], gait, plan.duration)
 
     model = compiled(machine, perfect, ())
@@ -185,7 +185,7 @@ def _by_displacement(
 def _trot(machine: Robot, plan: Plan) -> Gait:
     """Returns the trot with the largest displacement of the robot without gap and faults."""
     rng, kind = plan.stream("trot"), "trot" if machine.has_odometry else "walk"
-    return _by_displacement(machine, plan, [draw_gait(machine, kind, rng) for _ in range(GAITS)])[0]
+    return by_displacement(machine, plan, [draw_gait(machine, kind, rng) for _ in range(GAITS)])[0]
 
 
 def _record(
@@ -203,9 +203,9 @@ def _record(
     rng = plan.stream(plan.gap, name)
     delay, spread = gap.latency
     models = partial(compiled, machine, gap)
-    phases = [_phase(onset or 0.0, machine, faults, partial(models, faults))]
+    phases = [phase_of(onset or 0.0, machine, faults, partial(models, faults))]
     if onset is not None:
-        phases = [_phase(0.0, machine, (), partial(models, ())), *phases]
+        phases = [phase_of(0.0, machine, (), partial(models, ())), *phases]
     motion = simulate(
         machine, phases, gait, plan.duration, lambda: delay + spread * rng.uniform(-1, 1)
     )

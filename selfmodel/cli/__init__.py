@@ -57,6 +57,7 @@ app = group(
         "trial": ("Run and log one trial of the simulated robot.", "trial:trial", "RunTrial"),
         "calibrate": ("Fit the self-model to logged trials.", "calibrate:calibrate", "Calibrate"),
         "diagnose": ("Rank the hypotheses that explain logs.", "diagnose:diagnose", "Diagnose"),
+        "watch": ("Watch a robot through its log as it grows.", "watch:watch", "WatchLog"),
         "replay": ("Simulate a logged trial again, and compare.", "replay:replay", "ReplayTrial"),
         "render": ("Draw a logged trial beside its simulation.", "render:render", "Render"),
         "view": ("Open a logged trial and its simulation in Rerun.", "view:view", "View"),

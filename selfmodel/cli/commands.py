@@ -201,6 +201,23 @@ class Diagnose(FromLogs):
     export: Path | None = None
 
 
+class WatchLog(Command):
+    """Watch a robot through its trial log: alarms, since when, and which single fault explains it.
+
+    With --follow, the log may be one that is being written. Findings are JSON lines unless standard
+    output is a terminal.
+    """
+
+    file: Path
+    healthy: list[Path]
+    follow: bool = False
+    kinds: str = "default"
+    false_alarm_every: float = 3600.0
+    calibrate: bool = True
+    self_model: str | None = None
+    threads: int = 1
+
+
 class ReplayTrial(Simulated):
     """Simulate a logged trial again from its log, and compare the two bit by bit."""
 

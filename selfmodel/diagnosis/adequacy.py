@@ -441,7 +441,9 @@ def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
     for part in problem.trials:
         trajectory = part.rows.trajectory
         times, trial = trajectory.time, part.trial
-        ends = 1 + np.flatnonzero((_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1))
+        ends = 1 + np.flatnonzero(
+            (command_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1)
+        )
         groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
         spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
         most = MAX_LEFT_OUT * np.ptp(times) if trial.plan.name == "imported" else 0.0
@@ -459,14 +461,14 @@ def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
 def _fastest(parts: Sequence[TrialPart]) -> FloatArray:
     """Returns the speed of each motor's commands where any joint was measured, ``(motors,)``."""
     quantiles = []
-    for speeds in (_speeds(part.rows.trajectory) for part in parts):
+    for speeds in (command_speeds(part.rows.trajectory) for part in parts):
         known = speeds[np.isfinite(speeds).all(axis=1)]
         nothing = np.zeros(speeds.shape[1])
         quantiles.append(np.quantile(known, FASTEST, axis=0) if len(known) else nothing)
     return np.asarray(np.max(quantiles, axis=0))
 
 
-def _speeds(trajectory: Trajectory) -> FloatArray:
+def command_speeds(trajectory: Trajectory) -> FloatArray:
     """Returns the speeds of the motors' commands, rad/s, ``(steps - 1, motors)``.
 
     They are NaN at steps without a measured joint, which say nothing about the robot.

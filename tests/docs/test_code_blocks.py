@@ -37,7 +37,7 @@ TIME = re.compile(r"\d+(?=/s\b)|[\d.]+(?= s\b)")
 """Rates and durations, each of which stands for every other."""
 
 SEARCH = re.compile(
-    r"selfmodel (recover|diagnose|calibrate|ablate|suite run|paper|render)"
+    r"selfmodel (recover|diagnose|calibrate|watch|ablate|suite run|paper|render)"
     r"|\b(recover|diagnose|evolve)\("
 )
 """Commands and calls that run an evolutionary algorithm, a calibration or that draw for seconds."""

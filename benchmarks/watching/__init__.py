@@ -1,0 +1,1 @@
+"""Watches of robots of the independent generator: false alarms, delays, causes, onsets, time."""

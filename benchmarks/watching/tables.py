@@ -1,0 +1,81 @@
+"""Tables of the rows of ``benchmarks.watching``, in Markdown."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from benchmarks.foreign.scoring import rate
+from selfmodel.studies.study import Row
+from selfmodel.studies.tables import markdown_of, table_of
+
+HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
+"""Column of each part of what names a line."""
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Returns a table of the healthy robots, and one of the faults."""
+    parts = []
+    for command, columns, names in (
+        ("healthy", _healthy, ("robot", "gap", "gaits")),
+        ("faults", _faults, ("robot", "case")),
+    ):
+        groups: dict[tuple[str, ...], list[Row]] = {}
+        for row in rows:
+            if row["command"] == command:
+                groups.setdefault(tuple(str(row[name]) for name in names), []).append(row)
+        lines = [
+            {**dict(zip((HEADINGS[one] for one in names), name, strict=True)), **columns(chosen)}
+            for name, chosen in sorted(groups.items())
+        ]
+        if lines:
+            parts.append(markdown_of(table_of(command, lines, lines, texts=len(names))))
+    return "\n".join(parts)
+
+
+def _healthy(rows: Sequence[Row]) -> dict[str, str]:
+    hours = sum(row["judged"] for row in rows) / 3600
+    alarms = sum(len(row["alarms"]) for row in rows)
+    # Of a Poisson process: Garwood 1936, Biometrika 28.
+    low = chi2.ppf(0.025, 2 * alarms) / 2 / hours if alarms else 0.0
+    high = chi2.ppf(0.975, 2 * alarms + 2) / 2 / hours
+    total = sum(60 * row["minutes"] for row in rows)
+    return {
+        "robots": str(len(rows)),
+        "hours": f"{total / 3600:.2f}",
+        "judged": f"{100 * 3600 * hours / total:.0f} %",
+        "alarms": str(alarms),
+        "an hour judged": f"{alarms / hours:.2f} ({low:.2f} to {high:.2f})",
+        "real-time factor": f"{sum(row['seconds'] for row in rows) / total:.3f}",
+    }
+
+
+def _faults(rows: Sequence[Row]) -> dict[str, str]:
+    early = [row for row in rows if row["alarm"] is not None and row["alarm"] < row["onset"]]
+    timely = [row for row in rows if row not in early]
+    seen = [row for row in timely if row["alarm"] is not None]
+    delays = [row["alarm"] - row["onset"] for row in seen]
+    # A fault that is not seen counts as one after all others.
+    late = sorted([*delays, *[np.inf] * (len(timely) - len(seen))])
+    errors = [abs(row["dated"][0] - row["onset"]) for row in seen]
+    inside = [row["dated"][1] <= row["onset"] <= row["dated"][2] for row in seen]
+    ends = [row["ended"] - row["alarm"] for row in seen if row["status"] != "changed"]
+    return {
+        "robots": str(len(rows)),
+        "alarm before the onset": str(len(early)),
+        "alarm": rate([row["alarm"] is not None for row in timely]),
+        "delay, s (median; longest)": f"{_middle(late):.2f}; {late[-1]:.2f}" if late else "",
+        "cause right": rate([row["right"] and row["status"] == "explained" for row in timely]),
+        "of those explained": rate([row["right"] for row in seen if row["status"] == "explained"]),
+        "from alarm to cause, s": _range(ends),
+        "error of the onset, s": _range(errors),
+        "onset in its interval": rate(inside),
+    }
+
+
+def _middle(ordered: Sequence[float]) -> float:
+    return ordered[(len(ordered) - 1) // 2]
+
+
+def _range(values: Sequence[float]) -> str:
+    return f"{_middle(sorted(values)):.2f} (to {max(values):.2f})" if values else ""

@@ -1,0 +1,87 @@
+"""A bank of single faults, whose losses since a change are kept up to date segment by segment."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray
+from selfmodel.diagnosis import significance
+from selfmodel.diagnosis.comparator import Comparator
+from selfmodel.diagnosis.direct_evidence import observed_faults, standing_joints
+from selfmodel.diagnosis.losses import LossTable
+from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.joints import LOCKED_LEG
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trial import Trial, TrialPart
+from selfmodel.watching.finding import Rated
+
+
+class Bank:
+    """Hypotheses of one fault about a robot that changed, and ``INTACT``.
+
+    Jams are at the angles at which the encoders end, and legs of which all joints stand may be
+    locked. Two hypotheses are compared by the loss of the comparator plus that of the hinges that
+    show the change, as far as both predict them: a fault of a joint changes the motion of that
+    joint most. Those that are clearly worse than the best one are left out, and not simulated
+    again.
+
+    Args:
+        simulator: The self-model.
+        comparator: Comparator of the last segment of a trial.
+        space: Hypotheses about the robot.
+        since: The steps since the change, as a trial.
+        hinges: Columns of the hinges that show the change.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        comparator: Comparator,
+        space: HypothesisSpace,
+        since: Trial,
+        hinges: Sequence[int],
+    ) -> None:
+        self._table, self._hinges = LossTable(simulator, comparator), list(hinges)
+        anatomy = space.anatomy
+        standing = standing_joints([since], anatomy)
+        observed = observed_faults([since], anatomy, standing)
+        moving = {*LOCKED_LEG.parts(anatomy)} - {fault.part for fault in observed}
+        space = replace(space, observed=observed).without(LOCKED_LEG, moving)
+        self._left = [INTACT, *space.with_one_more(INTACT)]
+        self._losses: Mapping[Hypothesis, FloatArray] = {}
+
+    def remaining(self, segments: Sequence[TrialPart]) -> list[Rated]:
+        """Returns the hypotheses that are not significantly worse than the best, best first.
+
+        Of those that differ in severities alone, the best one is returned. ``segments`` are those
+        since the change, all of them: what was simulated before is known.
+        """
+        every = list(dict.fromkeys([*self._left, INTACT]))
+        losses, by_hinge = (
+            self._table.losses(every, segments),
+            self._table.by_hinge(every, segments),
+        )
+        at_hinges = np.array(by_hinge)[:, :, self._hinges]
+        # The first row is of the comparator, the others are of hinges, (1 + hinges, pieces).
+        rows = np.concatenate([losses[:, np.newaxis], at_hinges.swapaxes(1, 2)], axis=1)
+        self._losses = dict(zip(every, rows, strict=True))
+        order = sorted(self._left, key=lambda one: float(self._losses[one][0].sum()))
+        best = order[0]
+        for one in order:
+            own, other = self.compared(one, best)
+            best = one if own.sum() < other.sum() else best
+        leads = {one: significance.lead(*self.compared(best, one)) for one in [best, *order]}
+        self._left = [one for one, lead in leads.items() if lead < significance.MIN_Z_OF_CHANGE]
+        rated = dict[object, Rated]()
+        for one, lead in leads.items():
+            if lead < significance.MIN_Z:
+                loss = float(self._losses[one][0].mean())
+                rated.setdefault(one.without_severities, Rated(one, loss))
+        return list(rated.values())
+
+    def compared(self, one: Hypothesis, other: Hypothesis) -> FloatArray:
+        """Returns the losses by which two hypotheses are compared, ``(2, pieces)``."""
+        both = np.array([self._losses[one], self._losses[other]])
+        return np.asarray(np.where(np.isnan(both).any(axis=0), 0.0, both).sum(axis=1))

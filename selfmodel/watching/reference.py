@@ -1,0 +1,195 @@
+"""What the healthy trials show: how wrong predictions of a healthy robot are, and of what motions.
+
+The self-model is fitted to the first half of each healthy trial; the scores of the segments of the
+second half are held out. A score of a watched robot becomes an **e-value** by its rank among them:
+with r - 1 of n healthy scores at least as large, it is (n + 1) / (r H), where H is the sum of 1 / k
+up to n + 1. The expected value of a healthy score is 1 if it is exchangeable with those (a
+conformal p-value r / (n + 1), and the calibrator that is proportional to 1 / p).
+
+Neighbouring segments depend on each other, and gaits differ in how well they are predicted. So a
+score is first divided by a **margin** of its channel: the smallest with which no stretch of the
+healthy trials is evidence against them. Of each stretch, compared with all other stretches, the
+products of 1 to ``DEPENDENT`` neighbouring e-values have an expected value of at most 1, that of a
+log-normal distribution with the mean and the variance of their logarithms.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.comparators.segment_prediction import SegmentPrediction
+from selfmodel.diagnosis.adequacy import COVERAGE, command_speeds
+from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.diagnosis.significance import LOSS_FLOOR
+from selfmodel.errors import InputError
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator
+from selfmodel.trials.trajectory import Trajectory, samples_of
+from selfmodel.trials.trial import Trial
+from selfmodel.watching.segments import Window, scores_of
+
+MIN_HELD_OUT = 80
+"""Held-out segments, at least: with fewer, no single segment is much evidence."""
+
+STRETCH = 40
+"""Segments of a stretch that is compared with the others: 5 s at 100 Hz, as long as a gait."""
+
+DEPENDENT = 8
+"""Segments, at most, whose e-values are multiplied to set a margin: a second."""
+
+MARGINS = tuple(float(1.25**power) for power in range(1, 16))
+"""Margins that are tried, up to 28; the smallest is that of the speeds of commands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The healthy robot, as its trials show it.
+
+    Attributes:
+        robot: The self-model, fitted.
+        channels: Names of the scores.
+        scores: Held-out scores of each channel in increasing order, ``(n, channels)``.
+        margins: Factor by which a score may be larger than those, ``(channels,)``.
+        loss: Median held-out loss of the comparator.
+        speeds: Largest speed of each motor's commands, per s, ``(motors,)``.
+        lowest: Lowest command of each motor, ``(motors,)``.
+        highest: Highest command, likewise.
+    """
+
+    robot: Robot
+    channels: tuple[str, ...]
+    scores: FloatArray
+    margins: FloatArray
+    loss: float
+    speeds: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
+
+    def log_e_values(self, scores: FloatArray) -> FloatArray:
+        """Returns the logarithms of the e-values of a segment; 0 for what was not observed."""
+        counts = [
+            np.searchsorted(column, allowed)
+            for column, allowed in zip(self.scores.T, _allowed(scores, self.margins), strict=True)
+        ]
+        n = len(self.scores)
+        return np.where(np.isnan(scores), 0.0, _log_e_values(n - np.array(counts), n))
+
+    def uncovered(self, trial: Trial, steps: int) -> str:
+        """Returns why the healthy trials do not cover the last steps of a trial; "" if they do."""
+        rows = trial.trajectory.rows(slice(-steps - 1, None))
+        lowest, highest, speeds = _extent([rows])
+        slack = (COVERAGE - 1) * (self.highest - self.lowest)
+        for k, motor in enumerate(rows.names.motors):
+            if speeds[k] > COVERAGE * self.speeds[k]:
+                return (
+                    f"{motor} is commanded at {speeds[k]:.2g} rad/s, in the healthy trials at "
+                    f"{self.speeds[k]:.2g} rad/s at most"
+                )
+            if lowest[k] < self.lowest[k] - slack[k] or highest[k] > self.highest[k] + slack[k]:
+                return (
+                    f"{motor} is commanded from {lowest[k]:.2g} to {highest[k]:.2g}, in the "
+                    f"healthy trials from {self.lowest[k]:.2g} to {self.highest[k]:.2g}"
+                )
+        return ""
+
+
+def reference_of(
+    robot: Robot,
+    trials: Sequence[Trial],
+    comparator: SegmentPrediction,
+    fitted: Callable[[Sequence[Trial]], Robot],
+) -> Reference:
+    """Returns what healthy trials show of a robot.
+
+    Args:
+        robot: The nominal robot.
+        trials: Trials of the healthy robot.
+        comparator: Comparator of the last segment of a trial.
+        fitted: Fits the self-model to some trials.
+
+    Raises:
+        InputError: The trials are too short.
+    """
+    first = [trial.trajectory.steps // 2 for trial in trials]
+    parts = [
+        replace(trial, trajectory=trial.trajectory.first(steps))
+        for trial, steps in zip(trials, first, strict=True)
+    ]
+    simulator = Simulator(fitted(parts), threads=1)
+    stretches, channels = list[FloatArray](), tuple[str, ...]()
+    for trial, begin in zip(trials, first, strict=True):
+        window, held_out = Window(robot, comparator.horizon), list[FloatArray]()
+        for sample in samples_of(trial.trajectory):
+            newest = window.add(sample)
+            if newest is None or window.steps - comparator.horizon <= begin:
+                continue
+            try:
+                scores, channels = scores_of(simulator, comparator, newest)
+            except TrialRefusedError:
+                continue
+            # A healthy robot may lack a value at times, and its watch says nothing then.
+            held_out.append(np.where(np.isnan(scores), np.inf, scores))
+        if held_out:
+            count = max(1, round(len(held_out) / STRETCH))
+            stretches += np.array_split(np.array(held_out), count)
+    if (count := sum(map(len, stretches))) < MIN_HELD_OUT:
+        seconds = 2 * MIN_HELD_OUT * comparator.horizon * robot.control_timestep
+        raise InputError(
+            f"expected healthy trials of {seconds:.0f} s or more together, of which the second "
+            f"halves have {MIN_HELD_OUT} segments without late steps, got {count}: record more"
+        )
+    lowest, highest, speeds = _extent([trial.trajectory for trial in trials])
+    names, scores = robot.anatomy.names, np.concatenate(stretches)
+    first_signal = len(names.hinges) + len(names.sensors)
+    return Reference(
+        robot=simulator.robot,
+        channels=channels,
+        scores=np.sort(scores, axis=0),
+        margins=_margins(stretches),
+        loss=float(np.median(scores[:, first_signal:].sum(axis=1))),
+        speeds=speeds,
+        lowest=lowest,
+        highest=highest,
+    )
+
+
+def _margins(stretches: Sequence[FloatArray]) -> FloatArray:
+    """Returns the margin of each channel; see the module."""
+    columns = [[scores[:, k] for scores in stretches] for k in range(stretches[0].shape[1])]
+    return np.array(
+        [next((m for m in MARGINS if _is_enough(m, own)), MARGINS[-1]) for own in columns]
+    )
+
+
+def _is_enough(margin: float, stretches: Sequence[FloatArray]) -> bool:
+    """Returns whether no stretch is evidence against the others."""
+    for number, own in enumerate(stretches):
+        others = np.sort(np.concatenate([*stretches[:number], *stretches[number + 1 :]]))
+        above = len(others) - np.searchsorted(others, _allowed(own, margin))
+        sums = np.append(0.0, np.cumsum(_log_e_values(above, len(others))))
+        for length in range(1, min(DEPENDENT, len(own)) + 1):
+            logs = sums[length:] - sums[:-length]
+            if logs.mean() + logs.var() / 2 > 0.0:
+                return False
+    return True
+
+
+def _allowed(scores: FloatArray, margin: FloatArray | float) -> FloatArray:
+    """Returns scores less what a healthy robot may have beyond its healthy trials."""
+    return np.asarray(np.maximum(scores / margin - LOSS_FLOOR, 0.0))
+
+
+def _log_e_values(above: IndexArray, count: int) -> FloatArray:
+    """Returns the logarithms of e-values, by the number of healthy scores that are as large."""
+    harmonic = float(np.sum(1.0 / np.arange(1, count + 2)))
+    return np.asarray(np.log((count + 1) / ((above + 1) * harmonic)))
+
+
+def _extent(trajectories: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Returns the lowest and highest command and the largest speed of each motor; NaN if none."""
+    commands = np.concatenate([rows["commands"] for rows in trajectories])
+    speeds = np.concatenate([command_speeds(rows) for rows in trajectories])
+    lowest, highest = (one.reduce(commands, axis=0) for one in (np.fmin, np.fmax))
+    return lowest, highest, np.asarray(np.fmax.reduce(speeds, axis=0))

@@ -1,0 +1,236 @@
+"""Watch: whether a robot is as it was in its healthy trials, and if not, since when and why."""
+
+import dataclasses
+from collections import deque
+from collections.abc import Sequence
+
+from selfmodel import arguments
+from selfmodel.arguments import KindSource, RobotSource, TrialSource
+from selfmodel.arrays import FloatArray
+from selfmodel.comparators.segment_prediction import (
+    SEGMENT_PREDICTION,
+    SEGMENT_PREDICTION_ONBOARD,
+)
+from selfmodel.diagnosis.adequacy import MAX_LEFT
+from selfmodel.diagnosis.choice import chosen_comparator
+from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.diagnosis.significance import MIN_PIECES, share_left
+from selfmodel.errors import real_number
+from selfmodel.faults.hypothesis import INTACT
+from selfmodel.faults.hypothesis_space import HypothesisSpace
+from selfmodel.faults.registry import DEFAULT_KINDS
+from selfmodel.robot.robot import Robot
+from selfmodel.simulation.simulator import Simulator, thread_count
+from selfmodel.trials.trajectory import Sample
+from selfmodel.trials.trial import Trial, TrialPart
+from selfmodel.watching.bank import Bank
+from selfmodel.watching.detector import Detector
+from selfmodel.watching.finding import Finding, Rated, Status
+from selfmodel.watching.reference import reference_of
+from selfmodel.watching.segments import Window, last_segment, scores_of
+
+FIRST_PIECES, MAX_PIECES = 4, 40
+"""Segments since a change from which on causes are compared, and after which those that are left
+are the answer."""
+
+PAUSE = 8
+"""Segments that the healthy trials have to cover before the robot is judged again: a motion of
+which they cover a part is another one."""
+
+MAX_LISTED = 8
+"""Causes that a finding lists, at most, the best first."""
+
+FEW = 4
+"""Causes that are left, at most, when they are said before the end."""
+
+
+class Watch:
+    """Watches a robot step by step, as its control loop or its trial log gives them.
+
+    A segment of the comparator of segments is predicted as soon as it is complete, by a self-model
+    that is fitted to the healthy trials. A sequential test says that the robot changed; then single
+    faults are compared over the segments since the change.
+
+    A watch ends with a cause, or with several, or with none. If nothing but ``intact`` is left, the
+    alarm was false, and it goes on.
+
+    Example:
+        >>> import selfmodel
+        >>> walk = selfmodel.read_log("before.mcap").trial.plan.controller
+        >>> robot = selfmodel.load_robot("quadruped")
+        >>> physical = selfmodel.simulated_robot(robot)
+        >>> trial = selfmodel.run_trial(physical, walk, "w.mcap", robot=robot, steps=2000)
+        >>> watch = selfmodel.Watch(robot, trial, calibrate=False)
+        >>> findings = [one for step in physical.run(walk, 100) for one in watch.update(step)]
+        >>> [one.status for one in findings]
+        ['watching']
+
+    Args:
+        robot: The nominal robot, its name, or the path of its MJCF or URDF file.
+        healthy: Trials of the healthy robot, or paths of their logs, in the motions that are to be
+            judged: the first half of each fits the self-model, the second half shows its errors.
+        kinds: Fault kinds of the causes, or names of kinds and of their sets, in a sequence or
+            separated by commas.
+        false_alarm_every: Mean time between false alarms, at least, s of judged time.
+        calibrate: Whether the self-model is fitted to the healthy trials.
+        threads: Threads of the physics; 0 for all processors.
+
+    Raises:
+        InputError: The healthy trials are too short or unusable, or an argument is invalid.
+    """
+
+    def __init__(
+        self,
+        robot: RobotSource,
+        healthy: TrialSource | Sequence[TrialSource],
+        *,
+        kinds: KindSource = DEFAULT_KINDS,
+        false_alarm_every: float = 3600.0,
+        calibrate: bool = True,
+        threads: int = 1,
+    ) -> None:
+        arguments.check_options(lambda _event: None, calibrate=calibrate)
+        every = real_number("false_alarm_every", false_alarm_every, 3600.0, 1.0)
+        robot, count = arguments.load_robot(robot), thread_count(threads)
+        (trials,), _ = arguments.trials_of(healthy)
+        arguments.check_trials(robot, *trials)
+        able = {one.name: one for one in (SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD)}
+        chosen = able[chosen_comparator([*able.values()], robot, trials).comparator.name]
+        self._comparator = dataclasses.replace(chosen, only_last=True)
+
+        def fitted(parts: Sequence[Trial]) -> Robot:
+            return arguments.fitted(robot, parts, count).robot if calibrate else robot
+
+        self._reference = reference_of(robot, trials, self._comparator, fitted)
+        self._space = HypothesisSpace.of(arguments.kinds_of(kinds), robot.anatomy)
+        self._simulator = Simulator(self._reference.robot, count)
+        self._step, self._horizon = robot.control_timestep, chosen.horizon
+        self._run_length = every / (self._step * self._horizon)
+        self.restart()
+
+    @property
+    def robot(self) -> Robot:
+        """The self-model, fitted to the healthy trials."""
+        return self._reference.robot
+
+    def update(self, step: Sample) -> tuple[Finding, ...]:
+        """Adds a step, and returns what is new: most steps have no finding.
+
+        Args:
+            step: State, readings and commands of the next control step, NaN where not observed, as
+                ``PhysicalRobot.run`` yields them.
+        """
+        newest = self._window.add(step)
+        if newest is None or self._status in ("explained", "ambiguous", "unexplained"):
+            return ()
+        return tuple(self._seek(newest) if self._status == "changed" else self._judge(newest))
+
+    def restart(self) -> None:
+        """Begins anew with the next step, at time 0: of another log, or of a repaired robot."""
+        self._window = Window(self.robot, self._horizon)
+        self._status: Status | None = None
+        self._pause = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._detector = Detector(self._run_length)
+        self._recent: deque[tuple[float, TrialPart]] = deque(maxlen=MAX_PIECES)
+        self._change = Finding(0.0, "watching")
+        self._bank: Bank | None = None
+        self._named: tuple[object, ...] = ()
+
+    def _judge(self, newest: Trial) -> list[Finding]:
+        """Returns the findings of a segment as long as no change is known."""
+        reason = self._reference.uncovered(newest, self._horizon)
+        if not reason:
+            try:
+                scores, _ = scores_of(self._simulator, self._comparator, newest)
+            except TrialRefusedError as error:
+                reason = error.reason
+        self._pause = PAUSE if reason else max(self._pause - 1, 0)
+        if self._pause:
+            self._detector = Detector(self._run_length)  # what came before may be another motion
+            return self._said("not judged", reason)
+        self._recent.append((self._time, self._part(newest)))
+        if not self._detector.update(self._reference.log_e_values(scores)):
+            return self._said("watching")
+        onset, shown_by = self._detector.onset(), self._detector.shown_by()
+        ends = [end for end, _ in self._recent]
+        age, oldest, newest_age = (min(one, len(ends) - 1) for one in onset)
+        length = self._step * self._horizon
+        # The change may not have shown at first, or while the robot was not judged.
+        before = ends[: len(ends) - 1 - oldest]
+        self._status = "changed"
+        self._change = Finding(
+            self._time,
+            "changed",
+            onset=round(ends[-1 - age] - length, 6),
+            earliest=round(before[-1] - length, 6) if before else 0.0,
+            latest=ends[-1 - newest_age],
+            shown_by=tuple(self._reference.channels[k] for k in shown_by),
+        )
+        # The first segment that shows it may be one in which it began.
+        self._recent = deque(list(self._recent)[len(ends) - age :], MAX_PIECES)
+        return [self._change, *self._compared()]
+
+    def _seek(self, newest: Trial) -> list[Finding]:
+        """Returns the findings of a segment after a change."""
+        try:
+            last_segment(self.robot, self._comparator, newest)
+        except TrialRefusedError:
+            return []
+        self._recent.append((self._time, self._part(newest)))
+        return self._compared()
+
+    def _compared(self) -> list[Finding]:
+        """Returns what the segments since the change say about its cause."""
+        segments = [part for _, part in self._recent]
+        if len(segments) < FIRST_PIECES:
+            return []
+        if self._bank is None:
+            since = self._window.trial(len(segments) * self._horizon + 1)
+            channels, hinges = self._reference.channels, self.robot.anatomy.hinges
+            shown = [channels.index(name) for name in self._change.shown_by if name in hinges]
+            self._bank = Bank(self._simulator, self._comparator, self._space, since, shown)
+        remaining = self._bank.remaining(segments)
+        is_last = len(segments) >= MAX_PIECES
+        if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
+            return self._ended(remaining, self._bank.compared(remaining[0].hypothesis, INTACT))
+        named = tuple(rated.hypothesis.without_severities for rated in remaining)
+        if len(named) > FEW or set(named) == set(self._named):
+            return []
+        self._named = named
+        return [self._about("changed", remaining)]
+
+    def _ended(self, remaining: Sequence[Rated], compared: FloatArray) -> list[Finding]:
+        """Returns the last finding about a change; ``compared`` is the best with ``INTACT``."""
+        if remaining[0].hypothesis == INTACT:
+            self._forget()
+            return self._said("watching")
+        best, intact = compared.mean(axis=1).tolist()
+        left = share_left(best, intact, self._reference.loss)
+        if left is not None and left > MAX_LEFT:
+            reason = f"no single fault explains more than {1 - MAX_LEFT:.0%} of the errors"
+            return [self._about("unexplained", remaining, reason)]
+        return [self._about("explained" if len(remaining) == 1 else "ambiguous", remaining)]
+
+    def _about(self, status: Status, remaining: Sequence[Rated], reason: str = "") -> Finding:
+        self._status = status
+        return dataclasses.replace(
+            self._change,
+            time=self._time,
+            status=status,
+            reason=reason,
+            remaining=tuple(remaining[:MAX_LISTED]),
+        )
+
+    def _said(self, status: Status, reason: str = "") -> list[Finding]:
+        is_new, self._status = status != self._status, status
+        return [Finding(self._time, status, reason)] if is_new else []
+
+    def _part(self, trial: Trial) -> TrialPart:
+        return TrialPart(trial, begin=float(trial.trajectory.time[-1 - self._horizon]))
+
+    @property
+    def _time(self) -> float:
+        return round((self._window.steps - 1) * self._step, 6)

@@ -1,0 +1,90 @@
+"""``selfmodel watch``: JSON lines of a log, also while it is written."""
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+import selfmodel
+from selfmodel.cli import watch
+from selfmodel.logs.records import TrialHeader
+from selfmodel.logs.writer import TrialWriter
+from selfmodel.robot.robot import Robot
+from selfmodel.settings import Settings
+from selfmodel.trials.trajectory import Sample
+from selfmodel.trials.trial import TrialPlan
+from tests.helpers.command import Done, succeeds
+from tests.watching.conftest import stream, trial_of, walk
+
+pytestmark = pytest.mark.search
+
+STEPS = 500
+Run = Callable[..., Done]
+
+
+@pytest.fixture(scope="module")
+def folder(
+    tmp_path_factory: pytest.TempPathFactory, quadruped: Robot, healthy: list[Sample]
+) -> Path:
+    path = tmp_path_factory.mktemp("logs")
+    selfmodel.write_log(trial_of(quadruped, healthy), path / "healthy.mcap", quadruped)
+    return path
+
+
+@pytest.fixture
+def run(folder: Path) -> Run:
+    """Runs the command on a log."""
+    given = ("--healthy", "healthy.mcap", "--kinds", "body", "--no-calibrate")
+    return lambda log, *options: succeeds("watch", str(log), *given, *options, cwd=folder)
+
+
+def statuses(done: Done) -> list[str]:
+    return [json.loads(line)["status"] for line in done.stdout.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def failed(quadruped: Robot) -> list[Sample]:
+    return stream(quadruped, "jam:back_right_knee=0.3", STEPS)
+
+
+def test_the_findings_of_a_log_are_json_lines(
+    run: Run, folder: Path, quadruped: Robot, failed: list[Sample]
+):
+    selfmodel.write_log(trial_of(quadruped, failed), folder / "failed.mcap", quadruped)
+    done = run("failed.mcap")
+    *_, last = map(json.loads, done.stdout.splitlines())
+
+    assert statuses(done)[0] == "watching"
+    assert last["status"] == "explained"
+    assert last["remaining"][0]["hypothesis"].startswith("jam:back_right_knee")
+    assert f"failed.mcap: {STEPS} steps" in done.stderr
+
+
+def test_a_log_that_is_written_is_followed_to_its_end_and_falling_behind_is_said(
+    run: Run, folder: Path, quadruped: Robot, failed: list[Sample], monkeypatch: pytest.MonkeyPatch
+):
+    plan = TrialPlan("growing", "after", walk(quadruped, STEPS), STEPS, 0)
+    with ExitStack() as stack:
+        made = TrialWriter(folder / "growing.mcap", quadruped, plan, TrialHeader(Settings()))
+        writer, left = stack.enter_context(made), iter(failed)
+        writer.add(next(left))
+        unfinished = run("growing.mcap")
+
+        def written_meanwhile(_seconds: float) -> None:
+            """Writes 50 steps, 250, and then the rest."""
+            count = {1: 50, 51: 250}.get(writer.steps, STEPS - writer.steps)
+            for _ in range(count):
+                writer.add(next(left))
+            if writer.steps == STEPS:
+                stack.close()
+
+        monkeypatch.setattr(watch.time, "sleep", written_meanwhile)
+        followed = run("growing.mcap", "--follow")
+
+    assert unfinished.stdout == ""
+    assert "growing.mcap.part is not finished: --follow waits" in unfinished.stderr
+    assert statuses(followed)[-1] == "explained"
+    assert followed.stderr.count("note: behind by 250 steps") == 1
+    assert f"{STEPS} steps" in followed.stderr
