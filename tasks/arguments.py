@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Anatomy
@@ -53,8 +53,7 @@ def check_names(task_kwargs: Mapping[str, Any]) -> None:
             f"expected task_kwargs as a mapping, such as {{'gap': 0.05}}, got {task_kwargs!r}"
         )
     for name in task_kwargs:
-        if name not in NAMES:
-            raise unknown_name("argument of the task", str(name), NAMES)
+        check_name("argument of the task", str(name), NAMES)
 
 
 def check_time_limit(time_limit: float) -> None:
@@ -135,8 +134,7 @@ def draw_reality(
         )
     for fault in hypothesis.faults:
         known = fault.kind.parts(anatomy)
-        if fault.part not in known:
-            raise unknown_name(f"part of {fault.kind.name} in this body", fault.part, known)
+        check_name(f"part of {fault.kind.name} in this body", fault.part, known)
     _check_number("gap", gap)
     drawn = draw_gap_of(model, anatomy, gap, rng)
     start = gap
