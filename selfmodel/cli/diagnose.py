@@ -128,7 +128,6 @@ def _is_played_back(log: TrialLog) -> bool:
 
 
 def _notes(logs: Sequence[TrialLog]) -> list[str]:
-    """Returns the notes on limits of the logs that affect the ranking."""
     first = logs[0]
     notes = [
         f"{log.trial.path} has no controller: its commands are played back, so a sensor fault "

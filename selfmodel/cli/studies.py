@@ -127,7 +127,6 @@ def _damages(options: Ablate | RunSuite) -> list[str]:
 
 
 def _run(study: Study, options: Computed) -> None:
-    """Runs a study, writes and prints its results, and ends the command."""
     formats.check_format(options.table)
     read_style(options.style)
     failed = _compute(study, options)

@@ -206,13 +206,7 @@ class Graph:
 def layers(
     weights: Sequence[tuple[FloatArray, FloatArray]], activation: str, last: str = "Identity"
 ) -> Graph:
-    """Returns the network of dense layers, each ``(outputs, inputs)`` and its bias ``(outputs,)``.
-
-    Args:
-        weights: Matrix and bias of each layer.
-        activation: Operator between two layers, such as ``Elu``.
-        last: Operator after the last layer.
-    """
+    """Returns the network of dense layers: matrix ``(outputs, inputs)`` and bias ``(outputs,)``."""
     nodes, tensors, value = list[Node](), dict[str, FloatArray](), "input"
     for k, (matrix, bias) in enumerate(weights):
         tensors |= {f"weight{k}": matrix, f"bias{k}": bias}

@@ -123,7 +123,6 @@ class LayerRepair:
         return at_its_size(finite), at_its_size(better or kept[:1])
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
-        """Returns the designs of changes of the controller, by their size."""
         own = self.design
         if isinstance(own, Compensated):
             return list(dict.fromkeys([own, replace(own, feedback=True)]))

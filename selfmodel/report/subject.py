@@ -266,7 +266,6 @@ def subject_of_logs(
 
 
 def _hypothesis_space(robot: Robot, kinds: Iterable[FaultKind]) -> HypothesisSpace:
-    """Returns the hypotheses of built-in and of given kinds."""
     return HypothesisSpace(robot.anatomy, tuple(dict.fromkeys((*ALL_KINDS, *kinds))))
 
 

@@ -57,7 +57,6 @@ def read_study(path: str | Path) -> Study:
 
 
 def _planned(keys: dict[str, Any]) -> Study:
-    """Returns the study of some keys, or raises ``InputError``."""
     for key, example in (("study", "ablation"), ("folder", "runs/dtw")):
         if key not in keys:
             raise InputError(f'expected the key {key}, got none: add {key} = "{example}"')

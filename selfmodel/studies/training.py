@@ -309,7 +309,6 @@ COLUMNS = ("generation", "steps", "cpu_seconds", "mean_return", "best_return")
 
 
 def _body(name: str) -> tuple[Robot, tuple[str, str]]:
-    """Returns a body of the suite by its name, with its domain and its task."""
     known = {
         suite_bodies.name(*parts): parts for parts in suite_bodies.BODIES if parts[0] in REWARDS
     }
