@@ -30,8 +30,6 @@ class Reality:
     """The body of a task as it differs from its model, for all episodes.
 
     Attributes:
-        hypothesis: Its faults.
-        gap: Its reality gap; the level 0 is none.
         seed: Seed of the random parts of the faults, such as terrain.
         start: Noise of the initial pose, as a level of the reality gap.
     """

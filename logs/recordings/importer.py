@@ -46,7 +46,6 @@ class ImportedTrial:
         clock: Clock of the times: ``header``, ``log`` or ``column``.
         origin: Start of the trial, ns since 1970 or since the start of a table's time.
         acceleration: Acceleration that the IMU measured; see ``records.Imported``.
-        notes: Warnings, one sentence each.
     """
 
     trajectory: Trajectory

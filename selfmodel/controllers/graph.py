@@ -35,7 +35,6 @@ class Node:
         operator: Its name in ONNX, a key of ``OPERATORS``.
         inputs: Names of its inputs: the graph's input, its tensors, or outputs of earlier nodes; ""
             for an optional input that is left out.
-        outputs: Names of its outputs.
         attributes: Its numbers by name, as sorted pairs.
     """
 

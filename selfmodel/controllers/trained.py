@@ -165,9 +165,7 @@ class LastLayer:
     """The last layer of weights that the output of a network depends on.
 
     Attributes:
-        input: Name of its input.
         weight: Name of its weights, ``(outputs, inputs)``.
-        output: Name of its output.
         after: Operators between it and the output of the network.
     """
 

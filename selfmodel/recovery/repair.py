@@ -177,7 +177,6 @@ class RobustRepair:
     """Repair under uncertainty; a ``Repair`` whose cost follows from the paper's numbers.
 
     Attributes:
-        make_search: Makes the search for genomes.
         parts: Physics steps in place of each; see ``unflattered``.
     """
 

@@ -68,8 +68,6 @@ class Experiment:
     The fields of the same names are those of ``RecoveryLoop``.
 
     Attributes:
-        robot: The nominal robot.
-        folder: Folder of the run.
         case: Number of the failure in Table I; None for a failure that is not in it.
         truth: Faults of the simulated physical robot after the failure.
         gap: Level of its reality gap.

@@ -204,7 +204,6 @@ class Results:
 
     Attributes:
         facts: Its rows and summaries, by the keys of ``results.json``.
-        tables: Tables of the summaries.
         shown: The table for readers, and ``legend``, the line below it.
         files: Content of its files, by their path in the folder of the study.
         notes: Warnings.
