@@ -154,7 +154,7 @@ class RepairSearch:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
             return np.array(cached_rows(self._known, runs, self._simulate))
 
-        known = _genomes_of(design, seeds)
+        known = [one.genome for one in seeds if one.design == design]
         search = Evolution(design.weights, self.settings, rng, known, draw=draw_genomes)
         evolution.evolve(search, fitness, on_generation, search.generations_left)
         self.evaluations += search.evaluations
@@ -303,10 +303,6 @@ def comparisons_of(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]
     first = max(1, min(FINAL_CONDITIONS, round(rollouts / finalists)))
     last = max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED)))
     return (finalists, first), (JUDGED, last)
-
-
-def _genomes_of(design: Design, controllers: Sequence[Controller]) -> list[FloatArray]:
-    return [controller.genome for controller in controllers if controller.design == design]
 
 
 def _random_controller(design: Design, rng: np.random.Generator) -> Controller:
