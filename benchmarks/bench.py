@@ -32,7 +32,6 @@ from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import PAPER_KINDS
 from selfmodel.logs import read_log
-from selfmodel.logs.journal import FolderJournal
 from selfmodel.logs.log_file import read_contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.records import TrialHeader
@@ -43,6 +42,7 @@ from selfmodel.robot.designs import network_for
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Run, Simulator
+from selfmodel.studies import experiment as experiments
 from selfmodel.studies.experiment import Experiment, run
 from selfmodel.tasks import ROBOTS, Entry, entry, suite_bodies
 from selfmodel.trials.trajectory import Sample
@@ -256,7 +256,7 @@ def one_recovery() -> dict[str, float]:
     """
     robot, spent = ROBOTS["quadruped"].robot(), [0.0]
 
-    def timed(owner: type, name: str) -> None:
+    def timed(owner: object, name: str) -> None:
         original = getattr(owner, name)
 
         def call(*arguments: object) -> object:
@@ -268,7 +268,7 @@ def one_recovery() -> dict[str, float]:
         setattr(owner, name, call)
 
     timed(TrialRunner, "__call__")
-    timed(FolderJournal, "add")
+    timed(experiments, "add_diagnosis")
     with tempfile.TemporaryDirectory() as folder:
         experiment = Experiment(
             robot=robot,

@@ -1,23 +1,18 @@
 """Folder of a recovery: its options, one log per trial, and the diagnoses."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from selfmodel.diagnosis.diagnosis import Diagnosis, diagnosis_from_dict
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis_space import HypothesisSpace
-from selfmodel.faults.kind import FaultKind
 from selfmodel.files import read_file
-from selfmodel.logs.errors import CorruptError, SchemaMismatchError
+from selfmodel.logs.errors import CorruptError
 from selfmodel.logs.files import make_folder, replace_file
-from selfmodel.logs.reader import read_log
 from selfmodel.logs.results import MAX_BYTES, parse_json, read_result, result_bytes
-from selfmodel.robot.anatomy import Anatomy
-from selfmodel.trials.trial import Trial
 
 TRIALS = "trials"
 DIAGNOSES = "diagnoses.json"
@@ -28,62 +23,18 @@ OPTIONS = "options.json"
 """File of the options that no log has, written before the first trial."""
 
 
-@dataclass(frozen=True, eq=False)
-class FolderJournal:
-    """Journal of a recovery in a folder, which ``create_journal`` makes.
-
-    Attributes:
-        folder: Folder with ``trials/NAME.mcap`` for each trial, and ``diagnoses.json``.
-        space: Hypotheses that the diagnoses may name.
-    """
-
-    folder: Path
-    space: HypothesisSpace = field(repr=False)
-
-    @property
-    def trials(self) -> Path:
-        """Folder of the trials' logs."""
-        return self.folder / TRIALS
-
-    def add(self, diagnosis: Diagnosis) -> None:
-        """Writes a diagnosis after the earlier ones."""
-        values = [*_values_of(self.folder), diagnosis.to_dict()]
-        text = json.dumps(values, indent=1, allow_nan=False)
-        replace_file(self.folder / DIAGNOSES, text.encode())
-
-    def read(self) -> tuple[tuple[Trial, ...], tuple[Diagnosis, ...]]:
-        """Returns the finished trials and the diagnoses in the folder, read and verified.
-
-        A ``.part`` file, the log of an interrupted trial, is ignored.
-        """
-        if not self.trials.is_dir():
-            raise InputError(
-                f"{self.folder}: expected the folder of a run, with a folder {TRIALS} in it"
-            )
-        trials = tuple(
-            read_log(path).trial for path in sorted(self.trials.glob("*.mcap"), key=trial_order)
-        )
-        for trial in trials:
-            if trial.trajectory.names != self.space.anatomy.names:
-                raise SchemaMismatchError(
-                    trial.path,
-                    f"it is of the robot {trial.robot!r}, with other sensors, motors or hinges",
-                    advice="give the folder of a run of one robot",
-                )
-        return trials, read_diagnoses(self.folder, self.space)
+def add_diagnosis(folder: Path, diagnosis: Diagnosis) -> None:
+    """Writes a diagnosis after the earlier ones of a run."""
+    values = [*_values_of(folder), diagnosis.to_dict()]
+    text = json.dumps(values, indent=1, allow_nan=False)
+    replace_file(folder / DIAGNOSES, text.encode())
 
 
-def create_journal(
-    folder: Path, anatomy: Anatomy, kinds: Sequence[FaultKind] = (), *, calibrated: bool
-) -> FolderJournal:
-    """Makes the folder of a new run.
+def make_run(folder: Path, *, calibrated: bool) -> None:
+    """Makes the folder of a new run, which does not exist or is empty.
 
-    Args:
-        folder: New or empty folder.
-        anatomy: Parts of the robot.
-        kinds: Third-party kinds that the diagnoses may name, in addition to built-in kinds.
-        calibrated: Whether the self-model is fitted to the trials before the failure: whether
-            ``recover`` gets ``calibrate``. A report of an unfinished run repeats the fit.
+    ``calibrated`` is whether the self-model is fitted to the trials before the failure: a report of
+    an unfinished run repeats the fit.
     """
     try:
         holds = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
@@ -96,7 +47,6 @@ def create_journal(
         )
     make_folder(folder / TRIALS)
     replace_file(folder / OPTIONS, result_bytes({"calibrated": calibrated}))
-    return FolderJournal(folder, HypothesisSpace(anatomy, tuple(kinds)))
 
 
 def is_calibrated(folder: Path) -> bool:

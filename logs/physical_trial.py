@@ -52,8 +52,6 @@ class TrialRunner:
 
     Attributes:
         folder: Existing folder for the logs.
-        robot: Robot as its model describes it.
-        settings: The paper's numbers, for the record.
         hidden: Faults of a simulated physical robot per stage, in notation, for scoring: the logs
             contain them, and nothing else does. A stage may be missing.
         gap: Reality gap of a simulated physical robot at every stage, as JSON, for scoring.

@@ -56,7 +56,6 @@ class TrialLog:
     """Content of a trial log, without the hidden faults of a simulated robot.
 
     Attributes:
-        trial: Plan and observed trajectory.
         mjcf: Model of the healthy robot, as XML. The text is untrusted: load it with
             ``selfmodel.logs.robots.robot_of``.
         assets: Files that the model may name.

@@ -69,8 +69,6 @@ class TrialRecord(Struct, frozen=True, omit_defaults=True):
     Attributes:
         format: Version of the log's format.
         name: Name of the trial within its run.
-        stage: Stage of the recovery.
-        robot: Name of the robot.
         root: Name of the root body, whose motion is on ``/odom``.
         control_timestep: Control time step, s; step k is at k times this value. Time stamps are in
             nanoseconds, and bounded.

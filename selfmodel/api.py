@@ -232,7 +232,7 @@ def diagnose(
     own = own or arguments.robot_of_logs(logs, None)
     arguments.check_trials(own, *to_explain, *reference)
     logged = {log.trial.path: log.settings for log in logs}
-    return set_up_diagnosis(
+    return diagnosis_of_logs(
         to_explain,
         reference,
         robot=own,
@@ -244,7 +244,7 @@ def diagnose(
         calibrate=calibrate,
         threads=threads,
         on_event=on_event,
-    ).run(on_event)
+    ).diagnosis
 
 
 def recover(
@@ -387,7 +387,7 @@ def export_diagnosis(diagnosis: Diagnosis, robot: RobotSource, folder: str | Pat
 
 @dataclass(frozen=True, eq=False)
 class LogDiagnosis:
-    """Inputs of a diagnosis from logged trials: those to explain, and those of the healthy robot.
+    """Diagnosis of logged trials, with those to explain, and those of the healthy robot.
 
     ``comparator`` has the reason for its choice; ``calibration`` is None without a fit.
     """
@@ -398,16 +398,10 @@ class LogDiagnosis:
     calibration: Calibration | None
     search: DiagnosticSearch
     seed: int
-    hypothesis: Hypothesis
-
-    def run(self, on_event: Callable[[Event], None]) -> Diagnosis:
-        """Returns the diagnosis of the trials."""
-        return recovery_loop.diagnose_trials(
-            self.damaged, self.search, self.seed, on_event, hypothesis=self.hypothesis
-        )
+    diagnosis: Diagnosis
 
 
-def set_up_diagnosis(
+def diagnosis_of_logs(
     damaged: Sequence[Trial],
     healthy: Sequence[Trial],
     *,
@@ -421,7 +415,7 @@ def set_up_diagnosis(
     threads: int,
     on_event: Callable[[Event], None],
 ) -> LogDiagnosis:
-    """Returns the inputs of a diagnosis: chooses the comparator, then calibrates.
+    """Returns the diagnosis of trials: chooses the comparator, calibrates, then searches.
 
     The arguments are those of ``diagnose``; without healthy trials, there is no calibration.
 
@@ -450,4 +444,5 @@ def set_up_diagnosis(
         calibrate=fitted if fit else None,
     )
     drawn = damaged[0].plan.seed if seed is None else seed
-    return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn, hypothesis)
+    found = recovery_loop.diagnose_trials(damaged, search, drawn, on_event, hypothesis=hypothesis)
+    return LogDiagnosis(tuple(damaged), tuple(healthy), chosen, fit, search, drawn, found)

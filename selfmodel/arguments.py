@@ -161,9 +161,6 @@ def trials_of(
 ) -> tuple[list[tuple[Trial, ...]], list[TrialLog]]:
     """Returns groups of trials, given as themselves or as paths of their logs, and these logs.
 
-    Args:
-        groups: Each a trial, a path, or a sequence of them.
-
     Raises:
         InputError: A log is unusable or given twice, or an item has another type.
     """

@@ -4,7 +4,7 @@ import difflib
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence, Set as AbstractSet
+from collections.abc import Callable, Collection, Iterable, Sequence, Set as AbstractSet
 from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
@@ -34,17 +34,17 @@ def describe(error: BaseException) -> str:
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> InputError:
-    """Returns the error for an unknown name; its message lists the closest known names.
-
-    Args:
-        what: The kind of object that was named, such as ``"robot"``.
-        name: The unknown name.
-        known: Every valid name.
-    """
+    """Returns the error for an unknown name of ``what``, such as a robot, with the nearest ones."""
     names = [str(item) for item in known]
     nearest = _nearest(str(name), names)
     hint = f"did you mean {listed(nearest)}? " if nearest else ""
     return InputError(f"unknown {what} {name!r}: {hint}the known ones are {listed(names)}")
+
+
+def check_name(what: str, name: str, known: Collection[str]) -> None:
+    """Raises ``InputError`` with the nearest names for a name that is unknown."""
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name(what, name, known)
 
 
 def check_type(got: object, known: type | UnionType, expected: str) -> None:

@@ -116,10 +116,6 @@ def new_file(path: Path, *, replace: bool = False) -> Iterator[IO[bytes]]:
     Until then it has a random name in the same folder, so that two writers of one file do not mix,
     and no remainder of a killed process is in the way. A link of that name is not followed.
 
-    Args:
-        path: Name of the file.
-        replace: Whether a file that has the name is replaced.
-
     Raises:
         FileExistsError: The name is taken, and is not to be replaced.
         OSError: Writing failed. In any case, no file is left, or the old one.

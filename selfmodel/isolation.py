@@ -52,12 +52,7 @@ class IsolationError(InputError):
 
 
 def run_isolated(
-    task: str,
-    request: Message,
-    *,
-    what: str,
-    seconds: int = MODEL_SECONDS,
-    errors: tuple[type[Exception], ...] = (),
+    task: str, request: Message, *, what: str, seconds: int = MODEL_SECONDS
 ) -> Message:
     """Returns the answer of a function that runs in a child process.
 
@@ -66,12 +61,11 @@ def run_isolated(
         request: Argument of the function.
         what: Name of the input for an error message, such as the file's.
         seconds: Limit of the child's processor time, s.
-        errors: Exceptions of the function that are raised again here, with their public attributes
-            as keyword arguments. ``InputError`` and ``WorkError`` always are.
 
     Raises:
         IsolationError: The child crashed, or reached a limit.
-        InputError: The function raised it; so for each class in ``errors``.
+        InputError: The function raised it.
+        WorkError: The function raised it.
     """
     with TemporaryDirectory(prefix="selfmodel-") as scratch:
         try:
@@ -89,7 +83,7 @@ def run_isolated(
         raise _ended(what, child.returncode, seconds)
     answer = _parsed(child.stdout)
     if "error" in answer.header:
-        raise _error(what, answer.header, errors)
+        raise _error(what, **answer.header)
     return answer
 
 
@@ -134,16 +128,14 @@ def _ended(what: str, status: int, seconds: int) -> IsolationError:
     return IsolationError(f"{what} made the process that read it crash with {reason}")
 
 
-def _error(what: str, header: Mapping[str, Any], errors: tuple[type[Exception], ...]) -> Exception:
-    name, text, attributes = header["error"], header["text"], header["attributes"]
-    if name == "MemoryError":
+def _error(what: str, error: str, text: str) -> Exception:
+    if error == "MemoryError":
         return IsolationError(f"{what} takes more memory than this computer has: make it smaller")
-    if name == "RecursionError":
+    if error == "RecursionError":
         return InputError(f"{what} is nested too deeply")
-    for known in (*errors, IsolationError, InputError, WorkError):
-        if known.__name__ == name:
-            error: Exception = known(**attributes) if attributes else known(text)
-            return error
+    for known in (IsolationError, InputError, WorkError):
+        if known.__name__ == error:
+            return known(text)
     return RuntimeError(f"error in the child process of {what}:\n{text}")
 
 
@@ -178,11 +170,10 @@ def _answer(task: Task, request: Message) -> Message:
         return task(request)
     except (InputError, WorkError, MemoryError, RecursionError) as error:
         error.__traceback__ = None  # it may hold the memory
-        attributes = {key: str(value) for key, value in vars(error).items() if key[0] != "_"}
         name, text = type(error).__name__, str(error)
     except Exception:  # noqa: BLE001  # a defect of the task: the caller raises its traceback
-        name, text, attributes = "", traceback.format_exc(), {}
-    return Message({"error": name, "text": text, "attributes": attributes})
+        name, text = "", traceback.format_exc()
+    return Message({"error": name, "text": text})
 
 
 def _main(place: str, seconds: str) -> None:

@@ -4,7 +4,7 @@ A plug-in is an entry point of an installed package, or ``package.module:object`
 """
 
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import entry_points
@@ -18,7 +18,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.comparators import COMPARATORS
 from selfmodel.controllers.controller import Controller, Design, draw_genomes
 from selfmodel.diagnosis.comparator import Comparator, as_comparator
-from selfmodel.errors import InputError, check_type, items_of, unknown_name
+from selfmodel.errors import InputError, check_name, check_type, items_of, unknown_name
 from selfmodel.evolution import Evolution, GenomeSearch
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import ALL_KINDS, KIND_SETS, KINDS, kind_names
@@ -251,12 +251,6 @@ def score_named(source: Score | str | None) -> str | None:
     return name_of("score", source, getattr(source.of, "__module__", ""))
 
 
-def check_known(what: str, name: str, known: Collection[str]) -> None:
-    """Raises ``InputError`` with the nearest names for a name that is unknown."""
-    if not isinstance(name, str) or name not in known:
-        raise unknown_name(what, name, known)
-
-
 def repair(
     name: str = ROBUST,
     search: str | MakeSearch | None = None,
@@ -275,7 +269,7 @@ def repair(
         InputError: A name is unknown, another repair than the robust one is to have another search,
             a repertoire is given without the search that needs it, or that without a repertoire.
     """
-    check_known("repair", name, DEFAULT_SCORES)
+    check_name("repair", name, DEFAULT_SCORES)
     chosen = search_name(name, None, repertoire) if search is None else search
     if chosen != REPERTOIRE:
         make_search = _function("search", chosen)
@@ -320,7 +314,7 @@ def repaired_around(
         InputError: A layer is to be evolved around no controller, or a policy without a layer.
     """
     name = repair or (ROBUST if gait is None else COMPENSATE)
-    check_known("repair", name, DEFAULT_SCORES)
+    check_name("repair", name, DEFAULT_SCORES)
     if name not in FILES:
         if not design.weights:
             raise InputError(

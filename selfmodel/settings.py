@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from selfmodel.errors import InputError, real_number, unknown_name, whole_number
+from selfmodel.errors import InputError, check_name, real_number, whole_number
 
 MAX_SETTINGS: Mapping[str, int] = MappingProxyType(
     {
@@ -79,8 +79,7 @@ class Settings:
     max_simulated_steps: int | None = None
 
     def __post_init__(self) -> None:
-        if self.diagnostic_search not in DIAGNOSTIC_SEARCHES:
-            raise unknown_name("diagnostic search", self.diagnostic_search, DIAGNOSTIC_SEARCHES)
+        check_name("diagnostic search", self.diagnostic_search, DIAGNOSTIC_SEARCHES)
         if (most := self.max_simulated_steps) is not None:
             steps = whole_number("max_simulated_steps", most, 10**6, least=self.steps)
             object.__setattr__(self, "max_simulated_steps", steps)

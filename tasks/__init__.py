@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name, unknown_name
 from selfmodel.robot.mjcf.load import load_mjcf
 from selfmodel.tasks import suite_bodies, suite_tasks
 from selfmodel.tasks.arguments import check_names
@@ -113,8 +113,7 @@ def constructor(domain_name: str | Path, task_name: str) -> Callable[..., "contr
         InputError: The robot or the task is unknown, or the file cannot be a robot.
     """
     if isinstance(domain_name, Path) or Path(domain_name).suffix:
-        if task_name != "walk":
-            raise unknown_name(f"task of {domain_name}", task_name, ("walk",))
+        check_name(f"task of {domain_name}", task_name, ("walk",))
         # Imported here, because dm_control's physics initialises a display when imported.
         from selfmodel.tasks import walking  # noqa: PLC0415  # see the line above
 
@@ -125,8 +124,7 @@ def constructor(domain_name: str | Path, task_name: str) -> Callable[..., "contr
         known = {task: SUITE[domain][task]}
     if known is None:
         raise unknown_name("robot", domain_name, (*SUITE, "a path that ends in .xml"))
-    if task_name not in known:
-        raise unknown_name(f"task of {domain_name}", task_name, known)
+    check_name(f"task of {domain_name}", task_name, known)
     return known[task_name]
 
 

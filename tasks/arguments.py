@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name, check_type, real_number
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.faults.notation import parse
 from selfmodel.robot.anatomy import Anatomy
@@ -30,8 +30,6 @@ class Reality:
     """The body of a task as it differs from its model, for all episodes.
 
     Attributes:
-        hypothesis: Its faults.
-        gap: Its reality gap; the level 0 is none.
         seed: Seed of the random parts of the faults, such as terrain.
         start: Noise of the initial pose, as a level of the reality gap.
     """
@@ -48,27 +46,17 @@ def check_names(task_kwargs: Mapping[str, Any]) -> None:
     Raises:
         InputError: They are no mapping, or one of them is unknown.
     """
-    if not isinstance(task_kwargs, Mapping):
-        raise InputError(
-            f"expected task_kwargs as a mapping, such as {{'gap': 0.05}}, got {task_kwargs!r}"
-        )
+    check_type(task_kwargs, Mapping, "task_kwargs as a mapping, such as {'gap': 0.05}")
     for name in task_kwargs:
-        if name not in NAMES:
-            raise unknown_name("argument of the task", str(name), NAMES)
+        check_name("argument of the task", str(name), NAMES)
 
 
 def check_time_limit(time_limit: float) -> None:
     """Raises ``InputError`` unless the length of an episode is a number above 0."""
-    _check_number("time_limit", time_limit)
-    if not time_limit > 0:
+    if not real_number("time_limit", time_limit, 10, kind="real") > 0:
         raise InputError(
             f"expected a time_limit above 0 s, such as 10 or float('inf'), got {time_limit!r}"
         )
-
-
-def _check_number(name: str, value: float) -> None:
-    if not hasattr(value, "__float__") or isinstance(value, bool):
-        raise InputError(f"expected a number as {name}, such as 0.05, got {value!r}")
 
 
 def random_streams(random: Seed) -> tuple[np.random.RandomState, np.random.Generator]:
@@ -128,21 +116,14 @@ def draw_reality(
     """
     if isinstance(hypothesis, str):
         hypothesis = parse(hypothesis, anatomy)
-    if not isinstance(hypothesis, Hypothesis):
-        raise InputError(
-            f"expected a hypothesis in notation or as a Hypothesis, such as 'wind=5' or 'intact', "
-            f"got {hypothesis!r}"
-        )
+    check_type(hypothesis, Hypothesis, "a Hypothesis or notation such as 'wind=5'")
     for fault in hypothesis.faults:
         known = fault.kind.parts(anatomy)
-        if fault.part not in known:
-            raise unknown_name(f"part of {fault.kind.name} in this body", fault.part, known)
-    _check_number("gap", gap)
-    drawn = draw_gap_of(model, anatomy, gap, rng)
+        check_name(f"part of {fault.kind.name} in this body", fault.part, known)
+    drawn = draw_gap_of(model, anatomy, real_number("gap", gap, 0.05, kind="real"), rng)
     start = gap
     if start_noise is not None:
-        _check_number("start_noise", start_noise)
-        if not 0 <= start_noise <= MAX_START_NOISE:
+        if not 0 <= real_number("start_noise", start_noise, 0.02, kind="real") <= MAX_START_NOISE:
             raise InputError(
                 f"expected a start_noise from 0 to {MAX_START_NOISE:g} rad, such as 0.02, got "
                 f"{start_noise}"

@@ -31,7 +31,6 @@ def _beyond(values: FloatArray, speed: float, margin: float, at_margin: float) -
 
 
 def _little(control: FloatArray) -> FloatArray:
-    """Returns the reward of small commands."""
     each = _tolerance(control, 0, 0, margin=1, value_at_margin=0, sigmoid="quadratic")
     return np.asarray((4 + each.mean(axis=1)) / 5)
 

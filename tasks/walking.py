@@ -83,9 +83,6 @@ def motion_capture(
     """Returns a callable that adds base position, joint efforts and time to an observation.
 
     An ``EnvironmentRobot`` with this callable as ``observe`` records trials with all signals.
-
-    Args:
-        environment: The environment of the observations.
     """
 
     def observe(observation: Mapping[str, FloatArray]) -> Mapping[str, Any]:

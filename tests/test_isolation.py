@@ -7,18 +7,13 @@ import pytest
 from selfmodel import isolation
 from selfmodel.errors import InputError
 from selfmodel.isolation import IsolationError, Message, run_isolated
-from selfmodel.logs import CorruptError
 
 EMPTY = Message({})
 
 
 def run(task: str, request: Message = EMPTY, seconds: int = 20) -> Message:
     return run_isolated(
-        f"tests.helpers.isolated_tasks:{task}",
-        request,
-        what="walk.xml",
-        seconds=seconds,
-        errors=(CorruptError,),
+        f"tests.helpers.isolated_tasks:{task}", request, what="walk.xml", seconds=seconds
     )
 
 
@@ -57,7 +52,7 @@ def test_a_child_that_crashes_or_reaches_a_limit_is_one_sentence(
 @pytest.mark.parametrize(
     ("task", "error", "match"),
     [
-        ("refuse_log", CorruptError, r"walk\.bag.*record it again"),
+        ("refuse", InputError, r"walk\.bag.*record it again"),
         ("nest", InputError, "nested too deeply"),
         ("fail", RuntimeError, r"(?s)walk\.xml.*KeyError: 'a defect'"),
     ],

@@ -171,7 +171,6 @@ class _HashedReader(io.BufferedReader):
         self._hash = hashlib.sha256()
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Reads that many bytes, or the rest."""
         data = super().read(-1 if size is None or size > self.size else size)
         self._hash.update(data)
         return data

@@ -46,7 +46,6 @@ class ImportedTrial:
         clock: Clock of the times: ``header``, ``log`` or ``column``.
         origin: Start of the trial, ns since 1970 or since the start of a table's time.
         acceleration: Acceleration that the IMU measured; see ``records.Imported``.
-        notes: Warnings, one sentence each.
     """
 
     trajectory: Trajectory
@@ -84,12 +83,6 @@ def import_recording(
     """Returns the trial in a bag or a table of the robot that a mapping names.
 
     Written as a log (``write_recording``), it is read as any other trial is.
-
-    Args:
-        path: The recording.
-        mapping: Mapping of its topics or columns.
-        robot: Robot that the mapping names.
-        run: Number of the run, from 1, of a recording whose clock restarts.
 
     Raises:
         InputError: The recording cannot be read, does not fit the mapping, or has no such run.
@@ -144,12 +137,7 @@ def write_recording(
 ) -> Path:
     """Writes a recording as the log of a trial, with the text of its mapping.
 
-    Args:
-        path: Name of the log; it must not exist.
-        robot: Robot as its model describes it.
-        recording: Trial in the recording.
-        mapping: Mapping of the import.
-        controller: Controller of the robot; if not given, a playback of the recorded commands.
+    Without a controller, its plan is a playback of the recorded commands.
     """
     trajectory = recording.trajectory
     driver = controller or Playback(robot.anatomy.motors, trajectory["commands"])

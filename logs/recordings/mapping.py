@@ -104,7 +104,6 @@ class Link(Section):
     offset: Number = 0.0
 
     def __post_init__(self) -> None:
-        """Checks the sign."""
         if self.sign not in (1, -1):
             raise ValueError(f"sign must be 1 or -1, got {self.sign:g}")
 
@@ -154,7 +153,6 @@ class Body(Section):
         return any(isinstance(getattr(self, key), tuple) for key in self.__struct_fields__)
 
     def __post_init__(self) -> None:
-        """Checks that something is mapped."""
         if not self.topic and not self.has_columns:
             raise ValueError("this table needs topic, or the columns of a vector: add one")
 

@@ -33,12 +33,9 @@ class Quality:
 
     Attributes:
         roles: Roles of the topic.
-        type: Message type.
-        messages: Number of messages.
         rate: Message rate from the median period, 1/s; None for fewer than two messages.
         jitter: Standard deviation of the period without gaps, s; None for fewer than two messages.
         longest: Longest period, s; None for fewer than two messages.
-        gaps: Gaps, in order.
         latency: Median of log time minus stamp, s; None without stamps.
         latency_max: Maximum of log time minus stamp, s; None without stamps.
         fallbacks: Number of messages without a stamp, which have their log time.

@@ -47,7 +47,6 @@ class Track:
     values: FloatArray
 
     def __len__(self) -> int:
-        """Number of samples."""
         return len(self.times)
 
     def scaled(self, scale: float, offset: float = 0.0) -> "Track":

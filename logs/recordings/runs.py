@@ -26,12 +26,6 @@ def chosen_run(
 
     A topic with too few messages to show a restart has it where the first of the others has it.
 
-    Args:
-        path: Path of the recording, for errors.
-        recording: The recording; it is returned if its clock does not restart.
-        clocks: Times of the messages by topic.
-        run: Number of the run, from 1.
-
     Raises:
         InputError: There are several runs and none is chosen, or there is no run of that number.
     """

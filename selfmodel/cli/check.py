@@ -8,8 +8,7 @@ from typing import Any
 from selfmodel import testing
 from selfmodel.cli.commands import Check
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.errors import InputError, WorkError
-from selfmodel.plugins import check_known
+from selfmodel.errors import InputError, WorkError, check_name
 from selfmodel.testing.contract import ContractError
 
 _SAME, _ALONE, _KEPT = "equal arguments, equal results", "no dependence on the batch", "no change"
@@ -54,7 +53,7 @@ _OF_A_ROBOT = ("kind", "score", "controller")
 def check(options: Check) -> None:
     """Checks that a plug-in fulfils its contract."""
     what, name = options.what, options.plug_in
-    check_known("sort of plug-in", what, CHECKS)
+    check_name("sort of plug-in", what, CHECKS)
     given: dict[str, Any] = {} if options.self_model is None else {"robot": options.self_model}
     if given and what not in _OF_A_ROBOT:
         raise InputError(f"--robot is for {', '.join(_OF_A_ROBOT)}, got {what}: leave it out")

@@ -19,7 +19,6 @@ class Command:
     as_json: bool = False
 
     def __init_subclass__(cls) -> None:
-        """Makes a dataclass of the subclass."""
         dataclass(frozen=True, kw_only=True)(cls)
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 from time import perf_counter
 
 from selfmodel import arguments, plugins
-from selfmodel.api import LogDiagnosis, export_diagnosis, set_up_diagnosis
+from selfmodel.api import LogDiagnosis, diagnosis_of_logs, export_diagnosis
 from selfmodel.cli.commands import Diagnose, FromLogs
 from selfmodel.cli.output import print_json, print_lines, print_notes
 from selfmodel.cli.progress import display
 from selfmodel.cli.tables import print_tables, ranking_table
 from selfmodel.controllers.playback import Playback
 from selfmodel.diagnosis import text
-from selfmodel.diagnosis.diagnosis import Diagnosis, output_of, to_json
+from selfmodel.diagnosis.diagnosis import output_of, to_json
 from selfmodel.diagnosis.direct_evidence import direct_evidence
 from selfmodel.errors import counted
 from selfmodel.faults.hypothesis_space import HypothesisSpace
@@ -35,7 +35,8 @@ def diagnose(options: Diagnose) -> None:
         refuse_file(options.export)
         for name in (MODEL, STATUS):
             refuse_existing(options.export / name)
-    explained, robot, inputs, diagnosis = diagnose_logs(options.files, options)
+    explained, robot, inputs = diagnose_logs(options.files, options)
+    diagnosis = inputs.diagnosis
     evidence = direct_evidence(
         diagnosis.explained(inputs.damaged), robot.anatomy, trial_names(inputs.damaged)
     )
@@ -84,7 +85,7 @@ def diagnose(options: Diagnose) -> None:
 
 def diagnose_logs(
     files: Sequence[Path], options: FromLogs
-) -> tuple[list[TrialLog], Robot, LogDiagnosis, Diagnosis]:
+) -> tuple[list[TrialLog], Robot, LogDiagnosis]:
     """Returns the logs to explain, in order, the nominal robot, and the diagnosis with its inputs.
 
     Prints notes and progress on standard error.
@@ -106,7 +107,7 @@ def diagnose_logs(
         settings = settings.scaled(options.population)
     print_notes(*(f"note: {note}" for note in _notes(explained)))
     with display() as on_event:
-        inputs = set_up_diagnosis(
+        inputs = diagnosis_of_logs(
             failed,
             healthy,
             robot=robot,
@@ -119,8 +120,7 @@ def diagnose_logs(
             threads=options.threads,
             on_event=on_event,
         )
-        diagnosis = inputs.run(on_event)
-    return explained, robot, inputs, diagnosis
+    return explained, robot, inputs
 
 
 def _is_played_back(log: TrialLog) -> bool:
@@ -128,7 +128,6 @@ def _is_played_back(log: TrialLog) -> bool:
 
 
 def _notes(logs: Sequence[TrialLog]) -> list[str]:
-    """Returns the notes on limits of the logs that affect the ranking."""
     first = logs[0]
     notes = [
         f"{log.trial.path} has no controller: its commands are played back, so a sensor fault "

@@ -49,7 +49,6 @@ class Shot:
     """One motion of a film.
 
     Attributes:
-        title: Title of the motion.
         qpos: Positions of the model, ``(frames, nq)``.
         held: Frames that show the last observation of a missing one, ``(frames,)``.
         forward: Displacement of the base along the world's x axis, ``(frames,)``, m.
@@ -66,12 +65,10 @@ class Film:
     """Motions of one robot side by side.
 
     Attributes:
-        model: Model of the hypothesis.
         root: Id of the body that the camera follows.
         detached: Ids of the detached bodies.
         jammed: Ids of the bodies at a jammed joint.
         time: Time since the start, ``(frames,)``, s.
-        shots: The motions.
         missing: Names of hinges and signals without any observation.
         normal: Unit normal of the ground, ``(3,)``.
     """

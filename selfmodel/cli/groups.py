@@ -63,7 +63,6 @@ def _row(names: str, text: str, width: int) -> str:
 
 
 def _names(param: Any) -> str:  # noqa: ANN401  # the same
-    """Returns the names that a help page shows: short ones, and the first of the long ones."""
     if param.param_type_name == "argument":
         return str(param.metavar)
     short = [name for name in param.opts if not name.startswith("--")]

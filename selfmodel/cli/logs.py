@@ -44,7 +44,6 @@ def layout_path() -> Path:
 
 
 def _info(path: Path) -> dict[str, Any]:
-    """Returns the summary of a log as JSON values, or its damage."""
     try:
         return inspection.read_info(path)
     except (LogError, InputError) as error:

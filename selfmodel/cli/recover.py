@@ -123,7 +123,6 @@ def experiment_of(options: Recover) -> Experiment:
 
 
 def _print(found: results.RecoveryResult, recovery: Recovery, folder: Path) -> None:
-    """Prints the trials, the last diagnosis, and the true hypothesis."""
     diagnosis, score, evaluations = recovery.diagnosis, found.score, found.evaluations
     is_way = score.name == DISPLACEMENT.name
     subject = "The robot went" if is_way else f"The score {score.name} was"

@@ -108,7 +108,6 @@ def render(options: Render) -> None:
 
 
 def _out(options: Render) -> Path:
-    """Returns the file to write; refuses what is wrong before any work is done."""
     if not options.file.name:
         raise InputError(f"expected a trial log, NAME.mcap, got the folder {options.file}")
     out = options.out or options.file.with_suffix(".gif")
@@ -123,7 +122,6 @@ def _out(options: Render) -> Path:
 
 
 def _shown(frames: Frames, total: int) -> Frames:
-    """Yields the frames; shows a progress bar on a terminal."""
     console = text_console(stderr=True)
     hidden = not console.is_terminal
     yield from track(frames, "drawing", total, console=console, disable=hidden, transient=True)

@@ -70,13 +70,13 @@ def _of_logs(options: MakeReport, kinds: Sequence[FaultKind]) -> Report:
             kinds=kinds,
         )
         return report_of(given)
-    explained, robot, inputs, diagnosis = diagnose_logs(options.sources, options)
+    explained, robot, inputs = diagnose_logs(options.sources, options)
     made = subjects.Subject(
         name=", ".join(trial_names(inputs.damaged).values()),
         robot=robot,
         healthy=inputs.healthy,
         damaged=inputs.damaged,
-        diagnoses=(diagnosis,),
+        diagnoses=(inputs.diagnosis,),
         comparator=inputs.comparator.comparator,
         calibration=inputs.calibration,
         made_with=explained[0].software,

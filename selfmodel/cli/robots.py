@@ -168,7 +168,6 @@ def _parts(robot: Robot) -> dict[str, Any]:
 
 
 def _print_parts(facts: dict[str, Any]) -> None:
-    """Prints the parts and the cases of Table I."""
     root = "slides, and turns about one axis"
     if facts["root"]["floats"] or facts["root"]["fixed"]:
         root = "floating" if facts["root"]["floats"] else "fixed to the world"

@@ -21,7 +21,7 @@ from selfmodel.cli.progress import grid_display
 from selfmodel.cli.tables import show
 from selfmodel.comparators import COMPARATORS
 from selfmodel.diagnosis.diagnosis import to_json
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name
 from selfmodel.faults.registry import TABLE_ONE
 from selfmodel.simulation.simulator import thread_count
 from selfmodel.studies import bodies, paper_page, plans, tables as formats
@@ -127,7 +127,6 @@ def _damages(options: Ablate | RunSuite) -> list[str]:
 
 
 def _run(study: Study, options: Computed) -> None:
-    """Runs a study, writes and prints its results, and ends the command."""
     formats.check_format(options.table)
     read_style(options.style)
     failed = _compute(study, options)
@@ -159,8 +158,7 @@ def _compute(study: Study, options: Computed) -> Sequence[CellEnds]:
     Ctrl-C and the other stop signals end the command with a line on how to continue.
     """
     executor, scheduler = options.executor, options.scheduler
-    if executor not in EXECUTORS:
-        raise unknown_name("executor", executor, EXECUTORS)
+    check_name("executor", executor, EXECUTORS)
     if (scheduler is None) == (executor == DASK):
         raise InputError(
             f"expected --scheduler ADDRESS with --executor {DASK}, and with no other: give both, "

@@ -36,7 +36,6 @@ class Node:
         operator: Its name in ONNX, a key of ``OPERATORS``.
         inputs: Names of its inputs: the graph's input, its tensors, or outputs of earlier nodes; ""
             for an optional input that is left out.
-        outputs: Names of its outputs.
         attributes: Its numbers by name, as sorted pairs.
     """
 
@@ -206,13 +205,7 @@ class Graph:
 def layers(
     weights: Sequence[tuple[FloatArray, FloatArray]], activation: str, last: str = "Identity"
 ) -> Graph:
-    """Returns the network of dense layers, each ``(outputs, inputs)`` and its bias ``(outputs,)``.
-
-    Args:
-        weights: Matrix and bias of each layer.
-        activation: Operator between two layers, such as ``Elu``.
-        last: Operator after the last layer.
-    """
+    """Returns the network of dense layers: matrix ``(outputs, inputs)`` and bias ``(outputs,)``."""
     nodes, tensors, value = list[Node](), dict[str, FloatArray](), "input"
     for k, (matrix, bias) in enumerate(weights):
         tensors |= {f"weight{k}": matrix, f"bias{k}": bias}

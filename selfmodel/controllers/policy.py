@@ -17,7 +17,7 @@ from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import TASK_PREFIX, Design
 from selfmodel.controllers.function import Function
 from selfmodel.controllers.graph import Graph
-from selfmodel.errors import unknown_name
+from selfmodel.errors import check_name
 from selfmodel.rotation import directions, in_body_frame
 
 VELOCITY = 3
@@ -155,8 +155,8 @@ class Policy(Design):
                 raise ValueError(f"expected {count} numbers of its {what}, got {len(given)}")
         names = (("joint", own.joints, own.hinges), ("motor", action.motors, self.motors))
         for what, chosen, known in names:
-            if unknown := [name for name in chosen if name not in known]:
-                raise unknown_name(what, unknown[0], known)
+            for name in chosen:
+                check_name(what, name, known)
             if len(set(chosen)) < len(chosen):
                 raise ValueError(f"it names a {what} twice")
         if not (1 <= own.history <= MAX_HISTORY and own.decimation >= 1):

@@ -117,12 +117,7 @@ class Finetuned(Evolved):
 
     @classmethod
     def of(cls, policy: Policy, features: FloatArray) -> "Finetuned":
-        """Returns the design around a policy with a network, whose zeros are that policy.
-
-        Args:
-            policy: The policy.
-            features: Directions, ``(rank, inputs)``; see the class.
-        """
+        """Returns the design around a policy with a network, whose zeros are that policy."""
         own = {each.name: getattr(policy, each.name) for each in fields(Policy)}
         return cls(**own, features=tuple(map(tuple, features.tolist())))
 
@@ -170,9 +165,7 @@ class LastLayer:
     """The last layer of weights that the output of a network depends on.
 
     Attributes:
-        input: Name of its input.
         weight: Name of its weights, ``(outputs, inputs)``.
-        output: Name of its output.
         after: Operators between it and the output of the network.
     """
 

@@ -124,7 +124,6 @@ def chosen_comparator(
 
 
 def _refusals(comparator: Comparator, robot: Robot, trials: Sequence[Trial]) -> list[str]:
-    """Returns the reasons for which a comparator does not accept trials."""
     reasons = []
     for trial in trials:
         try:

@@ -132,7 +132,6 @@ class DiagnosticSearch:
         rng: np.random.Generator,
         observer: Callable[[Generation | Progress], None],
     ) -> Diagnosis:
-        """Returns the diagnosis by the search of the settings."""
         self.losses.losses([INTACT], trials)  # with a limit, something to end with
         surrogate, how = self.losses.surrogate(trials), self._settings.diagnostic_search
         space = self._space.including(seeds[:1])

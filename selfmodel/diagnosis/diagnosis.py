@@ -177,7 +177,6 @@ class DetectableSeverity:
     """The smallest severities of a fault that the trials would have shown, on either side.
 
     Attributes:
-        kind: Name of the fault kind.
         part: Name of the part; empty for an environment.
         below: The largest severity below the nominal one that predicts the trials clearly worse
             than the best hypothesis; None if no such severity would have shown.

@@ -128,7 +128,6 @@ def _evidence_of(trial: Trial, anatomy: Anatomy, trial_name: str) -> DirectEvide
 
 
 def _known(names: Sequence[str], values: FloatArray) -> dict[str, FloatArray]:
-    """Returns the finite values of each column."""
     return {name: one[np.isfinite(one)] for name, one in zip(names, values.T, strict=True)}
 
 

@@ -240,7 +240,6 @@ class LossTable:
         return True
 
     def _of(self, trial: Trial) -> PreparedPart:
-        """Returns the prepared trial."""
         if trial.content not in self._prepared:
             prepared = prepared_trial(self._comparator, self._simulator.robot, trial)
             self._prepared[trial.content] = prepared

@@ -47,16 +47,10 @@ class Problem:
     which a joint moves, and gains of servos that equal weak motors in the trials.
 
     Attributes:
-        table: Losses of the comparator.
-        space: The hypotheses about the robot.
-        trials: Trials to explain, or parts of them.
         surrogate: Losses of the surrogate comparator, and its trials; see ``LossTable.surrogate``.
-        healthy_trials: Trials of the healthy robot, or parts of them.
         names: Names of the trials of the whole diagnosis, by path.
-        settings: Parameters of the search.
         calibrate: Fits the self-model to some trials; None for one that is given as it is.
         healthy_parts: Parts of trials before a change, in which the robot was healthy.
-        observer: Called with the progress of each stage.
         standing: Joints that stand in the trials though they are commanded to move, with which the
             search begins; none if the comparator does not predict segments.
     """

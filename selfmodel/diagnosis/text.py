@@ -127,7 +127,6 @@ def _likely(probability: float | None) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
-    """Returns the answer about a robot that none of the faults explains that were tried."""
     best, unsearched, fit = diagnosis.best, diagnosis.unsearched, diagnosis.fit
     probability = diagnosis.probability.get(str(best))
     rest = 1 - sum(diagnosis.probability.values()) if diagnosis.probability else None
@@ -208,7 +207,6 @@ def right_or_wrong(best: str, truth: str, *, correct: bool) -> str:
 
 
 def _faults(notation: str) -> set[str]:
-    """Returns the terms of a notation without the numbers of severities, with their prefixes."""
     return {_SEVERITY.sub(r"=\1", term).rstrip("=") for term in notation.split("+")}
 
 

@@ -171,7 +171,6 @@ def probabilities(
 
 
 def _all_diverged(ranked: Sequence[Hypothesis], problem: Problem) -> Diagnosis:
-    """Returns the diagnosis of trials on which the simulation of every hypothesis diverged."""
     logs = ", ".join(part.trial.path for part in problem.trials)
     kept = best_severities(ranked)[: problem.settings.kept]
     return Diagnosis(

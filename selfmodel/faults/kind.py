@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Optional
 import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
-from selfmodel.errors import InputError, check_type, real_number, typed, unknown_name
+from selfmodel.errors import InputError, check_name, check_type, real_number, typed
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.trials.trajectory import Trajectory
 
@@ -89,8 +89,7 @@ class FaultKind:
                 real_number(f"{name}[{place}]", one, 0.5, kind="real")
         for to in (*self.degenerates_to.values(), *self.degenerates_alone_to.values()):
             check_type(to, FaultKind | None, "a FaultKind, such as selfmodel.faults.JAMMED")
-        if self.base not in (bases := ("any", "free", "fixed")):
-            raise unknown_name("base of a fault kind", self.base, bases)
+        check_name("base of a fault kind", self.base, ("any", "free", "fixed"))
         if self.bounds is not None and not (
             len(self.bounds) == 2 and self.bounds[0] <= self.bounds[1]
         ):

@@ -28,10 +28,10 @@ from selfmodel.errors import (
     InputError,
     TrialError,
     check_function,
+    check_name,
     check_type,
     items_of,
     real_number,
-    unknown_name,
     whole_number,
 )
 from selfmodel.physical.interface import NORM_TOLERANCE, Limit
@@ -374,8 +374,7 @@ def _signals(given: str | Collection[Signal]) -> tuple[Signal, ...]:
     """Returns signals, given as one or in a collection, or raises ``InputError``."""
     names = items_of(given)
     for name in names:
-        if name not in SIGNALS:
-            raise unknown_name("signal", str(name), SIGNALS)
+        check_name("signal", str(name), SIGNALS)
     return tuple(signal for signal in SIGNALS if signal in names)
 
 

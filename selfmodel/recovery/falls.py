@@ -48,10 +48,6 @@ def fallen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> Until | None:
 
     The window of a fall is over: the rest of the run does not change the step of the fall. A run
     that diverges after it is finite if it ends.
-
-    Args:
-        robot: The robot.
-        hypotheses: The faults of the robot in each run.
     """
     if not _has_gravity(robot):
         return None

@@ -5,7 +5,7 @@ regains too little of what the failure took is followed by a larger one.
 """
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import takewhile
@@ -85,45 +85,32 @@ class LayerRepair:
         on_generation: GenerationCallback,
     ) -> tuple[CandidateController, ...]:
         """Returns layers that are better than none, best first, or else that of zeros."""
-        search = partial(self._searched, hypotheses, uncertainty(), seeds, rng, on_generation)
-        return unflattered(self, search)
-
-    def _searched(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        uncertainty: DomainDistribution,
-        seeds: Sequence[Controller],
-        rng: np.random.Generator,
-        on_generation: GenerationCallback,
-    ) -> tuple[Candidates, Candidates]:
-        """Returns all layers, and the best of those that keep their scores at a finer step."""
-        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty)
+        drawn = uncertainty()
         self._sizes = self._sizes or self._smallest_first(hypotheses[0])
-        known = tried = [one for one in seeds if one.design in self._sizes]
+        tried = [one for one in seeds if one.design in self._sizes]
         begin = max([self._sizes.index(one.design) for one in tried], default=0)
-        for design in self._sizes[begin:]:
-            none = Controller(design, np.zeros(design.weights))
-            known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
-            known += self._evolved(fitness, known, rng, on_generation)
-            known, scores, intact, again = self._compared(fitness, known, rng)
-            values = robust(scores)
-            if values.max() - values[-1] >= STALLED * (intact - values[-1]):
-                break
-        small = {widened(one, known[0].design): one for one in tried}
-        order = np.argsort(-values, kind="stable")
-        rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
-        finite = viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
-        kept = converged(finite, fitness, self.settings.steps, again)
-        better = tuple(takewhile(lambda one: one.controller != finite[-1].controller, kept))
 
-        def at_its_size(some: Candidates) -> Candidates:
-            own = (small.get(one.controller, one.controller) for one in some)
-            return tuple(replace(one, controller=its) for one, its in zip(some, own, strict=True))
+        def searched() -> tuple[Candidates, Candidates]:
+            fitness, known = RobustFitness(self.simulator, self.score, hypotheses, drawn), tried
+            for design in self._sizes[begin:]:
+                none = Controller(design, np.zeros(design.weights))
+                known = list(dict.fromkeys([none, *(widened(one, design) for one in known)]))
+                known += self._evolved(fitness, known, rng, on_generation)
+                known, scores, intact, again = self._compared(fitness, known, rng)
+                values = robust(scores)
+                if values.max() - values[-1] >= STALLED * (intact - values[-1]):
+                    break
+            small = {widened(one, known[0].design): one for one in tried}
+            order = np.argsort(-values, kind="stable")
+            rows = [k for k in order if values[k] > values[-1]] + [len(known) - 1]
+            finite = viable([known[k] for k in rows], scores[rows], fitness, self.evaluations)
+            kept = converged(finite, fitness, self.settings.steps, again)
+            better = tuple(takewhile(lambda one: one.controller != finite[-1].controller, kept))
+            return _at_its_size(finite, small), _at_its_size(better or kept[:1], small)
 
-        return at_its_size(finite), at_its_size(better or kept[:1])
+        return unflattered(self, searched)
 
     def _smallest_first(self, hypothesis: Hypothesis) -> Sequence[Design]:
-        """Returns the designs of changes of the controller, by their size."""
         own = self.design
         if isinstance(own, Compensated):
             return list(dict.fromkeys([own, replace(own, feedback=True)]))
@@ -203,6 +190,11 @@ def features_of(
     kept = sizes[:RANK] > sizes[0] * 1e-6
     scale = sizes[:RANK][kept, np.newaxis] / np.sqrt(len(rows))
     return np.asarray(directions[:RANK][kept] / scale)
+
+
+def _at_its_size(some: Candidates, small: Mapping[Controller, Controller]) -> Candidates:
+    own = (small.get(one.controller, one.controller) for one in some)
+    return tuple(replace(one, controller=its) for one, its in zip(some, own, strict=True))
 
 
 def widened(controller: Controller, design: Design) -> Controller:

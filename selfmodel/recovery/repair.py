@@ -12,7 +12,6 @@ import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -155,7 +154,7 @@ class RepairSearch:
             runs: list[Run] = [(hypothesis, Controller(design, genome)) for genome in genomes]
             return np.array(cached_rows(self._known, runs, self._simulate))
 
-        known = _genomes_of(design, seeds)
+        known = [one.genome for one in seeds if one.design == design]
         search = Evolution(design.weights, self.settings, rng, known, draw=draw_genomes)
         evolution.evolve(search, fitness, on_generation, search.generations_left)
         self.evaluations += search.evaluations
@@ -178,7 +177,6 @@ class RobustRepair:
     """Repair under uncertainty; a ``Repair`` whose cost follows from the paper's numbers.
 
     Attributes:
-        make_search: Makes the search for genomes.
         parts: Physics steps in place of each; see ``unflattered``.
     """
 
@@ -208,46 +206,38 @@ class RobustRepair:
         if self.design.heading:
             start = replace(drawn.start, heading=HEADINGS)
             drawn = replace(drawn, start=start)
-        search = partial(self._searched, hypotheses, drawn, seeds, rng, on_generation)
-        return unflattered(self, search)
-
-    def _searched(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        uncertainty: DomainDistribution,
-        seeds: Sequence[Controller],
-        rng: np.random.Generator,
-        on_generation: GenerationCallback,
-    ) -> tuple[Candidates, Candidates]:
-        """Returns the candidates, and those of them that keep their scores at a finer step."""
-        fitness = RobustFitness(self.simulator, self.score, hypotheses, uncertainty)
         comparisons = comparisons_of(self.settings)
         compared = sum(candidates * conditions for candidates, conditions in comparisons)
         known = [controller for controller in seeds if controller.design == self.design]
         rollouts = rollouts_of(self.settings, known=bool(known)) - compared
-        genomes = [controller.genome for controller in known]
-        search = self.make_search(self.design.weights, self.settings, rng, genomes)
-        run_search(
-            *(search, fitness, self.design),
-            rollouts=rollouts,
-            steps=self.settings.steps,
-            rng=rng,
-            on_generation=on_generation,
-        )
-        self.evaluations += search.evaluations
-        count = comparisons[0][0]
-        near = mutants(known, count // 3, self.settings, rng) if known else []
-        evolved = [Controller(self.design, genome) for genome in search.candidates(count)]
-        new = [one for one in dict.fromkeys([*near, *evolved]) if one not in known]
-        # A search of one generation may have evaluated known controllers alone.
-        candidates = new or [_random_controller(self.design, rng)]
-        for count, conditions in comparisons:
-            again = copy.deepcopy(rng)
-            scores = fitness(candidates[:count], conditions, self.settings.steps, rng)
-            best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
-            candidates, scores = [candidates[i] for i in best], scores[best]
-        finite = viable(candidates, scores, fitness, search.evaluations)
-        return finite, converged(finite, fitness, self.settings.steps, again)
+
+        def searched() -> tuple[Candidates, Candidates]:
+            fitness = RobustFitness(self.simulator, self.score, hypotheses, drawn)
+            genomes = [controller.genome for controller in known]
+            search = self.make_search(self.design.weights, self.settings, rng, genomes)
+            run_search(
+                *(search, fitness, self.design),
+                rollouts=rollouts,
+                steps=self.settings.steps,
+                rng=rng,
+                on_generation=on_generation,
+            )
+            self.evaluations += search.evaluations
+            count = comparisons[0][0]
+            near = mutants(known, count // 3, self.settings, rng) if known else []
+            evolved = [Controller(self.design, genome) for genome in search.candidates(count)]
+            new = [one for one in dict.fromkeys([*near, *evolved]) if one not in known]
+            # A search of one generation may have evaluated known controllers alone.
+            candidates = new or [_random_controller(self.design, rng)]
+            for count, conditions in comparisons:
+                again = copy.deepcopy(rng)
+                scores = fitness(candidates[:count], conditions, self.settings.steps, rng)
+                best = np.argsort(-robust(scores), kind="stable")[:JUDGED]
+                candidates, scores = [candidates[i] for i in best], scores[best]
+            finite = viable(candidates, scores, fitness, search.evaluations)
+            return finite, converged(finite, fitness, self.settings.steps, again)
+
+        return unflattered(self, searched)
 
 
 def run_search(
@@ -313,10 +303,6 @@ def comparisons_of(settings: Settings) -> tuple[tuple[int, int], tuple[int, int]
     first = max(1, min(FINAL_CONDITIONS, round(rollouts / finalists)))
     last = max(2, min(JUDGED_CONDITIONS, round(rollouts / JUDGED)))
     return (finalists, first), (JUDGED, last)
-
-
-def _genomes_of(design: Design, controllers: Sequence[Controller]) -> list[FloatArray]:
-    return [controller.genome for controller in controllers if controller.design == design]
 
 
 def _random_controller(design: Design, rng: np.random.Generator) -> Controller:

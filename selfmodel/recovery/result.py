@@ -50,10 +50,8 @@ class TrialScore:
     """Score of a trial by the best hypothesis so far; an event again if a diagnosis changes it.
 
     Attributes:
-        trial: The trial.
         hypothesis: Intact before the failure; after it, the best hypothesis of the last diagnosis.
             It matters for a score that depends on the ground or on detached limbs.
-        score: Fitness of the repair.
         value: Its value; NaN if unobserved.
         fall: Step at which the robot fell; None if it did not.
     """

@@ -403,13 +403,7 @@ def observed_in(trial: Trial) -> frozenset[Signal]:
 def check_measurable(
     score: Score, robot: Robot, observed: Collection[Signal] = frozenset(SIGNALS)
 ) -> None:
-    """Raises ``InputError``, which names other scores, if a score cannot be measured on a robot.
-
-    Args:
-        score: Fitness of a repair.
-        robot: The robot as its model describes it.
-        observed: Signals that are observed of the physical robot.
-    """
+    """Raises ``InputError``, which names other scores, if a score cannot be measured on a robot."""
     if reason := _obstacle(score, robot, observed):
         others = [name for name, one in SCORES.items() if not _obstacle(one, robot, observed)]
         if "joint_positions" in observed:

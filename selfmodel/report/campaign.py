@@ -129,7 +129,6 @@ def _figures(folder: Path, most: int) -> Section | None:
 
 
 def _table_files(folder: Path) -> list[Path]:
-    """Returns the tables in a folder: CSV files, then those with a JSON object per line."""
     return [path for kind in ("*.csv", "*.jsonl") for path in sorted(folder.glob(kind))]
 
 

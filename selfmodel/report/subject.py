@@ -61,16 +61,12 @@ class Subject:
 
     Attributes:
         name: Name of the run or of the logs.
-        robot: The nominal robot.
         healthy: Trials of the healthy robot.
         damaged: Trials to explain, in order.
         diagnoses: At least one; the last is of all trials to explain.
-        comparator: Comparator of the diagnoses.
-        calibration: Fit of the self-model to the healthy trials.
         result: Result of a run; None for logs, and for a run that is not finished.
         searches: Progress of the searches; empty if it was not recorded.
         made_with: Versions by the name of the software.
-        threads: Threads of the physics.
     """
 
     name: str
@@ -266,7 +262,6 @@ def subject_of_logs(
 
 
 def _hypothesis_space(robot: Robot, kinds: Iterable[FaultKind]) -> HypothesisSpace:
-    """Returns the hypotheses of built-in and of given kinds."""
     return HypothesisSpace(robot.anatomy, tuple(dict.fromkeys((*ALL_KINDS, *kinds))))
 
 

@@ -122,8 +122,6 @@ class Shape:
     """A geom as it is drawn.
 
     Attributes:
-        geom: Id of the geom.
-        body: Id of its body.
         kind: Its form; a geom of another type is its bounding box.
         size: As of MuJoCo's geoms, ``(3,)``, m: radii, or half lengths along z and of a box.
         position: Position in the body's frame, ``(3,)``, m.

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name
 from selfmodel.robot.state import Bind, SignalSource, bind_data
 
 UP, FORWARD = [8], [0, 2]
@@ -159,8 +159,7 @@ def observation_source(key: str, model: mujoco.MjModel) -> SignalSource:
     Raises:
         InputError: The key is unknown, or the robot lacks a part that the task observes.
     """
-    if key not in OBSERVATIONS:
-        raise unknown_name("observation of a task", key, OBSERVATIONS)
+    check_name("observation of a task", key, OBSERVATIONS)
 
     def bound(bind: Bind) -> Callable[[], FloatArray]:
         fields, parts = Fields(model, bind), OBSERVATIONS[key]

@@ -65,10 +65,8 @@ class DomainDistribution:
     """Distribution of the runs of a robot around those of its self-model.
 
     Attributes:
-        models: Distribution of the parameters of the model.
         reading_noise: Standard deviation of the noise of each reading, ``(sensors,)``.
         wrong_touches: Probability that a touch reading is wrong, ``(sensors,)``; 0 for others.
-        start: Spread of the initial poses.
         delays: Control delays in addition to the self-model's, control steps, equally probable.
     """
 
@@ -90,8 +88,6 @@ class DomainSample:
     """One draw of a domain: the condition of a run.
 
     Attributes:
-        hypothesis: Faults of the robot.
-        model: Parameters of the model.
         delay: Control delay in addition to the self-model's, control steps.
         seed: Seed of the initial pose, of the noise of the readings, and of the random parts of
             faults, such as terrain; None for the self-model itself.

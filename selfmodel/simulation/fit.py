@@ -109,8 +109,6 @@ class Fit:
     """Fit of one set of parameters to trials.
 
     Attributes:
-        name: Name of the set.
-        parameters: The fitted parameters.
         deviations: Posterior standard deviation of the logarithm of each factor, by the name of
             its quantity in ``Parameters``; that of the prior for a factor that was not fitted.
         errors: Errors of its predictions, ``(errors,)``.

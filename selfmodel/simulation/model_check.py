@@ -52,27 +52,23 @@ class Motion:
     diverged: int
 
 
-def model_notes(robot: Robot, threads: int = 0) -> tuple[str, ...]:
+def model_notes(robot: Robot) -> tuple[str, ...]:
     """Returns what is found about a model whose motion depends on the time step; () for others.
 
     Each note is one or two sentences, with the setting that it advises.
-
-    Args:
-        robot: The robot.
-        threads: Threads of the simulations; 0 for all processors.
     """
-    motions = [motion_of(robot.finer(parts), threads) for parts in PARTS]
+    motions = [motion_of(robot.finer(parts)) for parts in PARTS]
     if _alike(motions[0], motions[-1]):
         return ()
     return (_of_motion(robot, motions), *_of_damping(robot.model), *_of_contacts(robot.model))
 
 
-def motion_of(robot: Robot, threads: int = 0) -> Motion:
+def motion_of(robot: Robot) -> Motion:
     """Returns the motion of a robot with random gaits, the same at any time step."""
     design = cpg_for(robot)
     genomes = draw_genomes(np.random.default_rng(0), (GAITS, design.weights))
     steps = max(2, round(SECONDS / robot.control_timestep))
-    outcome = Simulator(robot, threads).run(
+    outcome = Simulator(robot).run(
         [(INTACT, Controller(design, genome)) for genome in genomes],
         steps,
         ["base_position", "joint_velocities"],

@@ -139,11 +139,6 @@ def scale_contacts(model: mujoco.MjModel, stiffness: float, damping: float) -> N
     which MuJoCo replaces, and factors of 1 change nothing, to the bit.
 
     Source: MuJoCo's documentation, Modeling, Solver parameters, ``solref``.
-
-    Args:
-        model: The model.
-        stiffness: Factor of the stiffness.
-        damping: Factor of the damping.
     """
     if (stiffness, damping) == (1.0, 1.0):
         return

@@ -59,12 +59,10 @@ class ObservedSegments:
     """Segments of a trial, and what was observed in them.
 
     Attributes:
-        segments: Initial states and commands.
         observed: Estimated state after each step, ``(segments, horizon, width)`` for each signal
             that is compared.
         valid: Mask of the steps after which the state is known, but for single hinges, and so are
             the commands that led there, ``(segments, horizon)``.
-        hypothesis: The faults of the robot in the trial.
         known: Errors of predictions so far, by the parameters of the model, ``(errors,)`` each.
     """
 

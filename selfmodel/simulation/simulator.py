@@ -11,7 +11,7 @@ import numpy as np
 
 from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.controllers.controller import CommandSource
-from selfmodel.errors import check_type, typed, unknown_name, whole_number
+from selfmodel.errors import check_name, check_type, typed, whole_number
 from selfmodel.faults.build import apply_faults, build
 from selfmodel.faults.hypothesis import Hypothesis
 from selfmodel.robot.actuators import ancestors
@@ -97,8 +97,8 @@ class Simulator:
 
         Or from a state, signals of the joints and of the base, ``(1, width)`` each.
         """
-        if unknown := [str(signal) for signal in record if signal not in SIGNALS]:
-            raise unknown_name("signal", unknown[0], SIGNALS)
+        for signal in record:
+            check_name("signal", str(signal), SIGNALS)
         check_type(runs[0] if runs else None, tuple, "pairs (Hypothesis, Controller) as runs")
         steps = whole_number("steps", steps, 1000, least=1)
         variants = [self._variant(hypothesis) for hypothesis, _ in runs]

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from selfmodel import plugins
 from selfmodel.arguments import is_model, robot_entry
 from selfmodel.controllers.controller import Design, check_silent_neurons
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name, unknown_name
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.notation import parse
 from selfmodel.faults.registry import check_cases, notation_kinds
@@ -51,7 +51,7 @@ def bodies_of(domains: Sequence[str], tasks: Sequence[str] | None) -> tuple[str,
         bodies += [domain] if is_body else [f"{domain}-{task}" for task in chosen]
     known = tasks_of(domains)
     for task in tasks or ():
-        plugins.check_known("task of these domains", task, known)
+        check_name("task of these domains", task, known)
     return tuple(dict.fromkeys(bodies))
 
 

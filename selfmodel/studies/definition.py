@@ -7,9 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from selfmodel.errors import InputError, check_type
+from selfmodel.errors import InputError, check_name, check_type
 from selfmodel.files import load_toml, path_of, read_file
-from selfmodel.plugins import check_known
 from selfmodel.settings import RepairSettings, Settings
 from selfmodel.studies import plans
 from selfmodel.studies.study import Study
@@ -58,14 +57,13 @@ def read_study(path: str | Path) -> Study:
 
 
 def _planned(keys: dict[str, Any]) -> Study:
-    """Returns the study of some keys, or raises ``InputError``."""
     for key, example in (("study", "ablation"), ("folder", "runs/dtw")):
         if key not in keys:
             raise InputError(f'expected the key {key}, got none: add {key} = "{example}"')
-    check_known("study", name := keys.pop("study"), PLANS)
+    check_name("study", name := keys.pop("study"), PLANS)
     known = inspect.signature(PLANS[name]).parameters
     for key in keys:
-        check_known(f"key of the study {name}", key, known)
+        check_name(f"key of the study {name}", key, known)
     return PLANS[name](**keys | {key: _settings(key, keys[key]) for key in TABLES if key in keys})
 
 
@@ -75,7 +73,7 @@ def _settings(key: str, table: Any) -> Settings | RepairSettings:  # noqa: ANN40
     made = TABLES[key]
     names = [field.name for field in dataclasses.fields(made)]
     for name in table:
-        check_known(f"key of [{key}]", name, names)
+        check_name(f"key of [{key}]", name, names)
     if table.keys() & {"survivors", "crossovers"} or "population" not in table:
         return made(**table)
     rest = {name: value for name, value in table.items() if name != "population"}

@@ -24,7 +24,7 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.kind import FaultKind
 from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.logs import results
-from selfmodel.logs.journal import create_journal
+from selfmodel.logs.journal import TRIALS, add_diagnosis, make_run
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.logs.recordings.recording import TABLE
 from selfmodel.logs.recordings.tables import FORMATS, is_table, read_table
@@ -68,8 +68,6 @@ class Experiment:
     The fields of the same names are those of ``RecoveryLoop``.
 
     Attributes:
-        robot: The nominal robot.
-        folder: Folder of the run.
         case: Number of the failure in Table I; None for a failure that is not in it.
         truth: Faults of the simulated physical robot after the failure.
         gap: Level of its reality gap.
@@ -217,12 +215,12 @@ def run_recovery(
     make_repair = plugins.repair(experiment.repair, experiment.search, experiment.repertoire)
     next_trial, kinds = plugins.next_trial(experiment.next_trial), experiment.kinds
     calibrated, fit = experiment.calibrated, partial(fitted, robot, threads=threads, known={})
-    journal = create_journal(experiment.folder, robot.anatomy, kinds, calibrated=calibrated)
+    make_run(folder := experiment.folder, calibrated=calibrated)
     return RecoveryLoop(
         simulator=Simulator(robot, threads, stats),
         choose_comparator=experiment.choose_comparator,
-        run_trial=TrialRunner(journal.trials, robot, settings, hidden=hidden, gap=gap),
-        store_diagnosis=journal.add,
+        run_trial=TrialRunner(folder / TRIALS, robot, settings, hidden=hidden, gap=gap),
+        store_diagnosis=partial(add_diagnosis, folder),
         settings=settings,
         seed=experiment.seed,
         on_event=on_event,

@@ -280,7 +280,6 @@ def _submitted(executor: Executor, folder: Path, cell: Cell) -> "Future[Answer]"
 
 
 def _answer(future: "Future[Answer]", folder: Path, place: str) -> Answer:
-    """Returns the answer of a call that has ended; raises what ends the grid."""
     if future.cancelled():
         raise WorkError(
             "the executor has ended, such as the scheduler of a cluster: finished cells are kept; "

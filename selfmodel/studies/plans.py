@@ -18,6 +18,7 @@ from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.losses import check_limit, check_steps, still_trial
 from selfmodel.errors import (
     InputError,
+    check_name,
     items_of,
     names_of,
     real_numbers,
@@ -145,7 +146,7 @@ def ablation(
     settings = dataclasses.replace(settings, max_simulated_steps=limit)
     searches = names_of(diagnostic_searches, "searches of a diagnosis, such as ea")
     for one in searches:
-        plugins.check_known("diagnostic search", one, DIAGNOSTIC_SEARCHES)
+        check_name("diagnostic search", one, DIAGNOSTIC_SEARCHES)
     chosen, by_bank = repair_parameters(repair, search, score, repair_settings), next_trial == BANK
     trials = settings.trials
     lists = {"robots": robots, "comparators": comparators, "gaps": gaps, "seeds": seeds}
@@ -321,7 +322,7 @@ def paper(
     _check_search(settings, EA, "the paper has the EA alone")
     settings = dataclasses.replace(settings, diagnostic_search=EA)
     for robot in robots:
-        plugins.check_known("robot of the paper", robot, ROBOTS)
+        check_name("robot of the paper", robot, ROBOTS)
     check_cases(cases, "Table I", TABLE_ONE)
     for comparator in comparators:
         if comparator == ON_ROBOT:
@@ -446,7 +447,7 @@ def _check(
     for comparator in lists["comparators"]:
         plugins.comparator(comparator)
     if next_trial not in NEXT_TRIAL and ":" not in next_trial:
-        plugins.check_known("choice of the next trial", next_trial, NEXT_TRIAL)
+        check_name("choice of the next trial", next_trial, NEXT_TRIAL)
     if next_trial != BANK:
         plugins.next_trial(next_trial)
     if next_trial != BANK and trials < 2:

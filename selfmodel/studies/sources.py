@@ -85,7 +85,6 @@ def _file(name: str) -> Path | None:
 
 
 def _root(name: str) -> Path | None:
-    """Returns the folder that contains the top-level module or package of a module."""
     spec = _spec(name.partition(".")[0])
     if spec is None:
         return None

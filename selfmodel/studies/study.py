@@ -141,11 +141,7 @@ class Study:
 
 
 def rows_in(folder: Path, table: str | None = None) -> list[Row]:
-    """Returns the rows of all finished runs in the folder of a study.
-
-    Args:
-        folder: The folder.
-        table: Name of the table, where the function has several; None for the only one.
+    """Returns the rows of all finished runs in the folder of a study, or those of one table.
 
     Raises:
         InputError: A cell is damaged, or has no rows.

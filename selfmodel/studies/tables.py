@@ -15,10 +15,10 @@ from typing import Any
 import pandas as pd
 
 from selfmodel.diagnosis.diagnosis import to_json
-from selfmodel.errors import InputError, typed
+from selfmodel.errors import InputError, check_name, typed
 from selfmodel.files import path_of
 from selfmodel.logs.files import make_folder, replace_file
-from selfmodel.plugins import RETURN, check_known
+from selfmodel.plugins import RETURN
 from selfmodel.studies import figures
 from selfmodel.studies.comparisons import balance_warnings, ends
 from selfmodel.studies.recoveries import ENDS, RULE
@@ -204,7 +204,6 @@ class Results:
 
     Attributes:
         facts: Its rows and summaries, by the keys of ``results.json``.
-        tables: Tables of the summaries.
         shown: The table for readers, and ``legend``, the line below it.
         files: Content of its files, by their path in the folder of the study.
         notes: Warnings.
@@ -425,7 +424,7 @@ def check_format(wanted: str | None) -> None:
 
 def table_files(tables: Sequence[Table], wanted: str) -> dict[str, bytes]:
     """Returns the content of the files of tables by their name; a table without a row has none."""
-    check_known("table format", wanted, FORMATS)
+    check_name("table format", wanted, FORMATS)
     suffix, write = FORMATS[wanted]
     return {f"{table.name}.{suffix}": write(table) for table in tables if len(table.records)}
 

@@ -23,7 +23,7 @@ from selfmodel.controllers.controller import TASK_PREFIX, Controller
 from selfmodel.controllers.graph import layers
 from selfmodel.controllers.policy import Policy
 from selfmodel.controllers.trained import Trained, initial_layers
-from selfmodel.errors import InputError, typed, unknown_name
+from selfmodel.errors import InputError, check_name, typed
 from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
@@ -309,13 +309,11 @@ COLUMNS = ("generation", "steps", "cpu_seconds", "mean_return", "best_return")
 
 
 def _body(name: str) -> tuple[Robot, tuple[str, str]]:
-    """Returns a body of the suite by its name, with its domain and its task."""
     known = {
         suite_bodies.name(*parts): parts for parts in suite_bodies.BODIES if parts[0] in REWARDS
     }
     known = {body: parts for body, parts in known.items() if observation_of(body)}
-    if name not in known:
-        raise unknown_name("task that policies are evolved for", name, known)
+    check_name("task that policies are evolved for", name, known)
     return suite_bodies.robot(*known[name]), known[name]
 
 

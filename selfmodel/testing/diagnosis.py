@@ -129,7 +129,6 @@ def check_comparator(
 
 
 def _walk() -> Trial:
-    """Returns a simulated trial of the quadruped."""
     robot = arguments.load_robot("quadruped")
     network = network_for(robot)
     controller = Controller(network, np.linspace(-1, 1, network.weights))
@@ -169,7 +168,6 @@ def _bits(arrays: Mapping[Any, NDArray[Any]]) -> dict[Any, bytes]:
 
 
 def _content(request: Request) -> object:
-    """Returns what two equal requests have in common."""
     if not isinstance(request, Segments):
         return request
     arrays = _bits({**request.states, "starts": request.starts, "commands": request.commands})
@@ -367,7 +365,6 @@ def check_fault_kind(kind: FaultKind | str, robot: arguments.RobotSource = "quad
 
 
 def _check_candidate(fault: Fault, robot: Robot) -> None:
-    """Checks the level of a fault, and that notation and genome give the fault again."""
     bounds = fault.kind.bounds_at(robot.anatomy, fault.part)
     require(
         bounds or fault.severity == 0,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from selfmodel.arrays import BoolArray, FloatArray, frozen
-from selfmodel.errors import InputError, typed, unknown_name
+from selfmodel.errors import InputError, check_name, typed, unknown_name
 from selfmodel.trials.signals import SIGNALS, Names, Signal
 
 MAX_TIME_ERROR, MAX_LENGTH_ERROR = 0.5, 1e-3
@@ -297,9 +297,8 @@ def _checked(
         )
     if order is None:
         return values
-    unknown = [name for name in order if name not in known]
-    if unknown:
-        raise unknown_name(f"column of {signal}", unknown[0], known)
+    for name in order:
+        check_name(f"column of {signal}", name, known)
     if sorted(order) != sorted(known):
         raise InputError(
             f"the names of the columns of {signal} must be each of {', '.join(known)} once, got "

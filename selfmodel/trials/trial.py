@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from selfmodel.arrays import FloatArray, data_frame
 from selfmodel.controllers.controller import CommandSource
 from selfmodel.controllers.playback import played_back
-from selfmodel.errors import InputError, typed, unknown_name
+from selfmodel.errors import InputError, check_name, typed
 from selfmodel.trials.signals import Signal
 from selfmodel.trials.trajectory import (
     Described,
@@ -60,8 +60,7 @@ class TrialPlan:
     seed: int
 
     def __post_init__(self) -> None:
-        if self.stage not in STAGES:
-            raise unknown_name("stage", self.stage, STAGES)
+        check_name("stage", self.stage, STAGES)
         if not 0 <= self.seed <= MAX_SEED:
             raise InputError(f"seed must be a whole number from 0 to {MAX_SEED}, got {self.seed}")
 

@@ -7,6 +7,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from selfmodel.errors import InputError
 from selfmodel.isolation import Message
 
 
@@ -42,10 +43,8 @@ def nest(request: Message) -> Message:
     return nest(request)
 
 
-def refuse_log(_: Message) -> Message:
-    from selfmodel.logs import CorruptError  # noqa: PLC0415  # half a second, for this task only
-
-    raise CorruptError("walk.bag", "it is damaged", advice="record it again")
+def refuse(_: Message) -> Message:
+    raise InputError("walk.bag is damaged: record it again")
 
 
 def fail(_: Message) -> Message:

@@ -18,7 +18,7 @@ from selfmodel.cli import app
 from selfmodel.diagnosis.diagnosis import OLD_KEYS
 from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.logs import read_log
-from selfmodel.logs.journal import FolderJournal
+from selfmodel.logs.journal import read_diagnoses, trial_order
 from selfmodel.logs.records import SEALS
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.signals import SIGNALS
@@ -163,7 +163,8 @@ def test_the_logs_of_a_run_give_the_diagnosis_that_the_run_found(
 @pytest.mark.parametrize(("run", "robot"), [("recovery", "quadruped"), ("cpg", "hexapod")])
 def test_a_run_is_read_from_its_folder(run: str, robot: str):
     space = HypothesisSpace(ROBOTS[robot].robot().anatomy, ())
-    trials, diagnoses = FolderJournal(DATA / run, space).read()
+    logs = sorted((DATA / run / "trials").glob("*.mcap"), key=trial_order)
+    trials, diagnoses = [read_log(log).trial for log in logs], read_diagnoses(DATA / run, space)
     result = json.loads((DATA / run / "result.json").read_text(encoding="utf-8"))
 
     assert [t.displacement for t in trials] == [trial["displacement"] for trial in result["trials"]]

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,7 +27,7 @@ from selfmodel.faults.hypothesis_space import HypothesisSpace
 from selfmodel.faults.joints import BROKEN, JAMMED
 from selfmodel.faults.notation import parse
 from selfmodel.logs import read_truth, reader
-from selfmodel.logs.journal import create_journal
+from selfmodel.logs.journal import TRIALS, add_diagnosis, make_run, read_diagnoses
 from selfmodel.logs.log_file import Contents
 from selfmodel.logs.physical_trial import TrialRunner
 from selfmodel.physical.simulated import SimulatedRobot
@@ -216,20 +217,20 @@ def test_the_logs_are_all_that_is_known_and_what_they_hide_changes_nothing(
         return read_contents(path, unread)
 
     monkeypatch.setattr(reader, "read_contents", counted)
-    outcomes, journals = [], []
-    for name, hidden in (("hidden", {"after": TRUTH}), ("bare", {})):
-        journal = create_journal(tmp_path / name, quadruped.anatomy, calibrated=False)
-        run_trial = TrialRunner(journal.trials, quadruped, TINY, hidden)
+    outcomes, folders = [], [tmp_path / "hidden", tmp_path / "bare"]
+    for folder, hidden in zip(folders, ({"after": TRUTH}, {}), strict=True):
+        make_run(folder, calibrated=False)
+        run_trial = TrialRunner(folder / TRIALS, quadruped, TINY, hidden)
         few = dataclasses.replace(TINY, trials=1)
-        given = {"run_trial": run_trial, "store_diagnosis": journal.add}
+        given = {"run_trial": run_trial, "store_diagnosis": partial(add_diagnosis, folder)}
         outcomes.append(recovery(quadruped, settings=few, sealed=False, **given))
-        journals.append(journal)
 
     assert reads == dict.fromkeys(("00-before.mcap", "01-after.mcap", "02-recovery.mcap"), 2)
     assert outcomes[0].diagnosis == outcomes[1].diagnosis
-    logs = [journal.trials / "01-after.mcap" for journal in journals]
+    logs = [folder / TRIALS / "01-after.mcap" for folder in folders]
     assert [read_truth(log) for log in logs] == [TRUTH, None]
-    trials, diagnoses = journals[0].read()
+    trials = [reader.read_log(trial.path).trial for trial in outcomes[0].trials]
+    diagnoses = read_diagnoses(folders[0], HypothesisSpace(quadruped.anatomy, ()))
     assert diagnoses[-1] == outcomes[0].diagnosis
     assert len(diagnoses) == 2
     for trial, again in zip(outcomes[0].trials, trials, strict=True):

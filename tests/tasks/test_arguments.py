@@ -12,19 +12,19 @@ from selfmodel.tasks import suite_bodies
 
 WRONG: list[tuple[str, object, str]] = [
     ("hypotesis", "intact", "unknown argument of the task 'hypotesis': did you mean hypothesis"),
-    ("hypothesis", None, "expected a hypothesis in notation .* got None"),
-    ("hypothesis", ["break:x"], "expected a hypothesis in notation"),
+    ("hypothesis", None, "expected a Hypothesis or notation .* got an object of type NoneType"),
+    ("hypothesis", ["break:x"], "expected a Hypothesis or notation"),
     ("random", -1, "expected random as a whole number from 0 to 4294967295, .* got -1"),
     ("random", 2**32, "expected random as a whole number"),
     ("random", "one", "expected random as a whole number .* got 'one'"),
     ("random", 1.5, "expected random as a whole number"),
-    ("gap", None, "expected a number as gap, such as 0.05, got None"),
-    ("gap", "0.05", "expected a number as gap"),
-    ("start_noise", "x", "expected a number as start_noise"),
-    ("start_noise", True, "expected a number as start_noise"),
+    ("gap", None, "expected a real number as gap, got None: give one such as gap=0.05"),
+    ("gap", "0.05", "expected a real number as gap"),
+    ("start_noise", "x", "expected a real number as start_noise"),
+    ("start_noise", True, "expected a real number as start_noise"),
     ("time_limit", 0, "expected a time_limit above 0 s, such as 10 or .* got 0"),
     ("time_limit", float("nan"), "expected a time_limit above 0 s"),
-    ("time_limit", "10", "expected a number as time_limit"),
+    ("time_limit", "10", "expected a real number as time_limit"),
 ]
 
 
@@ -36,7 +36,9 @@ def test_a_wrong_argument_is_refused(number: int):
 
 
 def test_arguments_that_are_no_mapping_are_refused():
-    with pytest.raises(InputError, match=r"expected task_kwargs as a mapping, .* got \['gap'\]"):
+    with pytest.raises(
+        InputError, match=r"expected task_kwargs as a mapping, .* got an object of type list"
+    ):
         tasks.load("quadruped", "walk", ["gap"])  # type: ignore[arg-type]  # the promise
 
 

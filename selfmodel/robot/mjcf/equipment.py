@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET  # of checked texts
 import mujoco
 import numpy as np
 
-from selfmodel.errors import InputError, listed, unknown_name
+from selfmodel.errors import InputError, check_name, listed
 from selfmodel.robot.actuators import ancestors, command_range, command_ranges
 from selfmodel.robot.anatomy_reader import driven_joints
 from selfmodel.robot.contacts import contacts_enabled, ground_contact_geoms
@@ -299,8 +299,7 @@ def _chosen(
 ) -> list[str]:
     names = default if wanted is None else wanted
     for name in names:
-        if name not in known:
-            raise unknown_name(kind, name, known)
+        check_name(kind, name, known)
     return [name for name in names if name not in has]
 
 

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from selfmodel.errors import InputError, unknown_name
+from selfmodel.errors import InputError, check_name, unknown_name
 from selfmodel.files import load_toml, read_file
 from selfmodel.robot.mjcf.untrusted import is_around_home
 
@@ -213,8 +213,7 @@ def checked_settings(given: Mapping[str, Any]) -> MjcfSettings:
                 "neurons is a setting of a controller, not of a robot: leave neurons out, and give "
                 "--neurons N to the command"
             )
-        if key not in types:
-            raise unknown_name("setting", key, list(types))
+        check_name("setting", key, types)
         one = key in _BY_JOINT and not isinstance(value, Mapping)
         try:
             if value is not None:

@@ -165,7 +165,6 @@ class Folder:
     ``assets/trunk.stl`` or ``trunk.stl``. A link counts as the file that it leads to.
 
     Attributes:
-        path: Folder of the MJCF.
         root: Folder around all files of the robot; see ``root_around``.
         assets: Further folder with files that the MJCF names; "" for none.
     """

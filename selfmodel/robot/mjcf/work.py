@@ -28,8 +28,6 @@ class Work:
     """An MJCF that each step of the adaptation edits, and its model as it is at the moment.
 
     Attributes:
-        root: The ``<mujoco>`` element.
-        settings: Settings of the user.
         assets: Contents of the files that the MJCF names, by names without folders.
         notes: Descriptions of the changes, one sentence each.
         missing: Error messages of the meshes without files, by name; they have placeholders.
