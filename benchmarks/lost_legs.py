@@ -1,10 +1,11 @@
 """``python -m benchmarks.lost_legs``: a hexapod loses one leg or two, and walks again, by a rule.
 
 The rule is HexaHeal's: a trial of 14 s counts as recovered if the robot does not fall, and goes at
-least 0.125 m/s forward over the last 8 s; a case, if it does so in 7 of 10 robots. The 21 cases are
-six legs and fifteen pairs. A physical robot differs from the self-model by a gap of 0.1: masses,
-inertias and torques by 10 %, friction and damping by 20 %, with noise and delay (theirs: friction
-20 %, gains 15 %, torso 10 %). Unlike theirs, it has lost its legs before the trial begins.
+least 0.125 m/s forward over the last 8 s. The 21 cases are six legs and fifteen pairs; theirs count
+if 7 of 10 robots recover, here each robot is a row. A physical robot differs from the self-model by
+a gap of 0.1: masses, inertias and torques by 10 %, friction and damping by 20 %, with noise and
+delay (theirs: friction 20 %, gains 15 %, torso 10 %). Unlike theirs, it has lost its legs before
+the trial begins.
 
 A row for each case and robot is appended to ROWS, and those that are there are skipped. The order
 is random, so the rows of a run that was stopped are a random sample. The first gait is evolved once

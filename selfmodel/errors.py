@@ -202,8 +202,12 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     """Returns the most similar names; a file may have too many or too long ones to compare."""
     if len(name) > _LONGEST_COMPARED or len(names) > _MOST_COMPARED:
         return []
-    short = {one.casefold(): one for one in names if len(one) <= _LONGEST_COMPARED}
-    return [short[one] for one in difflib.get_close_matches(name.casefold(), short, cutoff=0.5)]
+    short = [one for one in names if len(one) <= _LONGEST_COMPARED]
+    folded = difflib.get_close_matches(name.casefold(), map(str.casefold, short), cutoff=0.5)
+    return sorted(
+        (one for one in short if one.casefold() in folded),
+        key=lambda one: folded.index(one.casefold()),
+    )
 
 
 def listed(names: Sequence[str], most: int = 200) -> str:

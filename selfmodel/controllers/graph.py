@@ -19,7 +19,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.operators import BY_SHAPE, OPERATORS, TENSOR_FACTORS, Arguments
-from selfmodel.errors import unknown_name
+from selfmodel.errors import check_name
 
 MAX_NODES = 1000
 """Largest number of operators of a graph."""
@@ -122,8 +122,7 @@ class Graph:
             raise ValueError(f"it has {len(self.nodes)} operators, expected at most {MAX_NODES}")
         known = {self.input, *(state.input for state in self.states), *self.tensors}
         for node in self.nodes:
-            if node.operator not in OPERATORS:
-                raise unknown_name("operator", node.operator, sorted(OPERATORS))
+            check_name("operator", node.operator, sorted(OPERATORS))
             if missing := [name for name in node.inputs if name and name not in known]:
                 raise ValueError(f"{missing[0]} is used by {node.operator} before it is computed")
             for name, value in node.attributes:

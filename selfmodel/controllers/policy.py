@@ -170,8 +170,7 @@ class Policy(Design):
         if not self.interface.terms:
             raise ValueError("expected a preset or terms of an observation, got none")
         for term in self.interface.terms:
-            if term.name not in TERMS:
-                raise unknown_name("term", term.name, TERMS)
+            check_name("term", term.name, TERMS)
             for numbers in (term.scale, term.offset):
                 if len(numbers) not in (1, self.width(term.name)):
                     raise ValueError(

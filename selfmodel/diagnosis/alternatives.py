@@ -26,22 +26,26 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     """Returns by how many standard errors the best hypothesis predicts better than its neighbours.
 
     The neighbours have one fault less than the best, or another fault of the searched kinds in the
-    place of one of its faults, or are single faults or none; they have at most as many faults. Of
-    an evident hypothesis, the other fault is one that may stop the joints that stand. The
-    eight best by the surrogate are compared, with the severity of the other fault fitted, and the
-    empty hypothesis. The lead is that of the loss, or that at a joint at which the two differ;
-    infinite over a neighbour of whose faults one corrects model error. They are sorted by total
-    loss.
+    place of one of its faults, or are single faults or none; they have at most as many faults.
+    Where the best stops joints that stand, another fault in the place of one of these is of the
+    same limbs. The eight best by the surrogate are compared, with the severity of the other fault
+    fitted, and the empty hypothesis. The lead is that of the loss, or that at a joint at which the
+    two differ; infinite over a neighbour of whose faults one corrects model error. They are sorted
+    by total loss.
     """
     space = problem.space
     neighbours = dict.fromkeys(
         [*space.with_one_less(best), *space.with_one_replaced(best), *space.with_one_more(INTACT)]
     )
-    known = {*best.faults, *problem.of_standing} if problem.is_evident(best) else None
+    parts = problem.standing_parts if problem.suffices(best) else frozenset()
 
     def is_rival(one: Hypothesis) -> bool:
-        is_other = len(one) <= len(best) and bool(best.lacking(one))
-        return is_other and (known is None or known.issuperset(one.faults))
+        lost, new = (
+            {fault.part for fault in some.lacking(other)}
+            for some, other in ((best, one), (one, best))
+        )
+        may_stand = not new or parts.isdisjoint(lost) or not parts.isdisjoint(new)
+        return len(one) <= len(best) and bool(lost) and may_stand
 
     rivals = [*filter(is_rival, neighbours)]
     few = best_severities(by_total_loss(rivals, problem.coarse))[: search.SHORTLIST_SIZE]
@@ -124,13 +128,13 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
     part. The gain has to be significant, and significantly larger than the gain of the fault alone
     on healthy trials; otherwise the fault corrects model error. Of those that pass, the one with
     the lowest total loss is returned, with the best hypothesis of each other kind; None if there is
-    none, if there are no comparable healthy trials, or if the best hypothesis is evident.
+    none, or if there are no comparable healthy trials.
     """
     (best_losses,) = problem.losses([best])
     is_exact = (
         not np.isfinite(best_losses).all() or best_losses.mean() <= significance.NEGLIGIBLE_LOSS
     )
-    if problem.healthy([INTACT]) is None or is_exact or problem.is_evident(best):
+    if problem.healthy([INTACT]) is None or is_exact:
         return None
     faults = _with_unsearched(best, problem.space)
     better: dict[str, Hypothesis] = {}

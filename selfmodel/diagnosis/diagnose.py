@@ -251,13 +251,13 @@ class DiagnosticSearch:
     ) -> Diagnosis | None:
         """Returns the diagnosis of the time after a change of the robot.
 
-        None if no change predicts the trials significantly better than the best hypothesis, as of
-        an evident one, if too little time follows it, or if the losses have no times. If the best
+        None if no change predicts the trials significantly better than the best hypothesis, if too
+        little time follows it, or if the losses of the comparator have no times. If the best
         hypothesis is not refined yet, the robot has to be as the healthy one before the change, and
         the change has to be better than the refined hypothesis after it is for the whole time.
         """
         timeline = self.losses.timeline(trials)
-        if timeline is None or problem.is_evident(best):
+        if timeline is None:
             return None
         names = [problem.names[trial.path] for trial in trials]
         dated = partial(change_at, losses=problem.losses, timeline=timeline, names=names)

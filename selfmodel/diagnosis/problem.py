@@ -167,10 +167,11 @@ class Problem:
         """
         return np.concatenate(self._references) if self._references else None
 
-    def is_evident(self, hypothesis: Hypothesis) -> bool:
+    def suffices(self, hypothesis: Hypothesis) -> bool:
         """Returns whether joints stand, and a hypothesis predicts the trials as the healthy ones.
 
-        That is, as well as the empty hypothesis predicts the healthy trials.
+        That is, as well as the empty hypothesis predicts the healthy trials. Weak faults beside it
+        do not show in that.
         """
         if not self.standing or not len(hypothesis) or self.reference is None:
             return False
@@ -178,14 +179,14 @@ class Problem:
         return excess < significance.MIN_Z
 
     @cached_property
-    def of_standing(self) -> list[Fault]:
-        """Coarse candidates that may stop the joints that stand: of these and of their limbs."""
+    def standing_parts(self) -> frozenset[str]:
+        """Parts whose faults may stop the joints that stand: these, and their limbs."""
         parts = {*self.standing}
         for name, limb in self.space.anatomy.limbs.items():
             joints = {joint.name for joint in limb}
             if not self.standing.isdisjoint(joints):
                 parts |= {name, *joints}
-        return [fault for fault in self.space.coarse_candidates if fault.part in parts]
+        return frozenset(parts)
 
     @property
     def hardest(self) -> FloatArray | None:

@@ -144,7 +144,7 @@ class LocalSearch:
         if not (self.problem.standing and any(starts)):
             further = [INTACT, *self.best_single_faults[:STARTS]]
             starts |= dict.fromkeys(self.pruned(levels(start)) for start in further)
-        evident = [start for start in starts if self.problem.is_evident(start)]
+        evident = [start for start in starts if self.problem.suffices(start)]
         local_optima = (
             {self._beside(evident)}
             if evident
@@ -230,9 +230,11 @@ class LocalSearch:
 
     def _beside(self, evident: Sequence[Hypothesis]) -> Hypothesis:
         """The best of some hypotheses by which joints stand, and what is beside it, pruned."""
+        parts = self.problem.standing_parts
 
         def others(current: Hypothesis) -> list[Hypothesis]:
-            return self._exchanged(current, self.problem.of_standing)
+            standing = [one for one in self._space.coarse_candidates if one.part in parts]
+            return self._exchanged(current, standing)
 
         def neighbours(current: Hypothesis) -> list[Hypothesis]:
             more = self._by_surrogate(self._space.with_one_more(current))[:SHORTLIST_SIZE]

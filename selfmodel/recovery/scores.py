@@ -158,7 +158,7 @@ def _before_fall(
 def _straight(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
     ahead = directions(trajectory["base_orientation"])
     headings = held(np.arctan2(ahead[..., 1], ahead[..., 0]), axis=-1)
-    turns = np.abs(np.unwrap(headings, axis=-1))
+    turns = np.abs(np.unwrap(np.nan_to_num(headings), axis=-1))  # unknown at first: forward
     share = np.minimum(_before_fall(turns, robot, hypothesis, trajectory) / np.pi, 1.0)
     distance = _upright(robot, hypothesis, trajectory)
     return np.asarray(distance - share * np.abs(distance))
@@ -221,10 +221,10 @@ nothing: a controller that tips the robot over and crawls on its back earns what
 """
 
 STRAIGHT = _metres("straight", UPRIGHT.record, _straight, ends_at_fall=True)
-"""Displacement up to the first fall, m, less its share that is the last turn over 180 degrees.
+"""Displacement up to the first fall, m, less a share of it: the last turn relative to 180 degrees.
 
-The turn is that of the base from the forward direction, in which a robot stands at first. A curve
-that costs a displacement little, such as 15 degrees, is longer on a physical robot.
+The turn is that of the base from the forward direction, in which a robot stands at first. One that
+costs little displacement, such as 15 degrees in simulation, is larger on a physical robot.
 """
 
 ENERGY = _metres(

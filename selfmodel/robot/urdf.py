@@ -41,6 +41,9 @@ ROTOR_TIME = 0.01
 in which a free motor reaches 63 % of that speed. About 6 ms for a Go2's and a Mini Cheetah's
 motors, 13 ms for a Dynamixel MX-64."""
 
+MAX_ROTOR = 100.0
+"""Largest inertia of a rotor at its joint, kg m²; that of the largest industrial robots is less."""
+
 UNLIMITED_RANGE = (-math.pi, math.pi)
 """Command range of a continuous joint, rad."""
 
@@ -321,7 +324,7 @@ def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
     a resistance that is the effort there, and grows with the square of the speed. Unlike the linear
     one of a motor's induced voltage, it is small at the low speeds of joints with a load, where
     MuJoCo computes contacts without it. Without the inertia of a rotor, the damping of a servo
-    stops a light limb within a time step, which flatters, too.
+    stops a light limb within a time step: a search finds gaits that no robot walks.
     """
     settings, names = work.settings, dict[str, list[str]]()
     elements = {j.get("name"): j for j in work.section("worldbody").iter("joint")}
@@ -347,6 +350,12 @@ def _add_servos(work: Work, hinges: list[ET.Element]) -> None:
         rotor = value_of(settings.armature, name)
         if velocity > 0:
             rotor = ROTOR_TIME * effort / velocity if rotor is None else rotor
+            if rotor > MAX_ROTOR:
+                raise InputError(
+                    f"the joint {quoted(name)} has a velocity limit of {velocity:g} rad/s at an "
+                    f"effort of {effort:g} N m, as if its rotor had {rotor:g} kg m²: correct the "
+                    f"velocity limit, or set velocity = 0 for none"
+                )
             own = elements[name].get("damping", "0").split()[0]
             elements[name].set("damping", f"{own} {effort / velocity / velocity!r}")
         if kd is None:

@@ -267,7 +267,7 @@ def test_the_rotor_of_a_servo_follows_from_its_limits_or_is_given(
 
 def test_a_velocity_limit_of_nearly_nothing_is_refused(tmp_path: Path):
     text = urdf(link("a"), link("b"), joint("knee", "a", "b", velocity=1e-200))
-    with pytest.raises(InputError, match=r"walker\.urdf: .*armature"):
+    with pytest.raises(InputError, match=r"walker\.urdf: .*'knee'.*velocity"):
         load_mjcf(written(tmp_path, text, 'base = "fixed"'))
 
 
