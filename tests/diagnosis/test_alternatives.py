@@ -64,6 +64,18 @@ def test_neighbours_that_predict_as_well_are_indistinguishable_and_others_are_no
     assert named(found) == [f"{BREAK}+sensor:back_left_touch", f"{BREAK}+{JAM}"]
 
 
+def test_a_fault_that_stops_joints_has_rivals_of_its_limb_and_one_beside_it_any():
+    best, beside = f"{BREAK}+{JAM}", f"{BREAK}+break:back_left_knee"
+    same_limb, elsewhere = f"jam:front_left_knee+{JAM}", f"jam:back_right_knee+{JAM}"
+    alike = {beside: 1 + 1e-7, same_limb: 1 + 2e-7, elsewhere: 1 + 3e-7}
+    problem = Synthetic(PAPER, of({best: 1.0, **alike}, otherwise=2.0))
+
+    every = [beside, same_limb, elsewhere]
+    assert indistinguishable(leads_of(said(best), problem)) == [*map(said, every)]
+    problem.standing, problem.reference = frozenset([KNEE]), np.full(PIECES, 1.0)
+    assert indistinguishable(leads_of(said(best), problem)) == [*map(said, every[:2])]
+
+
 def test_the_same_faults_at_another_severity_are_no_alternative_and_others_are_fitted():
     space = HypothesisSpace(ANATOMY, (WEAK_MOTOR, FRICTION))
     best = said("friction=0.4")
