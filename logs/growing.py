@@ -40,6 +40,7 @@ class GrowingLog:
     Attributes:
         path: The file that is read.
         has_ended: Whether the log is finished, and read to its end.
+        steps: Number of steps that were read.
 
     Raises:
         InputError: There is no such file; or, of ``new_steps``, the log is of another robot.
@@ -51,7 +52,7 @@ class GrowingLog:
         if not self.path.is_file():
             raise InputError(f"{path}: expected a trial log, finished or being written")
         self.has_ended = False
-        self._names, self._steps = names, 0
+        self._names, self.steps = names, 0
         self._contents = Contents(self.path)
         self._gatherer = Gatherer(self._contents, (records.HIDDEN,))
         self._topics: tuple[Topic, ...] = ()
@@ -82,6 +83,8 @@ class GrowingLog:
             advice = errors.salvage_it(self.path)
             raise self._contents.error(what, errors.CorruptError, advice) from failure
         found = self._contents.topics
+        if found and not self._topics:
+            reader.read_record(self._contents)  # raises LogError for a file that is no trial log
         if not self._topics and all(one in found and found[one].payloads for one in _NAMING):
             self._topics = self._checked_topics()
         held = [found[one.name].payloads if one.name in found else [] for one in self._topics]
@@ -93,8 +96,8 @@ class GrowingLog:
                 rows |= topic.unpack(topic.template.decode(payloads[:count])[1])
         for messages in found.values():
             del messages.payloads[:count], messages.times[:count]
-        self._steps += count
-        return [self._sample(rows, k, self._steps - count + k) for k in range(count)]
+        self.steps += count
+        return [self._sample(rows, k, self.steps - count + k) for k in range(count)]
 
     def _checked_topics(self) -> tuple[Topic, ...]:
         record = reader.read_record(self._contents)

@@ -77,9 +77,12 @@ class Bank:
         rated = dict[object, Rated]()
         for one, lead in leads.items():
             if lead < significance.MIN_Z:
-                loss = float(self._losses[one][0].mean())
-                rated.setdefault(one.without_severities, Rated(one, loss))
+                rated.setdefault(one.without_severities, Rated(one, self.loss(one)))
         return list(rated.values())
+
+    def loss(self, hypothesis: Hypothesis) -> float:
+        """Returns the mean loss of the comparator of one of the last hypotheses."""
+        return float(self._losses[hypothesis][0].mean())
 
     def compared(self, one: Hypothesis, other: Hypothesis) -> FloatArray:
         """Returns the losses by which two hypotheses are compared, ``(2, pieces)``."""

@@ -1,10 +1,11 @@
-"""A sequential test for a change, whose false alarms are stated per time.
+"""A sequential test for a change, whose threshold aims at a mean time between false alarms.
 
-Each segment gives e-values, one of each channel (joint, sensor or signal): numbers of at least 0
-whose expected value, given all segments before, is at most 1 as long as the robot is healthy. The
+Each segment gives e-values, one of each channel (joint, sensor or signal). Were their expected
+value, given all segments before, at most 1 as long as the robot is healthy, the aim would be
+proven: it holds on average over healthy trials, not given those of a watch; see ``reference``. The
 Shiryaev-Roberts recursion ``M = e * (M + 1)`` of a channel has an expected value of at most the
 number of segments, at any time that may be chosen while it runs, and so has the mean over the
-channels. An alarm at ``M >= A`` comes, on average, after ``A`` healthy segments or more.
+channels. An alarm at ``M >= A`` would come, on average, after ``A`` healthy segments or more.
 
 Source: Shin, Ramdas & Rinaldo, "E-detectors: a nonparametric framework for sequential change
 detection", New England Journal of Statistics in Data Science 2 (2023).
@@ -39,7 +40,7 @@ class Detector:
     """Mean over channels of e-detectors by Shiryaev and Roberts; see the module.
 
     Args:
-        run_length: Healthy segments before a false alarm, on average, at least.
+        run_length: Healthy segments before a false alarm that are aimed at, on average.
     """
 
     def __init__(self, run_length: float) -> None:

@@ -11,6 +11,10 @@ what it does. ``changed``: an alarm, whose cause is sought. The others end a wat
 left, several are, or none explains what is seen."""
 
 
+ENDS: tuple[Status, ...] = ("explained", "ambiguous", "unexplained")
+"""Those that end a watch."""
+
+
 @dataclass(frozen=True)
 class Rated:
     """A hypothesis that is left after a change, and its mean loss since then."""

@@ -4,13 +4,16 @@ The self-model is fitted to the first half of each healthy trial; the scores of 
 second half are held out. A score of a watched robot becomes an **e-value** by its rank among them:
 with r - 1 of n healthy scores at least as large, it is (n + 1) / (r H), where H is the sum of 1 / k
 up to n + 1. The expected value of a healthy score is 1 if it is exchangeable with those (a
-conformal p-value r / (n + 1), and the calibrator that is proportional to 1 / p).
+conformal p-value r / (n + 1), and the calibrator that is proportional to 1 / p), on average over
+healthy trials: given some of them, it may be 1.1 to 1.9, the more the fewer they are.
 
-Neighbouring segments depend on each other, and gaits differ in how well they are predicted. So a
-score is first divided by a **margin** of its channel: the smallest with which no stretch of the
-healthy trials is evidence against them. Of each stretch, compared with all other stretches, the
-products of 1 to ``DEPENDENT`` neighbouring e-values have an expected value of at most 1, that of a
-log-normal distribution with the mean and the variance of their logarithms.
+Besides, neighbouring segments depend on each other, and gaits differ in how well they are
+predicted. So a score is first divided by a **margin** of its channel: the smallest with which no
+stretch of the healthy trials is evidence against them, or the largest. Of each stretch, compared
+with all other stretches, the products of 1 to ``DEPENDENT`` neighbouring e-values are to have an
+expected value of at most 1, by a log-normal distribution with the mean and the variance of their
+logarithms, which is lower than theirs. The margin has to absorb all that; no proof says that it
+does.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,12 +1,12 @@
 """Watch: whether a robot is as it was in its healthy trials, and if not, since when and why."""
 
 import dataclasses
+import math
 from collections import deque
 from collections.abc import Sequence
 
 from selfmodel import arguments
 from selfmodel.arguments import KindSource, RobotSource, TrialSource
-from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
@@ -24,8 +24,8 @@ from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Trial, TrialPart
 from selfmodel.watching.bank import Bank
-from selfmodel.watching.detector import Detector
-from selfmodel.watching.finding import Finding, Rated, Status
+from selfmodel.watching.detector import MEMORY, Detector
+from selfmodel.watching.finding import ENDS, Finding, Rated, Status
 from selfmodel.watching.reference import reference_of
 from selfmodel.watching.segments import Window, last_segment, scores_of
 
@@ -71,7 +71,8 @@ class Watch:
             judged: the first half of each fits the self-model, the second half shows its errors.
         kinds: Fault kinds of the causes, or names of kinds and of their sets, in a sequence or
             separated by commas.
-        false_alarm_every: Mean time between false alarms, at least, s of judged time.
+        false_alarm_every: Mean time between false alarms that the threshold aims at, s of motions
+            that are judged. No proof says that it is reached.
         calibrate: Whether the self-model is fitted to the healthy trials.
         threads: Threads of the physics; 0 for all processors.
 
@@ -121,7 +122,7 @@ class Watch:
                 ``PhysicalRobot.run`` yields them.
         """
         newest = self._window.add(step)
-        if newest is None or self._status in ("explained", "ambiguous", "unexplained"):
+        if newest is None or self._status in ENDS:
             return ()
         return tuple(self._seek(newest) if self._status == "changed" else self._judge(newest))
 
@@ -135,6 +136,7 @@ class Watch:
     def _forget(self) -> None:
         self._detector = Detector(self._run_length)
         self._recent: deque[tuple[float, TrialPart]] = deque(maxlen=MAX_PIECES)
+        self._ends: deque[float] = deque(maxlen=MEMORY + 1)
         self._change = Finding(0.0, "watching")
         self._bank: Bank | None = None
         self._named: tuple[object, ...] = ()
@@ -152,10 +154,11 @@ class Watch:
             self._detector = Detector(self._run_length)  # what came before may be another motion
             return self._said("not judged", reason)
         self._recent.append((self._time, self._part(newest)))
+        self._ends.append(self._time)
         if not self._detector.update(self._reference.log_e_values(scores)):
             return self._said("watching")
         onset, shown_by = self._detector.onset(), self._detector.shown_by()
-        ends = [end for end, _ in self._recent]
+        ends = [*self._ends]
         age, oldest, newest_age = (min(one, len(ends) - 1) for one in onset)
         length = self._step * self._horizon
         # The change may not have shown at first, or while the robot was not judged.
@@ -170,7 +173,7 @@ class Watch:
             shown_by=tuple(self._reference.channels[k] for k in shown_by),
         )
         # The first segment that shows it may be one in which it began.
-        self._recent = deque(list(self._recent)[len(ends) - age :], MAX_PIECES)
+        self._recent = deque(list(self._recent)[-age:] if age else [], MAX_PIECES)
         return [self._change, *self._compared()]
 
     def _seek(self, newest: Trial) -> list[Finding]:
@@ -193,26 +196,29 @@ class Watch:
             shown = [channels.index(name) for name in self._change.shown_by if name in hinges]
             self._bank = Bank(self._simulator, self._comparator, self._space, since, shown)
         remaining = self._bank.remaining(segments)
+        if not math.isfinite(remaining[0].loss):
+            self._recent.pop()  # every hypothesis diverged: the segment says nothing
+            return []
         is_last = len(segments) >= MAX_PIECES
         if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
-            return self._ended(remaining, self._bank.compared(remaining[0].hypothesis, INTACT))
+            return self._ended(remaining, self._bank.loss(INTACT))
         named = tuple(rated.hypothesis.without_severities for rated in remaining)
         if len(named) > FEW or set(named) == set(self._named):
             return []
         self._named = named
         return [self._about("changed", remaining)]
 
-    def _ended(self, remaining: Sequence[Rated], compared: FloatArray) -> list[Finding]:
-        """Returns the last finding about a change; ``compared`` is the best with ``INTACT``."""
-        if remaining[0].hypothesis == INTACT:
+    def _ended(self, remaining: Sequence[Rated], intact: float) -> list[Finding]:
+        """Returns the last finding about a change; ``intact`` is the loss of ``INTACT``."""
+        best, *others = remaining
+        if best.hypothesis == INTACT and not others:
             self._forget()
             return self._said("watching")
-        best, intact = compared.mean(axis=1).tolist()
-        left = share_left(best, intact, self._reference.loss)
+        left = share_left(best.loss, intact, self._reference.loss)
         if left is not None and left > MAX_LEFT:
             reason = f"no single fault explains more than {1 - MAX_LEFT:.0%} of the errors"
             return [self._about("unexplained", remaining, reason)]
-        return [self._about("explained" if len(remaining) == 1 else "ambiguous", remaining)]
+        return [self._about("ambiguous" if others else "explained", remaining)]
 
     def _about(self, status: Status, remaining: Sequence[Rated], reason: str = "") -> Finding:
         self._status = status

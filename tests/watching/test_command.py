@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from mcap.writer import Writer
 
 import selfmodel
 from selfmodel.cli import watch
@@ -59,32 +59,51 @@ def test_the_findings_of_a_log_are_json_lines(
     assert statuses(done)[0] == "watching"
     assert last["status"] == "explained"
     assert last["remaining"][0]["hypothesis"].startswith("jam:back_right_knee")
-    assert f"failed.mcap: {STEPS} steps" in done.stderr
 
 
-def test_a_log_that_is_written_is_followed_to_its_end_and_falling_behind_is_said(
+@pytest.mark.parametrize("follow", [[], ["--follow"]])
+def test_a_log_is_watched_to_its_end_or_to_that_of_the_watch(
+    run: Run, folder: Path, quadruped: Robot, follow: list[str]
+):
+    steps = stream(quadruped, "intact", 100)
+    selfmodel.write_log(trial_of(quadruped, steps), folder / f"{len(follow)}.mcap", quadruped)
+    done = run(f"{len(follow)}.mcap", *follow)
+
+    assert statuses(done) == ["watching"]
+    assert "mcap: 100 steps" in done.stderr
+
+
+def test_a_file_that_is_no_trial_log_is_refused_before_the_fit(run: Run, folder: Path):
+    with (folder / "other.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/imu", "json", 0)
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    with pytest.raises(AssertionError, match=r"other\.mcap.*trial log"):
+        run("other.mcap")
+
+
+def test_a_log_that_is_written_is_followed_and_falling_behind_is_said(
     run: Run, folder: Path, quadruped: Robot, failed: list[Sample], monkeypatch: pytest.MonkeyPatch
 ):
     plan = TrialPlan("growing", "after", walk(quadruped, STEPS), STEPS, 0)
-    with ExitStack() as stack:
-        made = TrialWriter(folder / "growing.mcap", quadruped, plan, TrialHeader(Settings()))
-        writer, left = stack.enter_context(made), iter(failed)
+    with TrialWriter(folder / "growing.mcap", quadruped, plan, TrialHeader(Settings())) as writer:
+        left = iter(failed)
         writer.add(next(left))
         unfinished = run("growing.mcap")
 
         def written_meanwhile(_seconds: float) -> None:
-            """Writes 50 steps, 250, and then the rest."""
-            count = {1: 50, 51: 250}.get(writer.steps, STEPS - writer.steps)
-            for _ in range(count):
+            """Writes 50 steps, and then 250."""
+            for _ in range(50 if writer.steps == 1 else 250):
                 writer.add(next(left))
-            if writer.steps == STEPS:
-                stack.close()
 
         monkeypatch.setattr(watch.time, "sleep", written_meanwhile)
         followed = run("growing.mcap", "--follow")
+        for step in left:
+            writer.add(step)
 
     assert unfinished.stdout == ""
-    assert "growing.mcap.part is not finished: --follow waits" in unfinished.stderr
+    assert "growing.mcap.part has no end: it is cut, or --follow waits" in unfinished.stderr
     assert statuses(followed)[-1] == "explained"
     assert followed.stderr.count("note: behind by 250 steps") == 1
-    assert f"{STEPS} steps" in followed.stderr

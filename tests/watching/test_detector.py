@@ -1,4 +1,4 @@
-"""The sequential test: false alarms as seldom as stated, changes dated, and shown by a channel."""
+"""The sequential test: its recursion, and changes that are dated and shown by a channel."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,13 @@ from selfmodel.watching.detector import Detector
 
 
 def harmonic(rng: np.random.Generator, channels: int, healthy: int = 100) -> np.ndarray:
-    """Logarithms of e-values of scores that are exchangeable with those of the healthy trials."""
+    """Logarithms of e-values of scores that are ranked among healthy ones of their own."""
     ranks = rng.integers(1, healthy + 2, channels)
     return np.log((healthy + 1) / (ranks * np.sum(1 / np.arange(1, healthy + 2))))
 
 
 @pytest.mark.parametrize("channels", [1, 10])
-def test_a_false_alarm_comes_on_average_after_the_stated_number_of_segments_or_more(channels: int):
+def test_e_values_that_are_valid_given_all_before_alarm_as_seldom_as_stated(channels: int):
     rng, lengths = np.random.default_rng(0), []
     for _ in range(60):
         detector, length = Detector(run_length=40), 1
