@@ -43,7 +43,7 @@ class Bank:
         since: Trial,
         hinges: Sequence[int],
     ) -> None:
-        self._table, self._hinges = LossTable(simulator, comparator), list(hinges)
+        self._table, self.hinges = LossTable(simulator, comparator), list(hinges)
         anatomy = space.anatomy
         standing = standing_joints([since], anatomy)
         observed = observed_faults([since], anatomy, standing)
@@ -63,7 +63,7 @@ class Bank:
             self._table.losses(every, segments),
             self._table.by_hinge(every, segments),
         )
-        at_hinges = np.array(by_hinge)[:, :, self._hinges]
+        at_hinges = np.array(by_hinge)[:, :, self.hinges]
         # The first row is of the comparator, the others are of hinges, (1 + hinges, pieces).
         rows = np.concatenate([losses[:, np.newaxis], at_hinges.swapaxes(1, 2)], axis=1)
         self._losses = dict(zip(every, rows, strict=True))
@@ -77,12 +77,9 @@ class Bank:
         rated = dict[object, Rated]()
         for one, lead in leads.items():
             if lead < significance.MIN_Z:
-                rated.setdefault(one.without_severities, Rated(one, self.loss(one)))
+                loss = float(self._losses[one][0].mean())
+                rated.setdefault(one.without_severities, Rated(one, loss))
         return list(rated.values())
-
-    def loss(self, hypothesis: Hypothesis) -> float:
-        """Returns the mean loss of the comparator of one of the last hypotheses."""
-        return float(self._losses[hypothesis][0].mean())
 
     def compared(self, one: Hypothesis, other: Hypothesis) -> FloatArray:
         """Returns the losses by which two hypotheses are compared, ``(2, pieces)``."""

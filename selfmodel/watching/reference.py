@@ -79,6 +79,10 @@ class Reference:
         n = len(self.scores)
         return np.where(np.isnan(scores), 0.0, _log_e_values(n - np.array(counts), n))
 
+    def loss_with(self, hinges: Sequence[int]) -> float:
+        """Returns the median held-out loss of the comparator with those of some hinges."""
+        return self.loss + float(np.median(self.scores[:, list(hinges)], axis=0).sum())
+
     def uncovered(self, trial: Trial, steps: int) -> str:
         """Returns why the healthy trials do not cover the last steps of a trial; "" if they do."""
         rows = trial.trajectory.rows(slice(-steps - 1, None))

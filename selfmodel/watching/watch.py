@@ -201,20 +201,21 @@ class Watch:
             return []
         is_last = len(segments) >= MAX_PIECES
         if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
-            return self._ended(remaining, self._bank.loss(INTACT))
+            return self._ended(remaining, self._bank)
         named = tuple(rated.hypothesis.without_severities for rated in remaining)
         if len(named) > FEW or set(named) == set(self._named):
             return []
         self._named = named
         return [self._about("changed", remaining)]
 
-    def _ended(self, remaining: Sequence[Rated], intact: float) -> list[Finding]:
-        """Returns the last finding about a change; ``intact`` is the loss of ``INTACT``."""
+    def _ended(self, remaining: Sequence[Rated], bank: Bank) -> list[Finding]:
+        """Returns the last finding about a change."""
         best, *others = remaining
         if best.hypothesis == INTACT and not others:
             self._forget()
             return self._said("watching")
-        left = share_left(best.loss, intact, self._reference.loss)
+        own, intact = bank.compared(best.hypothesis, INTACT).mean(axis=1).tolist()
+        left = share_left(own, intact, self._reference.loss_with(bank.hinges))
         if left is not None and left > MAX_LEFT:
             reason = f"no single fault explains more than {1 - MAX_LEFT:.0%} of the errors"
             return [self._about("unexplained", remaining, reason)]
