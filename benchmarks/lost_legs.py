@@ -13,20 +13,17 @@ and kept in FOLDER.
 """
 
 import argparse
-import json
 import random
-import tempfile
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import combinations, islice
+from itertools import combinations
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 
 import selfmodel
-from benchmarks.foreign.scoring import rate, read_rows
+from benchmarks.foreign.scoring import add_rows, rate, read_rows
 from benchmarks.hexapod.robots import LEGS, self_model
 from selfmodel import Controller, Robot, Settings, Trial
 from selfmodel.faults.hypothesis import INTACT
@@ -67,16 +64,9 @@ def main() -> None:
     if given.command == "table":
         print(table(read_rows(given.rows)))
         return
-    robot, done = ROBOTS[given.robot](), read_rows(given.rows)
-    gait = first_gait(robot, given)
-    new = (key for key in cases(given) if not any(key.items() <= row.items() for row in done))
-    for key in islice(new, given.limit):
-        start = time.process_time()
-        values = recovered(robot, gait, given, key)
-        row = {**key, **values, "seconds": round(time.process_time() - start)}
-        with given.rows.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps(row)}\n")
-        print(json.dumps(row), flush=True)
+    robot = ROBOTS[given.robot]()
+    of = partial(recovered, robot, first_gait(robot, given), settings_of(robot, given))
+    add_rows(given.rows, cases(given), given.limit, of)
 
 
 def cases(given: argparse.Namespace) -> Iterator[Row]:
@@ -107,7 +97,7 @@ def first_gait(robot: Robot, given: argparse.Namespace) -> Controller:
     return load_controller(path)
 
 
-def recovered(robot: Robot, gait: Controller, given: argparse.Namespace, key: Row) -> Row:
+def recovered(robot: Robot, gait: Controller, settings: Settings, key: Row, work: Path) -> Row:
     """Returns the walks before and after the loss of legs, and those of the recovery."""
     limbs = robot.anatomy.limbs
     truth = "+".join(f"break:{limbs[leg][0].name}" for leg in key["legs"].split("+"))
@@ -115,16 +105,15 @@ def recovered(robot: Robot, gait: Controller, given: argparse.Namespace, key: Ro
         selfmodel.simulated_robot(robot, faults, gap=GAP, seed=key["seed"])
         for faults in ("intact", truth)
     )
-    with tempfile.TemporaryDirectory() as work:
-        found = selfmodel.recover(
-            *(healthy, damaged, robot, Path(work, "run")),
-            gait=gait,
-            repair="robust",
-            score=key["score"],
-            settings=settings_of(robot, given),
-            seed=key["seed"],
-            threads=1,
-        )
+    found = selfmodel.recover(
+        *(healthy, damaged, robot, work / "run"),
+        gait=gait,
+        repair="robust",
+        score=key["score"],
+        settings=settings,
+        seed=key["seed"],
+        threads=1,
+    )
     hypotheses = [INTACT, *[parse(truth, robot.anatomy)] * len(found.trials[1:])]
     before, after, *trials = [
         {"speed": last_speed(trial), "fell": fall_of(robot, hypothesis, trial) is not None}

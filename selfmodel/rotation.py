@@ -30,6 +30,12 @@ def directions(orientation: FloatArray) -> FloatArray:
     return np.stack([*forward, *upward], axis=-1)
 
 
+def headings(orientation: FloatArray) -> FloatArray:
+    """Returns the angle of a body's x axis in the horizontal plane, rad, ``(...)``."""
+    ahead = directions(orientation)
+    return np.asarray(np.arctan2(ahead[..., 1], ahead[..., 0]))
+
+
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
     """Returns the quaternion product, ``(..., 4)``: the second rotation followed by the first.
 

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,26 @@ def read_rows(path: Path) -> list[Row]:
     """Returns the rows of a file; none if it does not exist."""
     lines = path.read_text().splitlines() if path.exists() else []
     return [json.loads(line) for line in lines if line.strip()]
+
+
+def add_rows(
+    path: Path, keys: Iterable[Row], limit: int | None, values_of: Callable[[Row, Path], Row]
+) -> None:
+    """Appends a row for each key that has none yet, at most ``limit``, and prints it.
+
+    A row is its key, the values and, if these have none, the seconds of processor time. The values
+    are of a key and an empty folder, which is removed.
+    """
+    done = read_rows(path)
+    new = (key for key in keys if not any(key.items() <= row.items() for row in done))
+    for key in islice(new, limit):
+        start = time.process_time()
+        with tempfile.TemporaryDirectory() as work:
+            row = {**key, **values_of(key, Path(work))}
+        row.setdefault("seconds", round(time.process_time() - start))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps(row)}\n")
+        print(json.dumps(row), flush=True)
 
 
 def _diagnosed(folder: Path, question: Question) -> Row:

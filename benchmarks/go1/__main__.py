@@ -6,16 +6,12 @@ rows of a command that was stopped are a random sample.
 """
 
 import argparse
-import json
 import random
-import tempfile
-import time
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 import selfmodel
-from benchmarks.foreign.scoring import read_rows
+from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.go1 import robots
 from benchmarks.go1.robots import OTHERS, WALK, Go1
 from benchmarks.go1.tables import table
@@ -49,17 +45,12 @@ def main() -> None:
         return
     settings = Settings(steps=robots.STEPS, generations=given.generations).scaled(given.population)
     robot = selfmodel.load_robot(given.files / robots.SCENE, robots.SETTINGS)
-    new, done = cases(robot, given), read_rows(given.rows)
-    new = (key for key in new if not any(key.items() <= row.items() for row in done))
-    for key in islice(new, given.limit):
-        start = time.process_time()
-        with tempfile.TemporaryDirectory() as work:
-            go1 = Go1(given.files, Path(work), key["seed"], robot)
-            values = (recovered if given.command == "recover" else diagnosed)(go1, key, settings)
-        row = {**key, **values, "seconds": round(time.process_time() - start)}
-        with given.rows.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps(row)}\n")
-        print(json.dumps(row), flush=True)
+
+    def values_of(key: Row, work: Path) -> Row:
+        go1 = Go1(given.files, work, key["seed"], robot)
+        return (recovered if given.command == "recover" else diagnosed)(go1, key, settings)
+
+    add_rows(given.rows, cases(robot, given), given.limit, values_of)
 
 
 def cases(robot: Robot, given: argparse.Namespace) -> Iterator[Row]:

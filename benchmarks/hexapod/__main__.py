@@ -5,14 +5,12 @@ first gaits, which are evolved once. It needs PyBullet: ``pip install --group ot
 """
 
 import argparse
-import json
-import tempfile
-import time
 from collections.abc import Callable, Iterator, Mapping
-from itertools import islice, product
+from functools import partial
+from itertools import product
 from pathlib import Path
 
-from benchmarks.foreign.scoring import read_rows
+from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.hexapod.robots import CASES, GAIN, MODELS, STEPS
 from benchmarks.hexapod.tables import table
 from selfmodel import Settings
@@ -56,16 +54,8 @@ def main() -> None:
         given.population
     )
     bench = trials.Bench(given.folder, settings, given.score, given.design, given.repair)
-    done = read_rows(given.rows)
-    new = (key for key in cases(given) if not any(key.items() <= row.items() for row in done))
-    for key in islice(new, given.limit):
-        start = time.process_time()
-        with tempfile.TemporaryDirectory() as work:
-            values = run[given.command](bench, key, Path(work))
-        row = {**key, **values, "seconds": round(time.process_time() - start)}
-        with given.rows.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps(row)}\n")
-        print(json.dumps(row), flush=True)
+    of = partial(run[given.command], bench)
+    add_rows(given.rows, cases(given), given.limit, of)
 
 
 def cases(given: argparse.Namespace) -> Iterator[Row]:

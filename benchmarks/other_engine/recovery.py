@@ -20,7 +20,7 @@ from selfmodel.logs import load_controller
 from selfmodel.recovery.falls import falls_of
 from selfmodel.recovery.result import Recovery
 from selfmodel.robot.robot import Robot
-from selfmodel.rotation import directions
+from selfmodel.rotation import headings
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import is_correct
@@ -109,8 +109,7 @@ def _facts(recovery: Recovery, robot: Robot, truth: Hypothesis, threads: int) ->
 
 def heading_change(trajectory: Trajectory) -> float:
     """Returns the turn to the left from the first step to the last, degrees; 720 for two rounds."""
-    ahead = directions(trajectory["base_orientation"])
-    heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    heading = np.unwrap(headings(trajectory["base_orientation"]))
     return round(float(np.degrees(heading[-1] - heading[0])), 1)
 
 

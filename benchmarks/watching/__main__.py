@@ -4,11 +4,10 @@ A command appends a row for each case to ROWS, and skips the cases that are ther
 """
 
 import argparse
-import json
 import time
 from collections.abc import Iterator
 from functools import cache
-from itertools import islice, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,14 @@ import selfmodel
 from benchmarks.foreign.cases import Fault, stream
 from benchmarks.foreign.model import LEVELS
 from benchmarks.foreign.robots import robot
-from benchmarks.foreign.scoring import read_rows
+from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.watching.streams import NEW, Machine
 from benchmarks.watching.tables import table
 from selfmodel import Watch
 from selfmodel.studies.study import Row
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.watching import Finding
+from selfmodel.watching.finding import ENDS
 
 HEALTHY, HEALTHY_PERIOD = 80.0, 10.0
 """Length of each of the two healthy trials, and time of a gait in them, s."""
@@ -35,8 +35,6 @@ ONSETS, AFTER = (8.0, 14.0), 8.0
 """Range of the onset of a fault, and time of the stream after it, s."""
 
 FAULTS = ("break", "jam", "sensor", "motor")
-
-ENDS = ("explained", "ambiguous", "unexplained")
 
 
 def main() -> None:
@@ -60,14 +58,12 @@ def main() -> None:
     if given.command == "table":
         print(table(read_rows(given.rows)))
         return
-    done = read_rows(given.rows)
-    new = (key for key in cases(given) if not any(key.items() <= row.items() for row in done))
-    for key in islice(new, given.limit):
+
+    def values_of(key: Row, _work: Path) -> Row:
         machine = Machine(key["robot"], key["gap"], key["seed"])
-        values = (healthy if given.command == "healthy" else faulty)(machine, key)
-        with given.rows.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps({**key, **values})}\n")
-        print(json.dumps({**key, **values}), flush=True)
+        return (healthy if given.command == "healthy" else faulty)(machine, key)
+
+    add_rows(given.rows, cases(given), given.limit, values_of)
 
 
 def cases(given: argparse.Namespace) -> Iterator[Row]:

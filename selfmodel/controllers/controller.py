@@ -19,7 +19,7 @@ import numpy as np
 from selfmodel.arrays import FloatArray, frozen
 from selfmodel.controllers.playback import Playback, PlaybackBatch
 from selfmodel.errors import InputError, check_type, typed
-from selfmodel.rotation import directions
+from selfmodel.rotation import headings
 
 TARGET_RANGE = np.pi / 4
 """Half range of the paper's motor targets about 0, rad."""
@@ -291,6 +291,5 @@ class HeadingHold:
     def scale(self, outputs: FloatArray) -> None:
         """Scales the strides of the next control step, ``(n, motors)``."""
         for orientation in self.observed.values():
-            ahead = directions(orientation)
-            turn = np.arctan2(ahead[:, 1], ahead[:, 0])
+            turn = headings(orientation)
             outputs *= 1 + self._genes * np.clip(turn / MAX_TURN, -1, 1)[:, np.newaxis]

@@ -23,7 +23,7 @@ from selfmodel.physical.interface import ObservedRobot, PhysicalRobot
 from selfmodel.recovery.falls import falls_of, first_lasting, steps_in
 from selfmodel.robot.contacts import penetration_depths
 from selfmodel.robot.robot import Robot
-from selfmodel.rotation import directions
+from selfmodel.rotation import headings
 from selfmodel.simulation.rollout import SimulationResult
 from selfmodel.trials.signals import SIGNALS, Signal
 from selfmodel.trials.trajectory import NotRecordedError, Trajectory, forward_displacement
@@ -156,9 +156,8 @@ def _before_fall(
 
 
 def _straight(robot: Robot, hypothesis: Hypothesis, trajectory: Trajectory) -> FloatArray:
-    ahead = directions(trajectory["base_orientation"])
-    headings = held(np.arctan2(ahead[..., 1], ahead[..., 0]), axis=-1)
-    turns = np.abs(np.unwrap(np.nan_to_num(headings), axis=-1))  # unknown at first: forward
+    known = held(headings(trajectory["base_orientation"]), axis=-1)
+    turns = np.abs(np.unwrap(np.nan_to_num(known), axis=-1))  # unknown at first: forward
     share = np.minimum(_before_fall(turns, robot, hypothesis, trajectory) / np.pi, 1.0)
     distance = _upright(robot, hypothesis, trajectory)
     return np.asarray(distance - share * np.abs(distance))

@@ -19,7 +19,7 @@ from selfmodel.arrays import BoolArray, FloatArray
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.robot.anatomy import Anatomy
 from selfmodel.robot.robot import Robot
-from selfmodel.rotation import directions
+from selfmodel.rotation import directions, headings
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import EXACT_ERROR, Calibration
 from selfmodel.simulation.domain import DomainDistribution, DomainSample, StartSpread, draw_samples
@@ -344,8 +344,7 @@ def _observed(trial: Trial) -> FloatArray:
 
 def _track(position: FloatArray, orientation: FloatArray) -> FloatArray:
     """Returns forward and sideways position, m, and heading, rad, ``(steps, 3)``."""
-    ahead = directions(orientation)
-    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    heading = headings(orientation)
     known = np.isfinite(heading)
     heading[known] = np.unwrap(heading[known])
     return np.column_stack([position[:, :2], heading])
