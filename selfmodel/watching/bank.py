@@ -1,6 +1,6 @@
 """A bank of single faults, whose losses since a change are kept up to date segment by segment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,9 @@ from selfmodel.faults.joints import LOCKED_LEG
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPart
 from selfmodel.watching.finding import Rated
+
+AT_ONCE = 8
+"""Hypotheses that are simulated in one control step, at most."""
 
 
 class Bank:
@@ -50,15 +53,45 @@ class Bank:
         moving = {*LOCKED_LEG.parts(anatomy)} - {fault.part for fault in observed}
         space = replace(space, observed=observed).without(LOCKED_LEG, moving)
         self._left = [INTACT, *space.with_one_more(INTACT)]
+        self._compared: list[TrialPart] = []
+        self._new: list[TrialPart] = []
+        self._work = self._compare()
         self._losses: Mapping[Hypothesis, FloatArray] = {}
 
-    def remaining(self, segments: Sequence[TrialPart]) -> list[Rated]:
-        """Returns the hypotheses that are not significantly worse than the best, best first.
+    @property
+    def segments(self) -> int:
+        """Number of segments by which the hypotheses were compared."""
+        return len(self._compared)
 
-        Of those that differ in severities alone, the best one is returned. ``segments`` are those
-        since the change, all of them: what was simulated before is known.
+    def add(self, segment: TrialPart) -> None:
+        """Adds a segment since the change."""
+        self._new.append(segment)
+
+    def advance(self) -> Sequence[Rated]:
+        """Simulates a few hypotheses, and once all were, returns those that are left, best first.
+
+        What is left is not significantly worse than the best. Of those that differ in severities
+        alone, the best one is returned. A segment in which all simulations diverge says nothing.
         """
-        every = list(dict.fromkeys([*self._left, INTACT]))
+        return next(self._work, ())
+
+    def _compare(self) -> Iterator[Sequence[Rated]]:
+        while True:
+            while not self._new:
+                yield ()
+            every = list(dict.fromkeys([*self._left, INTACT]))
+            new, self._new = self._new, []
+            for part in new:
+                for first in range(0, len(every), AT_ONCE):
+                    yield ()
+                    self._table.losses(every[first : first + AT_ONCE], [part])
+            segments = [*self._compared, *new]
+            if rated := self._rated(every, segments):
+                self._compared = segments
+            yield rated
+
+    def _rated(self, every: Sequence[Hypothesis], segments: Sequence[TrialPart]) -> list[Rated]:
+        """Returns the hypotheses that are left, and forgets the others."""
         losses, by_hinge = (
             self._table.losses(every, segments),
             self._table.by_hinge(every, segments),
@@ -67,6 +100,8 @@ class Bank:
         # The first row is of the comparator, the others are of hinges, (1 + hinges, pieces).
         rows = np.concatenate([losses[:, np.newaxis], at_hinges.swapaxes(1, 2)], axis=1)
         self._losses = dict(zip(every, rows, strict=True))
+        if not np.isfinite(losses.sum(axis=1)).any():
+            return []
         order = sorted(self._left, key=lambda one: float(self._losses[one][0].sum()))
         best = order[0]
         for one in order:

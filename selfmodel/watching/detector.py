@@ -67,4 +67,4 @@ class Detector:
         """Returns the channels with the most evidence since the onset, the clearest first."""
         log_e = np.array(self._recent)[-1 - self.onset().age :].sum(axis=0)
         order = np.argsort(-log_e, kind="stable")[:MAX_SHOWN]
-        return [int(k) for k in order if log_e[k] > 0.5 * log_e.max()]
+        return [int(k) for k in order if log_e[k] > 0]

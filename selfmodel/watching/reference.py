@@ -1,11 +1,11 @@
 """What the healthy trials show: how wrong predictions of a healthy robot are, and of what motions.
 
 The self-model is fitted to the first half of each healthy trial; the scores of the segments of the
-second half are held out. A score of a watched robot becomes an **e-value** by its rank among them:
-with r - 1 of n healthy scores at least as large, it is (n + 1) / (r H), where H is the sum of 1 / k
-up to n + 1. The expected value of a healthy score is 1 if it is exchangeable with those (a
-conformal p-value r / (n + 1), and the calibrator that is proportional to 1 / p), on average over
-healthy trials: given some of them, it may be 1.1 to 1.9, the more the fewer they are.
+second half are held out. The p-value of a score of a watched robot is its rank among them; beyond
+the largest, that of a Pareto tail whose index is Hill's estimate of the largest tenth. Its
+**e-value** is proportional to 1 / p down to ``SMALLEST_P``. The expected value of a healthy score
+is at most 1 if it is exchangeable with those and the tail is right, on average over healthy trials;
+given some of them, it may be larger, the more the fewer they are.
 
 Besides, neighbouring segments depend on each other, and gaits differ in how well they are
 predicted. So a score is first divided by a **margin** of its channel: the smallest with which no
@@ -14,6 +14,10 @@ with all other stretches, the products of 1 to ``DEPENDENT`` neighbouring e-valu
 expected value of at most 1, by a log-normal distribution with the mean and the variance of their
 logarithms, which is lower than theirs. The margin has to absorb all that; no proof says that it
 does.
+
+Sources: Shafer, "Testing by betting", Journal of the Royal Statistical Society A 184 (2021), for
+e-values of p-values; Hill, "A simple general approach to inference about the tail of a
+distribution", Annals of Statistics 3 (1975).
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmodel.arrays import FloatArray, IndexArray
+from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.diagnosis.adequacy import COVERAGE, command_speeds
 from selfmodel.diagnosis.comparator import TrialRefusedError
@@ -42,6 +46,13 @@ STRETCH = 40
 DEPENDENT = 8
 """Segments, at most, whose e-values are multiplied to set a margin: a second."""
 
+SMALLEST_P = 1e-4
+"""Smallest p-value: with it, an alarm needs two segments or more. The delays and the false alarms
+of four robots were about the same from 1e-3 to 1e-5 (docs/results/watching.md)."""
+
+TAIL = 0.1
+"""Share of the healthy scores, the largest, whose tail is continued."""
+
 MARGINS = tuple(float(1.25**power) for power in range(1, 16))
 """Margins that are tried, up to 28; the smallest is that of the speeds of commands."""
 
@@ -54,6 +65,7 @@ class Reference:
         robot: The self-model, fitted.
         channels: Names of the scores.
         scores: Held-out scores of each channel in increasing order, ``(n, channels)``.
+        tails: Index of the Pareto tail of each channel, ``(channels,)``; 0 without one.
         margins: Factor by which a score may be larger than those, ``(channels,)``.
         loss: Median held-out loss of the comparator.
         speeds: Largest speed of each motor's commands, per s, ``(motors,)``.
@@ -64,6 +76,7 @@ class Reference:
     robot: Robot
     channels: tuple[str, ...]
     scores: FloatArray
+    tails: FloatArray
     margins: FloatArray
     loss: float
     speeds: FloatArray
@@ -72,12 +85,9 @@ class Reference:
 
     def log_e_values(self, scores: FloatArray) -> FloatArray:
         """Returns the logarithms of the e-values of a segment; 0 for what was not observed."""
-        counts = [
-            np.searchsorted(column, allowed)
-            for column, allowed in zip(self.scores.T, _allowed(scores, self.margins), strict=True)
-        ]
-        n = len(self.scores)
-        return np.where(np.isnan(scores), 0.0, _log_e_values(n - np.array(counts), n))
+        channels = zip(_allowed(scores, self.margins), self.scores.T, self.tails, strict=True)
+        logs = np.array([_log_e_values(own, healthy, tail) for own, healthy, tail in channels])
+        return np.where(np.isnan(scores), 0.0, logs)
 
     def loss_with(self, hinges: Sequence[int]) -> float:
         """Returns the median held-out loss of the comparator with those of some hinges."""
@@ -149,12 +159,14 @@ def reference_of(
         )
     lowest, highest, speeds = _extent([trial.trajectory for trial in trials])
     names, scores = robot.anatomy.names, np.concatenate(stretches)
+    tails = np.array([_tail_index(column) for column in scores.T])
     first_signal = len(names.hinges) + len(names.sensors)
     return Reference(
         robot=simulator.robot,
         channels=channels,
         scores=np.sort(scores, axis=0),
-        margins=_margins(stretches),
+        tails=tails,
+        margins=_margins(stretches, tails),
         loss=float(np.median(scores[:, first_signal:].sum(axis=1))),
         speeds=speeds,
         lowest=lowest,
@@ -162,20 +174,31 @@ def reference_of(
     )
 
 
-def _margins(stretches: Sequence[FloatArray]) -> FloatArray:
+def _tail_index(scores: FloatArray) -> float:
+    """Returns Hill's estimate of the index of the tail of some scores; 0 without one."""
+    ordered = np.sort(scores)[::-1]
+    count = max(1, round(TAIL * len(ordered)))
+    if not 0.0 < ordered[count] < ordered[0] < np.inf:
+        return 0.0
+    return float(1.0 / np.log(ordered[:count] / ordered[count]).mean())
+
+
+def _margins(stretches: Sequence[FloatArray], tails: FloatArray) -> FloatArray:
     """Returns the margin of each channel; see the module."""
-    columns = [[scores[:, k] for scores in stretches] for k in range(stretches[0].shape[1])]
     return np.array(
-        [next((m for m in MARGINS if _is_enough(m, own)), MARGINS[-1]) for own in columns]
+        [
+            next((m for m in MARGINS if _is_enough(m, tail, own)), MARGINS[-1])
+            for tail, *own in zip(tails, *(scores.T for scores in stretches), strict=True)
+        ]
     )
 
 
-def _is_enough(margin: float, stretches: Sequence[FloatArray]) -> bool:
+def _is_enough(margin: float, tail: float, stretches: Sequence[FloatArray]) -> bool:
     """Returns whether no stretch is evidence against the others."""
     for number, own in enumerate(stretches):
         others = np.sort(np.concatenate([*stretches[:number], *stretches[number + 1 :]]))
-        above = len(others) - np.searchsorted(others, _allowed(own, margin))
-        sums = np.append(0.0, np.cumsum(_log_e_values(above, len(others))))
+        logs_of = _log_e_values(_allowed(own, margin), others, tail)
+        sums = np.append(0.0, np.cumsum(logs_of))
         for length in range(1, min(DEPENDENT, len(own)) + 1):
             logs = sums[length:] - sums[:-length]
             if logs.mean() + logs.var() / 2 > 0.0:
@@ -188,10 +211,14 @@ def _allowed(scores: FloatArray, margin: FloatArray | float) -> FloatArray:
     return np.asarray(np.maximum(scores / margin - LOSS_FLOOR, 0.0))
 
 
-def _log_e_values(above: IndexArray, count: int) -> FloatArray:
-    """Returns the logarithms of e-values, by the number of healthy scores that are as large."""
-    harmonic = float(np.sum(1.0 / np.arange(1, count + 2)))
-    return np.asarray(np.log((count + 1) / ((above + 1) * harmonic)))
+def _log_e_values(scores: FloatArray, healthy: FloatArray, tail: float) -> FloatArray:
+    """Returns the logarithms of the e-values of scores, by healthy ones in increasing order."""
+    above = len(healthy) - np.searchsorted(healthy, scores)
+    p = (above + 1) / (len(healthy) + 1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # scores of 0, and infinite ones
+        beyond = np.where(scores > healthy[-1], scores / healthy[-1], 1.0)
+    p = np.maximum(p * beyond**-tail, SMALLEST_P)
+    return np.asarray(-np.log(p) - np.log(1.0 - np.log(SMALLEST_P)))
 
 
 def _extent(trajectories: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -83,8 +83,8 @@ def scores_of(
     """Returns how wrong the prediction of the last segment of a trial is, and the names of scores.
 
     The scores, ``(channels,)``, are at least 0: the loss of each hinge, the mean absolute error of
-    each sensor, and the loss of each signal; NaN for what was not observed, infinite if the
-    simulation diverged.
+    each sensor, of contacts the odds of an error, and the loss of each signal; NaN for what was not
+    observed, infinite if the simulation diverged.
 
     Raises:
         TrialRefusedError: The segment lacks a signal, or has a late step.
@@ -96,6 +96,9 @@ def scores_of(
     hinges = cast("FloatArray", losses.by_hinge)[0, -1]
     logged = trial.trajectory["sensors"][-comparator.horizon :]
     errors = np.abs(result.trajectory["sensors"][0, -1, 1:] - logged).mean(axis=0)
+    touch = np.array([sensor.kind == "touch" for sensor in simulator.robot.anatomy.sensors])
+    least = 0.5 / comparator.horizon  # an error of all steps is finite
+    errors = np.where(touch, (errors + least) / (1.0 - errors + least), errors)
     by_signal = {name: loss for name, loss in losses.by_signal.items() if name != _COMMANDS}
     signals = [float(loss[0, -1]) for loss in by_signal.values()]
     names = trial.trajectory.names

@@ -1,12 +1,12 @@
 """Watch: whether a robot is as it was in its healthy trials, and if not, since when and why."""
 
 import dataclasses
-import math
 from collections import deque
 from collections.abc import Sequence
 
 from selfmodel import arguments
 from selfmodel.arguments import KindSource, RobotSource, TrialSource
+from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import (
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
@@ -117,14 +117,22 @@ class Watch:
     def update(self, step: Sample) -> tuple[Finding, ...]:
         """Adds a step, and returns what is new: most steps have no finding.
 
+        After an alarm, each call simulates a few of the causes.
+
         Args:
             step: State, readings and commands of the next control step, NaN where not observed, as
                 ``PhysicalRobot.run`` yields them.
         """
         newest = self._window.add(step)
-        if newest is None or self._status in ENDS:
+        if self._status in ENDS:
             return ()
-        return tuple(self._seek(newest) if self._status == "changed" else self._judge(newest))
+        if self._status != "changed":
+            return () if newest is None else tuple(self._judge(newest))
+        if newest is not None:
+            self._add(newest)
+        if self._bank is None or not (remaining := self._bank.advance()):
+            return ()
+        return tuple(self._compared(remaining, self._bank))
 
     def restart(self) -> None:
         """Begins anew with the next step, at time 0: of another log, or of a repaired robot."""
@@ -135,10 +143,11 @@ class Watch:
 
     def _forget(self) -> None:
         self._detector = Detector(self._run_length)
-        self._recent: deque[tuple[float, TrialPart]] = deque(maxlen=MAX_PIECES)
+        self._recent: deque[TrialPart] = deque(maxlen=MAX_PIECES)
         self._ends: deque[float] = deque(maxlen=MEMORY + 1)
         self._change = Finding(0.0, "watching")
         self._bank: Bank | None = None
+        self._since = 0
         self._named: tuple[object, ...] = ()
 
     def _judge(self, newest: Trial) -> list[Finding]:
@@ -153,55 +162,60 @@ class Watch:
         if self._pause:
             self._detector = Detector(self._run_length)  # what came before may be another motion
             return self._said("not judged", reason)
-        self._recent.append((self._time, self._part(newest)))
+        if not self._has_alarm(newest, scores):
+            return self._said("watching")
+        self._status = "changed"
+        return [self._change]
+
+    def _has_alarm(self, newest: Trial, scores: FloatArray) -> bool:
+        """Adds a segment to the test, and dates the change if there is an alarm."""
+        self._recent.append(self._part(newest))
         self._ends.append(self._time)
         if not self._detector.update(self._reference.log_e_values(scores)):
-            return self._said("watching")
-        onset, shown_by = self._detector.onset(), self._detector.shown_by()
-        ends = [*self._ends]
-        age, oldest, newest_age = (min(one, len(ends) - 1) for one in onset)
-        length = self._step * self._horizon
+            return False
+        ends, length = [*self._ends], self._step * self._horizon
+        age, oldest, latest = (min(one, len(ends) - 1) for one in self._detector.onset())
         # The change may not have shown at first, or while the robot was not judged.
         before = ends[: len(ends) - 1 - oldest]
-        self._status = "changed"
         self._change = Finding(
             self._time,
             "changed",
             onset=round(ends[-1 - age] - length, 6),
             earliest=round(before[-1] - length, 6) if before else 0.0,
-            latest=ends[-1 - newest_age],
-            shown_by=tuple(self._reference.channels[k] for k in shown_by),
+            latest=ends[-1 - latest],
+            shown_by=tuple(self._reference.channels[k] for k in self._detector.shown_by()),
         )
         # The first segment that shows it may be one in which it began.
-        self._recent = deque(list(self._recent)[-age:] if age else [], MAX_PIECES)
-        return [self._change, *self._compared()]
+        self._since = max(self._since, age)
+        return True
 
-    def _seek(self, newest: Trial) -> list[Finding]:
-        """Returns the findings of a segment after a change."""
+    def _add(self, newest: Trial) -> None:
+        """Adds a segment after a change; the first ones also date it anew."""
         try:
-            last_segment(self.robot, self._comparator, newest)
+            if self._bank is not None:
+                last_segment(self.robot, self._comparator, newest)
+                self._bank.add(self._part(newest))
+                return
+            scores, _ = scores_of(self._simulator, self._comparator, newest)
         except TrialRefusedError:
-            return []
-        self._recent.append((self._time, self._part(newest)))
-        return self._compared()
-
-    def _compared(self) -> list[Finding]:
-        """Returns what the segments since the change say about its cause."""
-        segments = [part for _, part in self._recent]
-        if len(segments) < FIRST_PIECES:
-            return []
-        if self._bank is None:
+            return
+        self._since += 1
+        self._has_alarm(newest, scores)
+        if self._since >= FIRST_PIECES:
+            segments = [*self._recent][-self._since :]
             since = self._window.trial(len(segments) * self._horizon + 1)
             channels, hinges = self._reference.channels, self.robot.anatomy.hinges
             shown = [channels.index(name) for name in self._change.shown_by if name in hinges]
-            self._bank = Bank(self._simulator, self._comparator, self._space, since, shown)
-        remaining = self._bank.remaining(segments)
-        if not math.isfinite(remaining[0].loss):
-            self._recent.pop()  # every hypothesis diverged: the segment says nothing
-            return []
-        is_last = len(segments) >= MAX_PIECES
-        if len(segments) >= MIN_PIECES and (len(remaining) == 1 or is_last):
-            return self._ended(remaining, self._bank)
+            bank = Bank(self._simulator, self._comparator, self._space, since, shown)
+            for one in segments:
+                bank.add(one)
+            self._bank = bank
+
+    def _compared(self, remaining: Sequence[Rated], bank: Bank) -> list[Finding]:
+        """Returns what is new about the cause, by the hypotheses that are left."""
+        is_last = bank.segments >= MAX_PIECES
+        if bank.segments >= MIN_PIECES and (len(remaining) == 1 or is_last):
+            return self._ended(remaining, bank)
         named = tuple(rated.hypothesis.without_severities for rated in remaining)
         if len(named) > FEW or set(named) == set(self._named):
             return []

@@ -7,7 +7,7 @@ import pytest
 
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trial import Trial
-from selfmodel.watching.reference import MARGINS, Reference, _margins
+from selfmodel.watching.reference import MARGINS, SMALLEST_P, Reference, _margins, _tail_index
 
 
 def reference_of(
@@ -16,38 +16,64 @@ def reference_of(
     motors = len(robot.anatomy.motors)
     extent = {name: np.full(motors, value) for name, value in motion.items()}
     channels = tuple(f"channel {k}" for k in range(scores.shape[1]))
-    return Reference(robot, channels, np.sort(scores, axis=0), margins, 0.1, **extent)
+    tails = np.array([_tail_index(column) for column in scores.T])
+    return Reference(robot, channels, np.sort(scores, axis=0), tails, margins, 0.1, **extent)
 
 
 MOTION = {"speeds": 2.0, "lowest": -0.5, "highest": 0.5}
 
 
-def test_the_e_values_of_scores_at_each_rank_have_a_mean_of_one(quadruped: Robot):
-    scores = np.arange(1.0, 51.0)[:, np.newaxis]
-    reference = reference_of(quadruped, scores, np.ones(1), **MOTION)
-    at_each_rank = np.arange(0.6, 51.0)  # between two healthy scores, less what is allowed beyond
+LARGEST = -np.log(SMALLEST_P) - np.log(1.0 - np.log(SMALLEST_P))
+"""Logarithm of the largest e-value."""
 
-    e_values = np.exp([reference.log_e_values(np.array([score]))[0] for score in at_each_rank])
 
-    assert np.mean(e_values) == pytest.approx(1.0)
-    assert (np.diff(e_values) > 0).all()
+@pytest.mark.parametrize("index", [1.0, 3.0, 9.0])
+def test_the_e_values_of_healthy_scores_with_a_tail_have_a_mean_of_at_most_one(
+    quadruped: Robot, index: float
+):
+    rng = np.random.default_rng(4)
+    means = []
+    for _ in range(20):  # on average over healthy trials
+        reference = reference_of(quadruped, rng.pareto(index, (300, 1)) + 1, np.ones(1), **MOTION)
+        scores = rng.pareto(index, 4000) + 1
+        means.append(np.mean([np.exp(reference.log_e_values(one[None]))[0] for one in scores]))
+
+    assert 0.7 < np.mean(means) < 1.05
+
+
+def test_larger_scores_are_more_evidence_also_beyond_those_of_the_healthy_trials(quadruped: Robot):
+    reference = reference_of(quadruped, np.arange(1.0, 51.0)[:, None], np.ones(1), **MOTION)
+    logs = [reference.log_e_values(np.array([score]))[0] for score in np.arange(0.6, 70.0)]
+
+    assert (np.diff(logs) > 0).all()
+    assert logs[-1] < LARGEST
 
 
 def test_what_is_not_observed_is_no_evidence_and_a_diverged_simulation_is_the_most(
     quadruped: Robot,
 ):
-    reference = reference_of(quadruped, np.ones((80, 2)), np.ones(2), **MOTION)
+    scores = np.linspace(1.0, 2.0, 80)[:, np.newaxis] * [1.0, 1.0]
+    reference = reference_of(quadruped, scores, np.ones(2), **MOTION)
     unknown, diverged = reference.log_e_values(np.array([np.nan, np.inf]))
 
     assert unknown == 0.0
-    assert diverged == pytest.approx(np.log(81 / np.sum(1 / np.arange(1, 82))))
+    assert diverged == pytest.approx(LARGEST)
+
+
+def test_scores_that_are_infinite_in_the_healthy_trials_are_evidence_by_their_rank(
+    quadruped: Robot,
+):
+    scores = np.append(np.linspace(1.0, 2.0, 78), [np.inf, np.inf])[:, np.newaxis]
+    (log,) = reference_of(quadruped, scores, np.ones(1), **MOTION).log_e_values(np.array([np.inf]))
+
+    assert log == pytest.approx(np.log(81 / 3) - np.log(1.0 - np.log(SMALLEST_P)))
 
 
 def test_a_channel_whose_stretches_differ_has_a_larger_margin_than_one_of_independent_scores():
     rng = np.random.default_rng(2)
     levels = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 3.0])
     stretches = [np.exp(0.1 * rng.normal(size=(40, 2))) * [1.0, level] for level in levels]
-    independent, differing = _margins(stretches)
+    independent, differing = _margins(stretches, np.full(2, 3.0))
 
     assert independent == MARGINS[0]
     assert differing > 2.0

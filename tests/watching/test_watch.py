@@ -47,7 +47,7 @@ def test_a_fault_is_noticed_dated_and_named(
     assert (first.status, alarm.status, last.status) == ("watching", "changed", "explained")
     assert onset < alarm.time <= onset + 2.0
     assert alarm.earliest <= onset <= alarm.latest
-    assert any(joint in name for name in alarm.shown_by)
+    assert any(joint in name for name in last.shown_by)
     assert str(last.remaining[0].hypothesis).startswith(fault.partition("=")[0])
     assert json.loads(json.dumps(last.to_dict()))["remaining"][0]["hypothesis"].startswith(
         fault[:3]
