@@ -183,11 +183,14 @@ class Watch:
             onset=round(ends[-1 - age] - length, 6),
             earliest=round(before[-1] - length, 6) if before else 0.0,
             latest=ends[-1 - latest],
-            shown_by=tuple(self._reference.channels[k] for k in self._detector.shown_by()),
+            shown_by=self._shown_by(),
         )
         # The first segment that shows it may be one in which it began.
         self._since = max(self._since, age)
         return True
+
+    def _shown_by(self) -> tuple[str, ...]:
+        return tuple(self._reference.channels[k] for k in self._detector.shown_by())
 
     def _add(self, newest: Trial) -> None:
         """Adds a segment after a change; the first ones also date it anew."""
@@ -204,8 +207,9 @@ class Watch:
         if self._since >= FIRST_PIECES:
             segments = [*self._recent][-self._since :]
             since = self._window.trial(len(segments) * self._horizon + 1)
-            channels, hinges = self._reference.channels, self.robot.anatomy.hinges
-            shown = [channels.index(name) for name in self._change.shown_by if name in hinges]
+            self._change = dataclasses.replace(self._change, shown_by=self._shown_by())
+            hinges = self.robot.anatomy.hinges
+            shown = [hinges.index(name) for name in self._change.shown_by if name in hinges]
             bank = Bank(self._simulator, self._comparator, self._space, since, shown)
             for one in segments:
                 bank.add(one)
