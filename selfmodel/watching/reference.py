@@ -1,11 +1,11 @@
 """What the healthy trials show: how wrong predictions of a healthy robot are, and of what motions.
 
-The self-model is fitted to the first half of each healthy trial; the scores of the segments of the
-second half are held out. The p-value of a score of a watched robot is its rank among them; beyond
-the largest, that of a Pareto tail whose index is Hill's estimate of the largest tenth. Its
-**e-value** is proportional to 1 / p down to ``SMALLEST_P``. The expected value of a healthy score
-is at most 1 if it is exchangeable with those and the tail is right, on average over healthy trials;
-given some of them, it may be larger, the more the fewer they are.
+The scores of the segments of each half of the healthy trials are **held out**: the self-model that
+predicts them is fitted to the other halves. The p-value of a score of a watched robot is its rank
+among them; beyond the largest, that of a Pareto tail whose index is Hill's estimate of the largest
+tenth. Its **e-value** is proportional to 1 / p down to ``SMALLEST_P``. The expected value of a
+healthy score is at most 1 if it is exchangeable with those and the tail is right, on average over
+healthy trials; given some of them, it may be larger, the more the fewer they are.
 
 Besides, neighbouring segments depend on each other, and gaits differ in how well they are
 predicted. So a score is first divided by a **margin** of its channel: the smallest with which no
@@ -21,12 +21,13 @@ distribution", Annals of Statistics 3 (1975).
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
-from selfmodel.comparators.segment_prediction import SegmentPrediction
+from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPrediction
 from selfmodel.diagnosis.adequacy import COVERAGE, command_speeds
 from selfmodel.diagnosis.comparator import TrialRefusedError
 from selfmodel.diagnosis.significance import LOSS_FLOOR
@@ -37,8 +38,8 @@ from selfmodel.trials.trajectory import Trajectory, samples_of
 from selfmodel.trials.trial import Trial
 from selfmodel.watching.segments import Window, scores_of
 
-MIN_HELD_OUT = 80
-"""Held-out segments, at least: with fewer, no single segment is much evidence."""
+MIN_HELD_OUT = 50
+"""Held-out segments, at least: the largest tenth is their tail."""
 
 STRETCH = 40
 """Segments of a stretch that is compared with the others: 5 s at 100 Hz, as long as a gait."""
@@ -129,49 +130,52 @@ def reference_of(
     Raises:
         InputError: The trials are too short.
     """
-    first = [trial.trajectory.steps // 2 for trial in trials]
-    parts = [
-        replace(trial, trajectory=trial.trajectory.first(steps))
-        for trial, steps in zip(trials, first, strict=True)
-    ]
-    simulator = Simulator(fitted(parts), threads=1)
+    halves = [_halves(trial) for trial in trials]
     stretches, channels = list[FloatArray](), tuple[str, ...]()
-    for trial, begin in zip(trials, first, strict=True):
-        window, held_out = Window(robot, comparator.horizon), list[FloatArray]()
-        for sample in samples_of(trial.trajectory):
-            newest = window.add(sample)
-            if newest is None or window.steps - comparator.horizon <= begin:
-                continue
-            try:
-                scores, channels = scores_of(simulator, comparator, newest)
-            except TrialRefusedError:
-                continue
-            # A healthy robot may lack a value at times, and its watch says nothing then.
-            held_out.append(np.where(np.isnan(scores), np.inf, scores))
-        if held_out:
-            count = max(1, round(len(held_out) / STRETCH))
-            stretches += np.array_split(np.array(held_out), count)
+    for held_out, others in ((0, 1), (1, 0)):
+        simulator = Simulator(fitted([each[others] for each in halves]), threads=1)
+        for half in (each[held_out] for each in halves):
+            window, scores = Window(robot, comparator.horizon), list[FloatArray]()
+            for newest in filter(None, map(window.add, samples_of(half.trajectory))):
+                with suppress(TrialRefusedError):
+                    own, channels = scores_of(simulator, comparator, newest)
+                    # A healthy robot may lack a value at times; its watch says nothing then.
+                    scores.append(np.where(np.isnan(own), np.inf, own))
+            if scores:
+                count = max(1, round(len(scores) / STRETCH))
+                stretches += np.array_split(np.array(scores), count)
     if (count := sum(map(len, stretches))) < MIN_HELD_OUT:
-        seconds = 2 * MIN_HELD_OUT * comparator.horizon * robot.control_timestep
+        needed = MIN_HELD_OUT + 2 * len(trials) * MIN_SEGMENTS
+        seconds = needed * comparator.horizon * robot.control_timestep
         raise InputError(
-            f"expected healthy trials of {seconds:.0f} s or more together, of which the second "
-            f"halves have {MIN_HELD_OUT} segments without late steps, got {count}: record more"
+            f"expected healthy trials of {seconds:.0f} s or more together, with "
+            f"{MIN_HELD_OUT} segments without late steps, got {count}: record more"
         )
     lowest, highest, speeds = _extent([trial.trajectory for trial in trials])
-    names, scores = robot.anatomy.names, np.concatenate(stretches)
-    tails = np.array([_tail_index(column) for column in scores.T])
+    names, every = robot.anatomy.names, np.concatenate(stretches)
+    tails = np.array([_tail_index(column) for column in every.T])
     first_signal = len(names.hinges) + len(names.sensors)
     return Reference(
-        robot=simulator.robot,
+        robot=fitted(trials),
         channels=channels,
-        scores=np.sort(scores, axis=0),
+        scores=np.sort(every, axis=0),
         tails=tails,
         margins=_margins(stretches, tails),
-        loss=float(np.median(scores[:, first_signal:].sum(axis=1))),
+        loss=float(np.median(every[:, first_signal:].sum(axis=1))),
         speeds=speeds,
         lowest=lowest,
         highest=highest,
     )
+
+
+def _halves(trial: Trial) -> list[Trial]:
+    rows, middle = trial.trajectory, trial.trajectory.steps // 2
+    second = rows.rows(slice(middle, None))
+    second = replace(second, time=second.time - second.time[0])
+    return [
+        replace(trial, trajectory=half, path=f"{trial.path}, {name} half")
+        for name, half in (("first", rows.first(middle)), ("second", second))
+    ]
 
 
 def _tail_index(scores: FloatArray) -> float:

@@ -8,6 +8,7 @@ from selfmodel import arguments
 from selfmodel.arguments import KindSource, RobotSource, TrialSource
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import (
+    COMPARISONS,
     SEGMENT_PREDICTION,
     SEGMENT_PREDICTION_ONBOARD,
 )
@@ -28,6 +29,9 @@ from selfmodel.watching.detector import MEMORY, Detector
 from selfmodel.watching.finding import ENDS, Finding, Rated, Status
 from selfmodel.watching.reference import reference_of
 from selfmodel.watching.segments import Window, last_segment, scores_of
+
+SEGMENT = 0.12
+"""Length of a segment, s, at any control time step."""
 
 FIRST_PIECES, MAX_PIECES = 4, 40
 """Segments since a change from which on causes are compared, and after which those that are left
@@ -97,7 +101,9 @@ class Watch:
         arguments.check_trials(robot, *trials)
         able = {one.name: one for one in (SEGMENT_PREDICTION, SEGMENT_PREDICTION_ONBOARD)}
         chosen = able[chosen_comparator([*able.values()], robot, trials).comparator.name]
-        self._comparator = dataclasses.replace(chosen, only_last=True)
+        self._step = robot.control_timestep
+        self._horizon = max(COMPARISONS, round(SEGMENT / self._step))
+        self._comparator = dataclasses.replace(chosen, horizon=self._horizon, only_last=True)
 
         def fitted(parts: Sequence[Trial]) -> Robot:
             return arguments.fitted(robot, parts, count).robot if calibrate else robot
@@ -105,7 +111,6 @@ class Watch:
         self._reference = reference_of(robot, trials, self._comparator, fitted)
         self._space = HypothesisSpace.of(arguments.kinds_of(kinds), robot.anatomy)
         self._simulator = Simulator(self._reference.robot, count)
-        self._step, self._horizon = robot.control_timestep, chosen.horizon
         self._run_length = every / (self._step * self._horizon)
         self.restart()
 

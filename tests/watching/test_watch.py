@@ -110,5 +110,5 @@ def test_a_robot_without_odometry_is_watched_by_its_onboard_sensors(
 
 
 def test_healthy_trials_that_are_too_short_are_refused(quadruped: Robot, healthy: list[Sample]):
-    with pytest.raises(InputError, match=r"healthy trials of 19 s or more together.*record more"):
+    with pytest.raises(InputError, match=r"healthy trials of 7 s or more together.*record more"):
         Watch(quadruped, trial_of(quadruped, healthy[:600]), calibrate=False)
