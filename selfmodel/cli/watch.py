@@ -81,7 +81,7 @@ def _watched(
             is_stale = last is None or last.status not in ENDS
             found = [Finding(now, "stale", f"no step for {silence:g} s")] if is_stale else []
         else:
-            found, now = watched.update(step), step.time
+            found, now = watched.update(step), round(step.time, 6)
             if is_stale and last is not None:
                 found = [replace(last, time=now), *found]
             last, is_stale = found[-1] if found else last, False
