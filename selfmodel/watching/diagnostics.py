@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 
 from selfmodel.faults.hypothesis import Hypothesis
@@ -52,7 +52,7 @@ class PartStatus:
     name: str
     message: str
     hardware_id: str
-    values: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, str]
 
 
 def part_statuses(robot: Robot, finding: Finding) -> tuple[PartStatus, ...]:
@@ -81,13 +81,10 @@ def part_statuses(robot: Robot, finding: Finding) -> tuple[PartStatus, ...]:
         values = _values(finding, cause) if level else {}
         return PartStatus(level, f"selfmodel: {name}", message, robot.name, values)
 
-    best = next(iter(finding.remaining), None)
-    whole = _values(finding, best)
-    return (
-        PartStatus(of_robot, f"selfmodel: {robot.name}", finding.words, robot.name, whole),
-        # Of an imported model, a sensor may have the name of the hinge that it measures.
-        *(of(name) for name in dict.fromkeys((*names.hinges, *names.sensors))),
-    )
+    values = _values(finding, next(iter(finding.remaining), None))
+    whole = PartStatus(of_robot, f"selfmodel: {robot.name}", finding.words, robot.name, values)
+    # Of an imported model, a sensor may have the name of the hinge that it measures.
+    return whole, *(of(name) for name in dict.fromkeys((*names.hinges, *names.sensors)))
 
 
 def _causes(anatomy: Anatomy, finding: Finding) -> dict[str, Rated]:
