@@ -40,7 +40,7 @@ class PartStatus:
 
     Attributes:
         level: Level.
-        name: ``selfmodel: `` and the name of the part.
+        name: ``selfmodel:`` and the name of the part, a space between them.
         message: What is known of it, in plain words.
         hardware_id: Name of the robot.
         values: ``onset``, ``earliest`` and ``latest`` of the change, s; ``hypothesis`` and ``loss``
