@@ -13,6 +13,7 @@ from mcap.writer import Writer
 import selfmodel
 from selfmodel.arguments import read_logs, robot_of_logs
 from selfmodel.cli import watch
+from selfmodel.errors import InputError
 from selfmodel.logs import IncompleteError
 from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter, write_trial
@@ -176,6 +177,9 @@ def test_a_folder_gets_the_findings_and_some_seconds_after_the_end_in_a_black_bo
     assert f"black-box.mcap: {box.trial.trajectory.steps} steps from t = 0.00 s on" in done.stderr
     assert box.trial.trajectory.time[-1] == pytest.approx(last["time"] + AFTER)
     assert robot_of_logs([healthy, box], None).anatomy == quadruped.anatomy
+    other = replace(box, mjcf=box.mjcf.replace('kp="60"', 'kp="61"'))
+    with pytest.raises(InputError, match="of different models of the same name"):
+        robot_of_logs([healthy, other], None)
 
 
 @pytest.mark.usefixtures("clock")
