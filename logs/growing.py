@@ -41,6 +41,7 @@ class GrowingLog:
         path: The file that is read.
         has_ended: Whether the log is finished, and read to its end.
         steps: Number of steps that were read.
+        start: Time stamp of the first step, ns.
 
     Raises:
         InputError: There is no such file; or, of ``new_steps``, the log is of another robot.
@@ -52,7 +53,7 @@ class GrowingLog:
         if not self.path.is_file():
             raise InputError(f"{path}: expected a trial log, finished or being written")
         self.has_ended = False
-        self._names, self.steps = names, 0
+        self._names, self.steps, self.start = names, 0, 0
         self._contents = Contents(self.path)
         self._gatherer = Gatherer(self._contents, (records.HIDDEN,))
         self._topics: tuple[Topic, ...] = ()
@@ -105,6 +106,7 @@ class GrowingLog:
         if names != self._names:
             difference = describe_difference(self._names, names)
             raise InputError(f"{self.path} is of another robot than the healthy logs: {difference}")
+        self.start = reader.first_stamp(self._contents)
         self._period, timed = record.control_timestep, record.format == records.TIMED_FORMAT
         driven = reader.names_on(self._contents, COMMANDS)
         return topics(names, record.root, timed=timed, driven=driven)

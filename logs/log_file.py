@@ -104,10 +104,11 @@ class LogFile:
         with self._writing():
             sync(self._file)
 
-    def finish(self, result: records.ResultRecord) -> None:
-        """Writes the result and the end of the file, and renames the ``.part``."""
+    def finish(self, result: records.ResultRecord | None = None) -> None:
+        """Writes the result of a trial and the end of the file, and renames the ``.part``."""
         self.flush()
-        self.metadata(records.RESULT, records.texts_of(result))
+        if result is not None:
+            self.metadata(records.RESULT, records.texts_of(result))
         with self._writing():
             self._mcap.finish()
             sync(self._file)

@@ -22,6 +22,14 @@ _FIELDS = {
     "builtin_interfaces/Time": "int32 sec, uint32 nanosec",
     "std_msgs/Header": "builtin_interfaces/Time stamp, string frame_id",
     "std_msgs/String": "string data",
+    "diagnostic_msgs/DiagnosticArray": (
+        "std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status"
+    ),
+    "diagnostic_msgs/DiagnosticStatus": (
+        "byte OK=0, byte WARN=1, byte ERROR=2, byte STALE=3, byte level, "
+        "string name, string message, string hardware_id, diagnostic_msgs/KeyValue[] values"
+    ),
+    "diagnostic_msgs/KeyValue": "string key, string value",
     "geometry_msgs/Point": "float64 x, float64 y, float64 z",
     "geometry_msgs/Vector3": "float64 x, float64 y, float64 z",
     "geometry_msgs/Quaternion": "float64 x, float64 y, float64 z, float64 w",
@@ -63,7 +71,7 @@ _BILLION = 1_000_000_000
 
 
 def is_known(kind: str) -> bool:
-    """Returns whether a message type is one of those in a trial log."""
+    """Returns whether a message type is one of those that selfmodel writes."""
     return kind.replace("/msg/", "/") in DEFINITIONS
 
 
@@ -76,12 +84,18 @@ def schema_text(kind: str) -> str:
 
 def _nested(short: str) -> list[str]:
     """Nested types of a message type, depth first, without duplicates."""
-    types = [line.split(" ")[0].partition("[")[0] for line in DEFINITIONS[short].splitlines()]
+    types = [field.partition("[")[0] for field, _ in _fields_of(short)]
     return list(
         dict.fromkeys(
             part for kind in types if kind in DEFINITIONS for part in (kind, *_nested(kind))
         )
     )
+
+
+def _fields_of(short: str) -> list[tuple[str, str]]:
+    """Types and names of the fields of a message type; a constant is none."""
+    lines = [line.split(" ") for line in DEFINITIONS[short].splitlines()]
+    return [(field, name) for field, name in lines if "=" not in name]
 
 
 # ---------------------------------------------------------------- layout in bytes
@@ -92,8 +106,8 @@ class Template:
 
     Args:
         kind: Message type, such as ``sensor_msgs/msg/JointState``.
-        content: Texts, lists of texts and of messages, and lengths of sequences of numbers, by
-            field; a text is empty and a sequence has no numbers unless given. Arrays of fixed
+        content: Texts, bytes, lists of texts and of messages, and lengths of sequences of numbers,
+            by field; a text is empty and a sequence has no numbers unless given. Arrays of fixed
             length, which are covariances, are zeros after the first number; all other numbers are
             gaps.
 
@@ -116,6 +130,8 @@ class Template:
                 data = (value or "").encode() + b"\x00"
                 self._length(len(data))
                 self._bytes += data
+            case "byte":
+                self._bytes.append(value)
             case "float64":
                 self._gap(1)
             case "float64[]":
@@ -129,8 +145,7 @@ class Template:
                 for item in value:
                     self._add(kind.removesuffix("[]"), item)
             case _:
-                for line in DEFINITIONS[kind].splitlines():
-                    field, name = line.split(" ")
+                for field, name in _fields_of(kind):
                     self._add(field, (value or {}).get(name))
 
     def _reserve(self, alignment: int, size: int) -> int:

@@ -1,6 +1,7 @@
 """Robot of a log, built from the untrusted model in the log."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from selfmodel.errors import InputError, WorkError
 from selfmodel.logs.errors import GOOD, SchemaMismatchError
@@ -87,6 +88,8 @@ def common_robot(logs: Sequence[TrialLog]) -> Robot:
 
 
 def _identity(log: TrialLog) -> tuple[object, ...]:
-    trial = log.trial
-    names = trial.trajectory.names
-    return trial.robot, log.mjcf, dict(log.assets), log.control_timestep, names
+    """What logs of one robot have in common; a log of a robot of a log has no comments of MJCF."""
+    trial, model = log.trial, (log.mjcf, dict(log.assets))
+    with suppress(InputError):  # which ``robot_of`` explains
+        model = checked_model(*model)
+    return trial.robot, model, log.control_timestep, trial.trajectory.names

@@ -204,12 +204,14 @@ class WatchLog(Command):
     """Watch a robot through its trial log: alarms, since when, and which single fault explains it.
 
     With --follow, the log may be one that is being written. Findings are JSON lines unless standard
-    output is a terminal.
+    output is a terminal; with --out, they are diagnostics of ROS 2 too, and the steps around the
+    change are a trial log.
     """
 
     file: Path
     healthy: list[Path]
     follow: bool = False
+    out: Path | None = None
     kinds: str = "default"
     false_alarm_every: float = 3600.0
     calibrate: bool = True

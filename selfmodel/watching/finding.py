@@ -5,10 +5,13 @@ from typing import Any, Literal
 
 from selfmodel.faults.hypothesis import Hypothesis
 
-Status = Literal["watching", "not judged", "changed", "explained", "ambiguous", "unexplained"]
+Status = Literal[
+    "watching", "not judged", "stale", "changed", "explained", "ambiguous", "unexplained"
+]
 """``watching``: the robot is as it was in the healthy trials. ``not judged``: they do not cover
-what it does. ``changed``: an alarm, whose cause is sought. The others end a watch: one fault is
-left, several are, or none explains what is seen."""
+what it does. ``stale``: no step comes, as who waits for the steps says. ``changed``: an alarm,
+whose cause is sought. The others end a watch: one fault is left, several are, or none explains what
+is seen."""
 
 
 ENDS: tuple[Status, ...] = ("explained", "ambiguous", "unexplained")
@@ -30,7 +33,7 @@ class Finding:
     Attributes:
         time: Time of the newest step, s since the first.
         status: See ``Status``.
-        reason: Clause, of ``not judged`` and ``unexplained``; else "".
+        reason: Clause, of ``not judged``, ``stale`` and ``unexplained``; else "".
         onset: Time of the change, s; None without one.
         earliest: Lower bound of the onset, s; with ``latest``, it has 95 % of the evidence.
         latest: Upper bound of the onset, s.
@@ -52,7 +55,9 @@ class Finding:
         remaining = [{"hypothesis": str(r.hypothesis), "loss": r.loss} for r in self.remaining]
         return {**vars(self), "shown_by": list(self.shown_by), "remaining": remaining}
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """The finding in plain words, without its time."""
         clauses = [self.reason] if self.reason else []
         if self.onset is not None:
             since = f"since t = {self.onset:.2f} s ({self.earliest:.2f} to {self.latest:.2f})"
@@ -61,5 +66,7 @@ class Finding:
             clauses.append("; ".join(rated.hypothesis.words for rated in self.remaining))
         elif self.shown_by:
             clauses.append(f"shown by {', '.join(self.shown_by)}")
-        said = f"{self.time:8.2f} s  {self.status}"
-        return f"{said}: {', '.join(clauses)}" if clauses else said
+        return f"{self.status}: {', '.join(clauses)}" if clauses else self.status
+
+    def __str__(self) -> str:
+        return f"{self.time:8.2f} s  {self.words}"

@@ -9,8 +9,8 @@ import pytest
 from selfmodel.errors import InputError
 from selfmodel.logs import CorruptError, NotMcapError
 from selfmodel.logs.growing import GrowingLog
-from selfmodel.logs.records import TrialHeader
-from selfmodel.logs.writer import FLUSH_STEPS, TrialWriter
+from selfmodel.logs.records import Imported, TrialHeader
+from selfmodel.logs.writer import FLUSH_STEPS, TrialWriter, write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
 from selfmodel.trials.signals import SIGNALS, Names
@@ -46,6 +46,18 @@ def test_each_step_is_read_once_as_soon_as_it_is_written(
 
         assert growing.has_ended
     assert_equal(read, steps)
+
+
+@pytest.mark.parametrize("start", [0, 1_700_000_000_123_456_789])
+def test_the_time_stamp_of_the_first_step_is_that_of_the_recording(
+    tmp_path: Path, biped: Robot, start: int
+):
+    imported = Imported({"start": str(start)}, "") if start else None
+    header, steps = TrialHeader(Settings(), imported=imported), made_up(biped, STEPS)
+    path = write_trial(tmp_path / "a.mcap", biped, plan_of(biped, STEPS), steps, header)
+    with GrowingLog(path, biped.anatomy.names) as growing:
+        growing.new_steps()
+        assert growing.start == start
 
 
 def test_a_log_that_is_cut_anywhere_grows_to_the_same_steps(
