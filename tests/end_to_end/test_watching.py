@@ -7,8 +7,7 @@ import pytest
 
 from benchmarks.foreign.cases import Fault
 from benchmarks.foreign.scoring import read_rows
-from benchmarks.watching.__main__ import FAULTS, drawn
-from benchmarks.watching.streams import Machine
+from benchmarks.watching.streams import FAULTS, Machine, drawn
 from benchmarks.watching.tables import table
 
 ROWS = Path(__file__).parents[2] / "docs" / "results" / "data" / "watching.jsonl"
