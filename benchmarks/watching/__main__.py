@@ -12,9 +12,10 @@ from pathlib import Path
 import selfmodel
 from benchmarks.foreign.model import LEVELS
 from benchmarks.foreign.scoring import add_rows, read_rows
-from benchmarks.watching.rivals import METHODS, compared
+from benchmarks.watching.monitors import METHODS
+from benchmarks.watching.rivals import compared
 from benchmarks.watching.streams import AFTER, FAULTS, Machine, watch_of
-from benchmarks.watching.tables import rivals_table, table
+from benchmarks.watching.tables import table
 from selfmodel.studies.study import Row
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.watching import Finding
@@ -36,23 +37,19 @@ def main() -> None:
     commands.choices["faults"].add_argument("--cases", nargs="+", default=[*FAULTS])
     commands.choices["faults"].add_argument("--draws", type=int, default=1, help="of each case")
     commands.choices["rivals"].add_argument("--methods", nargs="+", default=[*METHODS])
-    commands.add_parser("table", help="print tables of the rows")
-    commands.add_parser("rivals-table", help="print a table of the rows of rivals and of watches")
-    commands.choices["rivals-table"].add_argument("watches", type=Path, help="file of the watches")
-    for command in commands.choices.values():
-        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
+    commands.add_parser("table", help="print tables of the rows of files")
+    for name, command in commands.choices.items():
+        files = "+" if name == "table" else None
+        command.add_argument("rows", type=Path, nargs=files, help="file of the rows, JSON lines")
     given = parser.parse_args()
     if given.command == "table":
-        print(table(read_rows(given.rows)))
+        print(table([row for path in given.rows for row in read_rows(path)]))
         return
-    if given.command == "rivals-table":
-        print(rivals_table(read_rows(given.rows), read_rows(given.watches)))
-        return
-    of = {"healthy": healthy, "faults": faulty, "rivals": compared}[given.command]
+    values = {"healthy": healthy, "faults": faulty, "rivals": compared}[given.command]
 
     def values_of(key: Row, _work: Path) -> Row:
         machine = Machine(key["robot"], key["gap"], key["seed"])
-        return of(machine, key)
+        return values(machine, key)
 
     add_rows(given.rows, cases(given), given.limit, values_of)
 

@@ -15,7 +15,7 @@ HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Returns a table of the healthy robots, and one of the faults."""
+    """Returns a table of the healthy robots, one of the faults, and one of other methods."""
     parts = []
     for command, columns, names in (
         ("healthy", _healthy, ("robot", "gap", "gaits")),
@@ -31,6 +31,8 @@ def table(rows: Sequence[Row]) -> str:
         ]
         if lines:
             parts.append(markdown_of(table_of(command, lines, lines, texts=len(names))))
+    if rivals := [row for row in rows if row["command"] == "rivals"]:
+        parts.append(_compared(rivals, [row for row in rows if row["command"] != "rivals"]))
     return "\n".join(parts)
 
 
@@ -86,10 +88,10 @@ THRESHOLDS = {"healthy": "1.25 of healthy", "oracle": "oracle"}
 """Thresholds of the other methods, and how the table says them."""
 
 
-def rivals_table(rows: Sequence[Row], watches: Sequence[Row]) -> str:
+def _compared(rows: Sequence[Row], watches: Sequence[Row]) -> str:
     """Returns a table of other methods, and of the watches of the same robots and faults."""
     machines = {_machine(row) for row in rows}
-    lines = []
+    lines = list[dict[str, str]]()
     for name in dict.fromkeys(row["method"] for row in rows):
         for threshold, words in THRESHOLDS.items():
             found = [(row, row["thresholds"][threshold]) for row in rows if row["method"] == name]
