@@ -6,42 +6,27 @@ A command appends a row for each case to ROWS, and skips the cases that are ther
 import argparse
 import time
 from collections.abc import Iterator
-from functools import cache
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
 import selfmodel
-from benchmarks.foreign.cases import Fault, stream
 from benchmarks.foreign.model import LEVELS
-from benchmarks.foreign.robots import robot
 from benchmarks.foreign.scoring import add_rows, read_rows
-from benchmarks.watching.streams import NEW, Machine
+from benchmarks.watching.monitors import METHODS
+from benchmarks.watching.rivals import compared
+from benchmarks.watching.streams import AFTER, FAULTS, Machine, watch_of
 from benchmarks.watching.tables import table
-from selfmodel import Watch
 from selfmodel.studies.study import Row
 from selfmodel.trials.trajectory import samples_of
 from selfmodel.watching import Finding
 from selfmodel.watching.finding import ENDS
-
-HEALTHY, HEALTHY_PERIOD = 80.0, 10.0
-"""Length of each of the two healthy trials, and time of a gait in them, s."""
-
-PERIOD = 30.0
-"""Time of a gait in a stream that is watched, s."""
-
-ONSETS, AFTER = (8.0, 14.0), 8.0
-"""Range of the onset of a fault, and time of the stream after it, s."""
-
-FAULTS = ("break", "jam", "sensor", "motor")
 
 
 def main() -> None:
     """Runs a command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.watching", description=__doc__)
     commands = parser.add_subparsers(required=True, dest="command")
-    for name in ("healthy", "faults"):
+    for name in ("healthy", "faults", "rivals"):
         command = commands.add_parser(name)
         command.add_argument("--robots", nargs="+", default=["quadruped"])
         command.add_argument("--gaps", nargs="+", choices=LEVELS, default=["moderate", "large"])
@@ -51,17 +36,20 @@ def main() -> None:
     commands.choices["healthy"].add_argument("--gaits", choices=("known", "new"), default="known")
     commands.choices["faults"].add_argument("--cases", nargs="+", default=[*FAULTS])
     commands.choices["faults"].add_argument("--draws", type=int, default=1, help="of each case")
-    commands.add_parser("table", help="print tables of the rows")
-    for command in commands.choices.values():
-        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
+    commands.choices["rivals"].add_argument("--methods", nargs="+", default=[*METHODS])
+    commands.add_parser("table", help="print tables of the rows of files")
+    for name, command in commands.choices.items():
+        files = "+" if name == "table" else None
+        command.add_argument("rows", type=Path, nargs=files, help="file of the rows, JSON lines")
     given = parser.parse_args()
     if given.command == "table":
-        print(table(read_rows(given.rows)))
+        print(table([row for path in given.rows for row in read_rows(path)]))
         return
+    values = {"healthy": healthy, "faults": faulty, "rivals": compared}[given.command]
 
     def values_of(key: Row, _work: Path) -> Row:
         machine = Machine(key["robot"], key["gap"], key["seed"])
-        return (healthy if given.command == "healthy" else faulty)(machine, key)
+        return values(machine, key)
 
     add_rows(given.rows, cases(given), given.limit, values_of)
 
@@ -72,23 +60,16 @@ def cases(given: argparse.Namespace) -> Iterator[Row]:
         key = {"command": given.command, "robot": name, "gap": gap, "seed": seed}
         if given.command == "healthy":
             yield {**key, "gaits": given.gaits, "minutes": given.minutes}
+        elif given.command == "rivals":
+            yield from ({**key, "method": method} for method in given.methods)
         else:
             for draw, case in product(range(given.draws), given.cases):
                 yield {**key, "case": case, "draw": draw}
 
 
-@cache
-def watch_of(machine: Machine) -> Watch:
-    """Returns the watch of a physical robot, by two healthy trials in all its gaits."""
-    trials = [machine.trial(f"healthy-{k}", HEALTHY, HEALTHY_PERIOD) for k in range(2)]
-    return Watch(machine.robot, trials)
-
-
 def healthy(machine: Machine, key: Row) -> Row:
     """Returns the alarms in a stream of a healthy robot; after each that ends, it begins anew."""
-    seed = machine.seed + NEW if key["gaits"] == "new" else machine.seed
-    name, duration = f"watched-{key['gaits']}", 60 * key["minutes"]
-    trial = machine.trial(name, duration, PERIOD, gaits_of=seed)
+    trial = machine.watched(key["gaits"], key["minutes"])
     watch, judged, status = watch_of(machine), 0, "not judged"
     alarms, causes = list[list[float | str]](), list[str]()
     watch.restart()
@@ -112,12 +93,7 @@ def healthy(machine: Machine, key: Row) -> Row:
 
 def faulty(machine: Machine, key: Row) -> Row:
     """Returns what the watch of a robot says that fails at an onset."""
-    rng = stream(machine.seed, machine.robot, key["case"], str(key["draw"]))
-    fault, notation = drawn(machine.robot, key["case"], rng)
-    onset = round(float(rng.uniform(*ONSETS)), 2)
-    trial = machine.trial(
-        f"{key['case']}-{key['draw']}", onset + AFTER, 10.0, faults=(fault,), onset=onset
-    )
+    notation, onset, trial = machine.failing(key["case"], key["draw"])
     watch, findings = watch_of(machine), list[Finding]()
     watch.restart()
     start = time.process_time()
@@ -140,20 +116,6 @@ def faulty(machine: Machine, key: Row) -> Row:
         "seconds": round(seconds, 2),
         "watched": onset + AFTER,
     }
-
-
-def drawn(name: str, case: str, rng: np.random.Generator) -> tuple[Fault, str]:
-    """Returns the fault of a case at a random part, and its notation; a jam is where it is."""
-    machine = robot(name)
-    if case == "sensor":
-        part = str(rng.choice(list(machine.touches)))
-        return Fault("dead-sensor", part), f"sensor:{part}"
-    part = str(rng.choice([part.name for part in machine.parts if len(part.hinges) == 1]))
-    if case == "break":
-        return Fault("lost", part), f"break:{part}"
-    if case == "jam":
-        return Fault("jam", part, float("nan")), f"jam:{part}"
-    return Fault("motor", part, 0.5), f"motor:{part}=0.5"
 
 
 if __name__ == "__main__":

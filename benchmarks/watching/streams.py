@@ -7,17 +7,18 @@ with the noise of the generator's recorder, and the commands. No recording is wr
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
 import selfmodel
-from benchmarks.foreign.cases import Faults, stream
+from benchmarks.foreign.cases import Fault, Faults, stream
 from benchmarks.foreign.generate import CANDIDATES, Plan, by_displacement, phase_of
 from benchmarks.foreign.model import LEVELS, compiled, draw_gap
 from benchmarks.foreign.motion import Gait, Motion, draw_gait, simulate
 from benchmarks.foreign.recorder import Noise
 from benchmarks.foreign.robots import Robot, robot
-from selfmodel import Trial
+from selfmodel import Trial, Watch
 
 GAITS = 4
 """Gaits of a robot."""
@@ -27,6 +28,25 @@ PASSAGE = 0.5
 
 NEW = 1000
 """Added to the seed of a robot for gaits that its healthy trials do not have."""
+
+HEALTHY, HEALTHY_PERIOD = 80.0, 10.0
+"""Length of each of the two healthy trials, and time of a gait in them, s."""
+
+PERIOD = 30.0
+"""Time of a gait in a stream that is watched, s."""
+
+ONSETS, AFTER = (8.0, 14.0), 8.0
+"""Range of the onset of a fault, and time of the stream after it, s."""
+
+FAULTS = ("break", "jam", "sensor", "motor")
+
+
+class Failing(NamedTuple):
+    """A stream of a robot that fails: the notation of the fault, its onset, s, and the trial."""
+
+    notation: str
+    onset: float
+    trial: Trial
 
 
 @dataclass(frozen=True)
@@ -41,6 +61,24 @@ class Machine:
     def model(self) -> selfmodel.Robot:
         """Its nominal model."""
         return selfmodel.load_robot(self.robot)
+
+    def healthy(self) -> list[Trial]:
+        """Returns two healthy trials in all its gaits."""
+        return [self.trial(f"healthy-{k}", HEALTHY, HEALTHY_PERIOD) for k in range(2)]
+
+    def watched(self, gaits: str, minutes: float) -> Trial:
+        """Returns a healthy stream, in ``known`` or ``new`` gaits."""
+        seed = self.seed + NEW if gaits == "new" else self.seed
+        return self.trial(f"watched-{gaits}", 60 * minutes, PERIOD, gaits_of=seed)
+
+    def failing(self, case: str, draw: int) -> Failing:
+        """Returns a stream with a fault of a case."""
+        rng = stream(self.seed, self.robot, case, str(draw))
+        fault, notation = drawn(self.robot, case, rng)
+        onset = round(float(rng.uniform(*ONSETS)), 2)
+        duration, name = onset + AFTER, f"{case}-{draw}"
+        trial = self.trial(name, duration, HEALTHY_PERIOD, faults=(fault,), onset=onset)
+        return Failing(notation, onset, trial)
 
     def trial(
         self,
@@ -72,6 +110,26 @@ class Machine:
             lambda: delay + spread * rng.uniform(-1, 1),
         )
         return _measured(machine, motion, Noise().scaled(level), rng, name)
+
+
+@cache
+def watch_of(machine: Machine) -> Watch:
+    """Returns the watch of a physical robot, by its healthy trials."""
+    return Watch(machine.robot, machine.healthy())
+
+
+def drawn(name: str, case: str, rng: np.random.Generator) -> tuple[Fault, str]:
+    """Returns the fault of a case at a random part, and its notation; a jam is where it is."""
+    machine = robot(name)
+    if case == "sensor":
+        part = str(rng.choice(list(machine.touches)))
+        return Fault("dead-sensor", part), f"sensor:{part}"
+    part = str(rng.choice([part.name for part in machine.parts if len(part.hinges) == 1]))
+    if case == "break":
+        return Fault("lost", part), f"break:{part}"
+    if case == "jam":
+        return Fault("jam", part, float("nan")), f"jam:{part}"
+    return Fault("motor", part, 0.5), f"motor:{part}=0.5"
 
 
 @cache

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from benchmarks.foreign.scoring import rate
+from benchmarks.watching.streams import FAULTS
 from selfmodel.studies.study import Row
 from selfmodel.studies.tables import markdown_of, table_of
 
@@ -14,7 +15,7 @@ HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Returns a table of the healthy robots, and one of the faults."""
+    """Returns a table of the healthy robots, one of the faults, and one of other methods."""
     parts = []
     for command, columns, names in (
         ("healthy", _healthy, ("robot", "gap", "gaits")),
@@ -30,6 +31,8 @@ def table(rows: Sequence[Row]) -> str:
         ]
         if lines:
             parts.append(markdown_of(table_of(command, lines, lines, texts=len(names))))
+    if rivals := [row for row in rows if row["command"] == "rivals"]:
+        parts.append(_compared(rivals, [row for row in rows if row["command"] != "rivals"]))
     return "\n".join(parts)
 
 
@@ -79,3 +82,70 @@ def _middle(ordered: Sequence[float]) -> float:
 
 def _range(values: Sequence[float]) -> str:
     return f"{_middle(sorted(values)):.2f} (to {max(values):.2f})" if values else ""
+
+
+THRESHOLDS = {"healthy": "1.25 of healthy", "oracle": "oracle"}
+"""Thresholds of the other methods, and how the table says them."""
+
+
+def _compared(rows: Sequence[Row], watches: Sequence[Row]) -> str:
+    """Returns a table of other methods, and of the watches of the same robots and faults."""
+    machines = {_machine(row) for row in rows}
+    lines = list[dict[str, str]]()
+    for name in dict.fromkeys(row["method"] for row in rows):
+        for threshold, words in THRESHOLDS.items():
+            found = [(row, row["thresholds"][threshold]) for row in rows if row["method"] == name]
+            faults = [(case, one[case]) for _, one in found for case in FAULTS]
+            alarms = sum(one["alarms"] for _, one in found)
+            minutes = sum(row["minutes"] for row, _ in found)
+            lines.append(_rival(name, words, alarms, minutes, faults))
+    watched = [row for row in watches if _machine(row) in machines]
+    healthy = [row for row in watched if row["command"] == "healthy" and row["gaits"] == "known"]
+    faults = [
+        (row["case"], _as_rival(row))
+        for row in watched
+        if row["command"] == "faults" and row["draw"] == 0
+    ]
+    alarms = sum(len(row["alarms"]) for row in healthy)
+    minutes = sum(row["judged"] for row in healthy) / 60
+    lines.insert(0, _rival("`watch`", "its own", alarms, minutes, faults))
+    return markdown_of(table_of("rivals", lines, lines, texts=2))
+
+
+def _machine(row: Row) -> tuple[str, str, int]:
+    return row["robot"], row["gap"], row["seed"]
+
+
+def _as_rival(row: Row) -> Row:
+    """Returns the row of a fault of a watch as that of another method."""
+    is_early = row["alarm"] is not None and row["alarm"] < row["onset"]
+    seen = row["alarm"] is not None and not is_early
+    delay = row["alarm"] - row["onset"] if seen else None
+    return {"onset": row["onset"], "early": is_early, "delay": delay, "right": row["right"]}
+
+
+def _rival(
+    name: str, threshold: str, alarms: int, minutes: float, faults: Sequence[tuple[str, Row]]
+) -> dict[str, str]:
+    early = sum(fault["early"] for _, fault in faults)
+    hours = minutes / 60 + sum(fault["onset"] for _, fault in faults) / 3600
+    seen = [fault for _, fault in faults if fault["delay"] is not None]
+
+    def delay(chosen: Sequence[Row]) -> str:
+        late = sorted(np.inf if one["delay"] is None else one["delay"] for one in chosen)
+        middle = _middle(late)
+        return f"{middle:.2f}" if np.isfinite(middle) else "—"
+
+    of_case = {case: [fault for name, fault in faults if name == case] for case in FAULTS}
+    return {
+        "method": name,
+        "threshold": threshold,
+        "false alarms an hour": f"{(alarms + early) / hours:.1f}",
+        "delay, s": delay([fault for _, fault in faults]),
+        **{case: delay(chosen) for case, chosen in of_case.items()},
+        "within 1 s": rate(
+            [fault["delay"] is not None and fault["delay"] <= 1.0 for _, fault in faults]
+        ),
+        "missed": str(len(faults) - len(seen)),
+        "part right": rate([fault["right"] for fault in seen]),
+    }
