@@ -13,6 +13,7 @@ import selfmodel
 from benchmarks.foreign.model import LEVELS
 from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.watching.monitors import METHODS
+from benchmarks.watching.recordings import recordings, watched
 from benchmarks.watching.rivals import compared
 from benchmarks.watching.streams import AFTER, FAULTS, Machine, watch_of
 from benchmarks.watching.tables import table
@@ -26,6 +27,7 @@ def main() -> None:
     """Runs a command."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.watching", description=__doc__)
     commands = parser.add_subparsers(required=True, dest="command")
+    commands.add_parser("recordings", help="of real robots").set_defaults(limit=None)
     for name in ("healthy", "faults", "rivals"):
         command = commands.add_parser(name)
         command.add_argument("--robots", nargs="+", default=["quadruped"])
@@ -44,6 +46,11 @@ def main() -> None:
     given = parser.parse_args()
     if given.command == "table":
         print(table([row for path in given.rows for row in read_rows(path)]))
+        return
+    if given.command == "recordings":
+        found = recordings()
+        keys = (one.key for one in found.values())
+        add_rows(given.rows, keys, given.limit, lambda key, _work: watched(found[str(key)]))
         return
     values = {"healthy": healthy, "faults": faulty, "rivals": compared}[given.command]
 

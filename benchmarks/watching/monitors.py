@@ -32,9 +32,6 @@ TOLERANCE, START, FORGETTING = 0.005, 30, 0.9999
 """Page-Hinkley: the change that is ignored, steps until it judges, and the factor by which the sum
 is multiplied each step: the default values of river. Errors are in standard deviations."""
 
-DELTAS = (2e-3, 1e-4, 1e-6, 1e-9, 1e-13, 1e-18, 1e-26, 1e-38, 1e-60, 1e-100, 1e-200, 1e-300)
-"""Confidences of ADWIN; the first is the default value of river."""
-
 SPAN, STRIDE, EVERY = 48, 8, 12
 """Isolation forest: steps of a window, steps between the samples of it, and between windows."""
 
@@ -158,33 +155,6 @@ def page_hinkley(machine: Machine, trials: Sequence[Trial]) -> Scorer:
                 total = FORGETTING * total + row - average - TOLERANCE
                 lowest = np.minimum(lowest, total)
                 values[k] = total - lowest
-        return Scores(np.arange(len(values)), values, joints.names)
-
-    return scores
-
-
-def adwin(machine: Machine, trials: Sequence[Trial]) -> Scorer:
-    """Returns by which confidence ADWIN sees a change of the tracking error, as -log10.
-
-    Source: Bifet & Gavaldà, "Learning from time-changing data with adaptive windowing", SIAM
-    International Conference on Data Mining (2007); the program is river's.
-    """
-    from river.drift import ADWIN  # noqa: PLC0415  # the other methods do without
-
-    errors = tracking_of(machine, trials)
-    largest = np.max([errors(joints).max(axis=0) for joints in first_halves(machine, trials)], 0)
-
-    def scores(trial: Trial) -> Scores:
-        joints = joints_of(machine, trial)
-        rows = np.minimum(errors(joints) / largest, 1.0)  # its bound is that of values up to 1
-        values = np.zeros_like(rows)
-        for column, of_joint in zip(rows.T.tolist(), values.T, strict=True):
-            for delta in DELTAS:
-                window = ADWIN(delta=delta)
-                for k, error in enumerate(column):
-                    window.update(error)
-                    if window.drift_detected:
-                        of_joint[k] = -np.log10(delta)
         return Scores(np.arange(len(values)), values, joints.names)
 
     return scores
@@ -356,7 +326,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "tracking error": Method(tracking_error),
         "Page-Hinkley": Method(page_hinkley),
-        "ADWIN": Method(adwin, in_common=True),
         "isolation forest": Method(isolation_forest),
         "recursive least squares": Method(recursive_least_squares),
         "multiple models": Method(multiple_model),

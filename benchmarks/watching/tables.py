@@ -15,7 +15,7 @@ HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Returns a table of the healthy robots, one of the faults, and one of other methods."""
+    """Returns a table of the healthy robots, of the faults, of recordings and of other methods."""
     parts = []
     for command, columns, names in (
         ("healthy", _healthy, ("robot", "gap", "gaits")),
@@ -31,8 +31,23 @@ def table(rows: Sequence[Row]) -> str:
         ]
         if lines:
             parts.append(markdown_of(table_of(command, lines, lines, texts=len(names))))
+    recordings = [
+        {
+            "recording": row["recording"],
+            "truth": row["truth"],
+            "healthy trials": row["healthy"],
+            "length, s": f"{row['length']:.1f}",
+            "findings": "; ".join(row["findings"]),
+        }
+        for row in rows
+        if row["command"] == "recordings"
+    ]
+    if recordings:
+        parts.append(markdown_of(table_of("recordings", recordings, recordings, texts=3)))
     if rivals := [row for row in rows if row["command"] == "rivals"]:
-        parts.append(_compared(rivals, [row for row in rows if row["command"] != "rivals"]))
+        parts.append(
+            _compared(rivals, [row for row in rows if row["command"] in ("healthy", "faults")])
+        )
     return "\n".join(parts)
 
 

@@ -64,8 +64,6 @@ def test_the_table_counts_alarms_per_hour_and_a_fault_that_is_not_seen_is_the_la
 @pytest.mark.search
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "Mahalanobis"])
 def test_a_score_of_another_method_is_of_its_step_and_of_earlier_ones_alone(name: str):
-    if name == "ADWIN":
-        pytest.importorskip("river", reason="river is in the dependency group rivals")
     machine = Machine("quadruped", "moderate", 0)
     fitted, seen = trials_of(machine)
     scorer = METHODS[name].fitted(machine, [fitted])
