@@ -27,6 +27,7 @@ def main() -> None:
         command.add_argument("--models", nargs="+", choices=MODELS, default=["import", "stiff"])
         command.add_argument("--gains", nargs="+", type=float, default=[GAIN], help="of the motors")
         command.add_argument("--seeds", type=int, nargs="+", default=[0], help="physical robots")
+        command.add_argument("--gaits", type=int, nargs="+", help="seeds; those of the robots")
         command.add_argument("--cases", default="", help="only those whose name has this text")
         command.add_argument("--limit", type=int, help="number of new rows")
         command.add_argument("--score", default="upright", help="of gaits")
@@ -65,10 +66,11 @@ def cases(given: argparse.Namespace) -> Iterator[Row]:
         failed = [{"group": "intact", "legs": "intact"}]
     names = ("design", "score", "population", "generations", "repair", "trials")
     search = {name: getattr(given, name) for name in names}
-    for seed, model, gain, case in product(given.seeds, given.models, given.gains, failed):
+    robots = [(seed, gait) for seed in given.seeds for gait in given.gaits or [seed]]
+    for robot, model, gain, case in product(robots, given.models, given.gains, failed):
         if given.cases in f"{case['group']} {case['legs']}":
-            own = {"command": given.command, "model": model, "gain": gain, "seed": seed}
-            yield {**own, **case, **search}
+            own = {"command": given.command, "model": model, "gain": gain}
+            yield {**own, "seed": robot[0], "gait": robot[1], **case, **search}
 
 
 if __name__ == "__main__":

@@ -34,8 +34,9 @@ class Bench:
     design: str
     repair: str
 
-    def gait(self, model: str, seed: int) -> Controller:
-        """Returns the first gait of a self-model: of the folder, or evolved for it."""
+    def gait(self, key: Row) -> Controller:
+        """Returns the first gait of a row: of the folder, or evolved for its self-model."""
+        model, seed = key["model"], key["gait"]
         size = f"{self.settings.population}x{self.settings.generations}"
         path = self.folder / f"{model}-{self.design}-{self.score}-{size}-{seed}.npz"
         if not path.exists():
@@ -71,7 +72,7 @@ def walked(bench: Bench, key: Row, work: Path) -> Row:
 
     A simulation that diverges goes nowhere.
     """
-    gait = bench.gait(key["model"], key["seed"])
+    gait = bench.gait(key)
     predicted, finer = (
         in_mujoco(Simulator(model_of(key["model"], part), 1), INTACT, gait, STEPS) or 0.0
         for part in (1, FINER)
@@ -82,7 +83,7 @@ def walked(bench: Bench, key: Row, work: Path) -> Row:
 
 def diagnosed(bench: Bench, key: Row, work: Path) -> Row:
     """Returns the diagnosis of the first gait with failed legs, by a log of the intact robot."""
-    gait = bench.gait(key["model"], key["seed"])
+    gait = bench.gait(key)
     healthy = logged(key, "intact", 0, gait, work / "intact.mcap")
     trial = logged(key, key["legs"], 1, gait, work / "failed.mcap")
     start = time.process_time()
@@ -107,7 +108,7 @@ def recovered(bench: Bench, key: Row, work: Path) -> Row:
             damaged,
             model_of(key["model"]),
             work / "run",
-            gait=bench.gait(key["model"], key["seed"]),
+            gait=bench.gait(key),
             repair=bench.repair,
             score=bench.score,
             settings=bench.settings,

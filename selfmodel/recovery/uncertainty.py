@@ -43,6 +43,10 @@ ASSUMED_FACTORS = 0.1
 """Standard deviation of the logarithm of the factor of a mass or a motor before the first trial;
 that of friction and of damping, which models often contain guesses of, is twice as large."""
 
+GROUND = 0.35
+"""As ``ASSUMED_FACTORS``, of the friction on a ground that is not in the robot's file, as of every
+URDF: half to twice that of the import in 95 % of the draws."""
+
 CALIBRATED = 0.65
 """Factor of the posterior deviations of a calibration of a robot with a floating base. Its
 intervals of 68 % contain the truth in 86 to 89 % of the parameters (docs/results/calibration.md),
@@ -54,7 +58,8 @@ calibration fits only those that the bodies share, and a robot of unequal legs w
 
 CONTACTS = 0.5
 """Standard deviation of the logarithms of the stiffness and of the damping of contacts, where a
-calibration changed them, this one or an earlier one: its candidates are a factor of 2 apart."""
+calibration changed them, this one or an earlier one: its candidates are a factor of 2 apart. Also
+of those on an unknown ground before a calibration."""
 
 ASSUMED_DELAYS = (0, 1, 2)
 """Control delays in addition to the model's before the first trial, control steps."""
@@ -102,8 +107,11 @@ def assumed_uncertainty(robot: Robot) -> DomainDistribution:
     touch = _touch(robot.anatomy)
     factors = np.full(4 + robot.model.nu, ASSUMED_FACTORS)
     factors[2:4] *= 2  # friction and damping
+    contacts = 0.0
+    if robot.has_unknown_ground:
+        factors[2], contacts = GROUND, CONTACTS
     return DomainDistribution(
-        models=LogNormal(factors, np.full(robot.model.nbody, BODIES)),
+        models=LogNormal(factors, np.full(robot.model.nbody, BODIES), contacts),
         reading_noise=np.where(touch, 0.0, ASSUMED_NOISE),
         wrong_touches=np.where(touch, ASSUMED_WRONG_TOUCHES, 0.0),
         start=ASSUMED_START,

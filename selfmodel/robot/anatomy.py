@@ -147,6 +147,9 @@ FITTED_CONTACTS = "selfmodel_fitted_contacts"
 """Name of the custom numeric of a model with contacts that a calibration changed. Logs of version
 0.1 may have a third, ``selfmodel_hidden_neurons``, which is ignored: their controllers have it."""
 
+UNKNOWN_GROUND = "selfmodel_unknown_ground"
+"""Name of the custom numeric of a model that was imported from a file without a ground."""
+
 MAX_CONTROL_DELAY = 5
 """Largest control delay, in control steps: segments contain that many commands before their
 start."""

@@ -13,6 +13,7 @@ from selfmodel.robot.actuators import SUPPORTED_TRANSMISSIONS, motor_joints
 from selfmodel.robot.anatomy import (
     CONTROL_DELAY,
     FITTED_CONTACTS,
+    UNKNOWN_GROUND,
     Anatomy,
     control_delay,
     custom_numeric,
@@ -101,6 +102,11 @@ class Robot:
     def has_fitted_contacts(self) -> bool:
         """Whether a calibration changed the contacts of the model."""
         return custom_numeric(self.model, FITTED_CONTACTS) is not None
+
+    @property
+    def has_unknown_ground(self) -> bool:
+        """Whether the ground is of the import, and no calibration has fitted its contacts."""
+        return custom_numeric(self.model, UNKNOWN_GROUND) is not None and not self.is_calibrated
 
     @property
     def standing_height(self) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError, listed
+from selfmodel.robot.anatomy import UNKNOWN_GROUND
 from selfmodel.robot.contacts import ground_contact_geoms
 from selfmodel.robot.mjcf.pose import lowest_point
 from selfmodel.robot.mjcf.settings import JointValues, MjcfSettings, check_patterns, value_of
@@ -296,6 +297,7 @@ def _free_base(work: Work) -> None:
     name = roots[0].get("name", "")
     roots[0].insert(0, ET.Element("freejoint", {"name": f"{name}_root"}))
     world.insert(0, ET.Element("geom", {"name": "ground", "type": "plane", "size": "0 0 1"}))
+    ET.SubElement(work.section("custom"), "numeric", {"name": UNKNOWN_GROUND, "data": "1"})
     work.notes.append(f"the root link {name} moves freely, on a ground plane")
 
 

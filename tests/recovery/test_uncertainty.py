@@ -14,6 +14,7 @@ from selfmodel.faults.notation import parse
 from selfmodel.recovery.uncertainty import (
     BODIES,
     CONTACTS,
+    GROUND,
     MIN_EFFECTIVE,
     MODELS,
     Posterior,
@@ -22,7 +23,8 @@ from selfmodel.recovery.uncertainty import (
     flattened_weights,
     log_likelihood,
 )
-from selfmodel.robot.robot import Robot
+from selfmodel.robot.anatomy import UNKNOWN_GROUND
+from selfmodel.robot.robot import Robot, mjcf_of
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration, calibrate
 from selfmodel.simulation.model_factors import Weighted, nominal, with_parameters
@@ -85,6 +87,24 @@ def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
     # Without a calibration, the parameters are as uncertain as before.
     assert found.models.draw(np.random.default_rng(0)).differs
     assert found.delays == assumed_uncertainty(quadruped).delays
+
+
+def test_the_contacts_with_a_ground_that_no_file_has_are_unknown_until_a_calibration_fits_them(
+    quadruped: Robot,
+):
+    spec = quadruped.specification()
+    spec.add_numeric(name=UNKNOWN_GROUND, data=[1.0])
+    imported = replace(quadruped, mjcf=mjcf_of(spec))
+    fitted = with_parameters(imported, nominal(imported))
+    usual, wider, narrowed = (
+        assumed_uncertainty(robot).models for robot in (quadruped, imported, fitted)
+    )
+
+    assert wider.factors[2] == GROUND > usual.factors[2]
+    assert wider.contacts == CONTACTS > usual.contacts
+    np.testing.assert_array_equal(np.delete(wider.factors, 2), np.delete(usual.factors, 2))
+    np.testing.assert_array_equal(narrowed.factors, usual.factors)
+    assert narrowed.contacts == usual.contacts == 0.0
 
 
 @pytest.fixture(scope="module")

@@ -424,6 +424,8 @@ def test_a_urdf_gives_a_robot_with_touch_sensors_on_its_feet_that_stands(tmp_pat
     assert touch == ["left_foot", "right_foot"]
     assert robot.standing_height == pytest.approx(0.4 * np.cos(0.25) + 0.03)
     assert np.abs(data.qvel).max() < 5
+    assert robot.has_unknown_ground
+    assert not load_mjcf(written(tmp_path, toml='base = "fixed"')).has_unknown_ground
 
 
 def test_what_friction_holds_slides_in_no_direction(tmp_path: Path):
