@@ -203,12 +203,15 @@ class Diagnose(FromLogs):
 class WatchLog(Command):
     """Watch a robot through its trial log: alarms, since when, and which single fault explains it.
 
-    With --follow, the log may be one that is being written. Findings are JSON lines unless standard
-    output is a terminal.
+    With --mapping, it is a recording of ROS or a table, as for `selfmodel logs import`. With
+    --follow, it may be one that is being written, a recording as MCAP. Findings are JSON lines
+    unless standard output is a terminal.
     """
 
     file: Path
     healthy: list[Path]
+    mapping: Path | None = None
+    run: int | None = None
     follow: bool = False
     kinds: str = "default"
     false_alarm_every: float = 3600.0

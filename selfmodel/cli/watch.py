@@ -3,23 +3,24 @@
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from itertools import chain
 
 from selfmodel import arguments, plugins
 from selfmodel.cli.commands import WatchLog
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.errors import counted
+from selfmodel.errors import InputError, counted
 from selfmodel.logs.growing import GrowingLog
-from selfmodel.logs.writer import FLUSH_STEPS
-from selfmodel.trials.trajectory import Sample
+from selfmodel.logs.recordings.growing import GrowingBag
+from selfmodel.logs.recordings.importer import import_recording
+from selfmodel.logs.recordings.mapping_file import read_mapping
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.trajectory import Sample, samples_of
 from selfmodel.watching.finding import ENDS
 from selfmodel.watching.watch import Watch
 
 POLL = 0.05
 """Time between two looks at a log that grows, s."""
-
-MOST_NEW = 2 * FLUSH_STEPS
-"""New steps that a look may find: a trial is written in parts of ``FLUSH_STEPS``."""
 
 
 def watch(options: WatchLog) -> None:
@@ -30,8 +31,7 @@ def watch(options: WatchLog) -> None:
     logs = arguments.read_logs(options.healthy)
     robot = arguments.robot_of_logs(logs, options.self_model)
     as_lines = sys.stdout.isatty() and not options.as_json
-    with GrowingLog(options.file, robot.anatomy.names) as log:
-        first = log.new_steps()  # a file that is no log of the robot is refused before the fit
+    with _opened(options, robot) as steps:
         watched = Watch(
             robot,
             [one.trial for one in logs],
@@ -40,7 +40,7 @@ def watch(options: WatchLog) -> None:
             calibrate=options.calibrate,
             threads=options.threads,
         )
-        for step in chain(first, _steps(log, follow=options.follow)):
+        for step in steps:
             for finding in watched.update(step):
                 if as_lines:
                     print_lines(str(finding))
@@ -50,19 +50,44 @@ def watch(options: WatchLog) -> None:
                     return
 
 
-def _steps(log: GrowingLog, *, follow: bool) -> Iterator[Sample]:
+@contextmanager
+def _opened(options: WatchLog, robot: Robot) -> Iterator[Iterator[Sample]]:
+    """Opens a log or a recording, of which a first look refuses what is none, and has its steps."""
+    follow, mapping = options.follow, options.mapping
+    if options.run is not None and (follow or mapping is None):
+        raise InputError("--run is for a finished recording: it needs --mapping, without --follow")
+    if mapping is not None and not follow:
+        found = import_recording(options.file, read_mapping(mapping), robot, options.run)
+        for note in found.notes:
+            _note(note)
+        yield samples_of(found.trajectory)
+        return
+    log: GrowingLog | GrowingBag
+    if mapping is None:
+        log = GrowingLog(options.file, robot.anatomy.names)
+    else:
+        log = GrowingBag(options.file, read_mapping(mapping), robot, _note)
+    with closing(log):
+        yield chain(log.new_steps(), _steps(log, follow=follow))
+
+
+def _note(sentence: str) -> None:
+    print_notes(f"note: {sentence}")
+
+
+def _steps(log: GrowingLog | GrowingBag, *, follow: bool) -> Iterator[Sample]:
     """Yields the further steps of a log in order, as they are written if it is followed."""
     has_caught_up, is_behind = False, False
     while not log.has_ended:
         new = log.new_steps()
-        was_behind, is_behind = is_behind, has_caught_up and len(new) > MOST_NEW
+        was_behind, is_behind = is_behind, has_caught_up and len(new) > log.most_new
         if is_behind and not was_behind:
-            print_notes(f"note: behind by {counted(len(new), 'step')}")
+            _note(f"behind by {counted(len(new), 'step')}")
         yield from new
         if new or log.has_ended:
             continue
         if not follow:
-            print_notes(f"note: {log.path} has no end: it is cut, or --follow waits for what comes")
+            _note(f"{log.path} has no end: it is cut, or --follow waits for what comes")
             return
         has_caught_up = True
         time.sleep(POLL)
