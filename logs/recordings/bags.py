@@ -79,10 +79,7 @@ def bag_files(path: Path) -> list[Path]:
         return [path]
     metadata = path / "metadata.yaml"
     if not metadata.exists():
-        storage = [file for file in path.iterdir() if _STORAGE.search(file.name) and file.is_file()]
-        if not storage:
-            raise InputError(f"{path}: expected a bag, got a folder without one: {_EXPECTED}")
-        return sorted(storage, key=in_order)
+        return files_in(path)
     advice = "add what is missing, or remove it to read the files that are there"
     data = read_file(metadata, "a list of files", 2**20)
     try:
@@ -101,8 +98,16 @@ def bag_files(path: Path) -> list[Path]:
     return files
 
 
+def files_in(folder: Path) -> list[Path]:
+    """Returns the files in a folder that have messages, in the order of the numbers in names."""
+    storage = [file for file in folder.iterdir() if _STORAGE.search(file.name) and file.is_file()]
+    if not storage:
+        raise InputError(f"{folder}: expected a bag, got a folder without one: {_EXPECTED}")
+    return sorted(storage, key=in_order)
+
+
 def in_order(path: Path) -> list[tuple[int, str]]:
-    """Returns what sorts the files of a bag: the numbers in their names are numbers."""
+    """Returns the key by which files are in the order of the numbers in their names."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 

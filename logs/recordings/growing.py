@@ -14,7 +14,7 @@ from mcap import records as mcap
 
 from selfmodel.errors import InputError
 from selfmodel.logs.growing_file import GrowingFile
-from selfmodel.logs.recordings.bags import bag_files, explained, in_order
+from selfmodel.logs.recordings.bags import bag_files, explained, files_in, in_order
 from selfmodel.logs.recordings.importer import MAX_STEPS
 from selfmodel.logs.recordings.mapping_file import RecordingMapping, check_recording, check_robot
 from selfmodel.logs.recordings.recording import IntArray, Recording
@@ -42,6 +42,11 @@ MAX_READ = 100_000_000_000
 
 PATIENCE = 5_000_000_000
 """Time of a recording after which topics without messages are named, ns."""
+
+_FOLLOWED = (
+    "--follow is for MCAP: record with `ros2 bag record -s mcap`, or watch the finished recording "
+    "without --follow"
+)
 
 _ARRIVALS = 1000
 """Messages of a topic before the new ones in which a clock that restarts is looked for."""
@@ -77,6 +82,8 @@ class GrowingBag:
         self, path: Path, mapping: RecordingMapping, robot: Robot, note: Callable[[str], None]
     ) -> None:
         check_robot(mapping, robot.anatomy)
+        if mapping.trial.time is not None:
+            raise mapping.error(("time",), f"[time] is for tables: {_FOLLOWED}")
         self.path, self.steps, self.has_ended, self.most_new = path, 0, False, 0
         self._mapping, self._robot, self._note = mapping, robot, note
         self._said: set[str] = set()
@@ -138,9 +145,7 @@ class GrowingBag:
     def _begin_file(self, path: Path) -> None:
         if path.suffix != ".mcap":
             raise InputError(
-                f"{path}: expected MCAP without compression of files, as a recording that is "
-                f"followed: record with `ros2 bag record -s mcap`, or watch the finished recording "
-                f"without --follow"
+                f"{path}: expected an .mcap, without compression of files: {_FOLLOWED}"
             )
         self._file, self._announced = GrowingFile(path), McapTopics()
 
@@ -171,7 +176,7 @@ class GrowingBag:
         if not self.path.is_dir():
             return None, True
         is_listed, current = (self.path / "metadata.yaml").exists(), in_order(self._file.path)
-        later = [path for path in bag_files(self.path) if in_order(path) > current]
+        later = [path for path in files_in(self.path) if in_order(path) > current]
         if later and _has_messages(later[0]):
             return later[0], False
         return None, is_listed and not later
@@ -253,12 +258,10 @@ class GrowingBag:
         return first + round(self._mapping.trial.start * 1e9)
 
     def _due(self, origin: int) -> int:
-        """Returns the number of steps that are old enough, or of all in a finished bag."""
-        timestep = self._robot.control_timestep
+        """Returns the number of steps that are old enough; in a finished bag, all are."""
+        timestep, newest = self._robot.control_timestep, self._newest(self._timing) - LAG
         if self._is_complete:
-            newest = extent(self._mapping, self._tracks, timestep)[1]
-        else:
-            newest = self._newest(self._timing) - LAG
+            newest = max(newest, extent(self._mapping, self._tracks, timestep)[1])
         return int((newest - origin + 0.5) // (timestep * 1e9)) + 1
 
     def _say(self, sentence: str) -> None:
