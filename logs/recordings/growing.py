@@ -189,12 +189,11 @@ class GrowingBag:
             topic = self._topics.setdefault(item.topic, Topic())
             topic.add(item, next(self._places), self._columns.get(item.topic))
             if item.data is not None:
-                self._logged = item.time
+                self._logged, before = item.time, before or item.time
                 if item.topic in self._columns:
                     self._heard.setdefault(item.topic, item.time)
-        if before:
-            burst = (self._logged - before) / 1e9 / self._robot.control_timestep
-            self.most_new = max(self.most_new, 2 * FEWEST, round(2 * burst))
+        burst = (self._logged - before) / 1e9 / self._robot.control_timestep
+        self.most_new = max(self.most_new, 2 * FEWEST, round(2 * burst))
 
     # ------------------------------------------------------------ tracks
 
