@@ -47,7 +47,10 @@ class GrowingLog:
     def __init__(self, path: Path, names: Names) -> None:
         self.path = path if path.exists() else partial_path(path)
         if not self.path.is_file():
-            raise InputError(f"{path}: expected a trial log, finished or being written")
+            raise InputError(
+                f"{path}: expected a trial log, finished or being written; a recording of a robot "
+                f"needs --mapping"
+            )
         self._file = GrowingFile(self.path)
         self._names, self.steps = names, 0
         self._contents = Contents(self.path)

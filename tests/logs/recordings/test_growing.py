@@ -179,6 +179,23 @@ def test_jitter_gaps_and_unknown_numbers_are_those_of_the_import(
     assert len(grown.steps) == expected.steps
 
 
+def test_a_rate_that_falls_is_no_gap_as_in_the_import(
+    biped: Robot, tmp_path: Path, grow: Callable[..., Growth]
+):
+    items = []
+    for k in (*range(300), *range(300, 800, 4)):  # 200 Hz, then 50 Hz
+        stamp = T0 + k * 5_000_000
+        items.append(("/joint_states", stamp, joint_state(stamp, JOINTS, [k / 1000] * 4)))
+        items.append(("/commands", stamp, joint_state(stamp, JOINTS, [0.0] * 4)))
+    write_mcap(tmp_path / "finished.mcap", items, use_chunking=False)
+    grown = grow(mapping=JOINTS_ONLY)
+    grown.append((tmp_path / "finished.mcap").read_bytes(), repeat(500))
+
+    expected = imported(tmp_path / "finished.mcap", biped, JOINTS_ONLY).trajectory
+    assert np.isfinite(expected["joint_positions"]).all()
+    assert_same(grown.rows(biped), expected)
+
+
 def test_angles_that_go_round_go_on_as_in_the_import(tmp_path: Path, grow: Callable[..., Growth]):
     free = Robot("biped", MJCF.replace(' range="-30 30"', ""), 0.01)
     items = []
