@@ -1,33 +1,28 @@
 """Steps of a trial log while it is written, or of a finished one, in order."""
 
-import io
-from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
-from mcap import records as mcap
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.exceptions import InvalidMagic
 
 from selfmodel.arrays import FloatArray
 from selfmodel.errors import InputError
 from selfmodel.logs import errors, reader, records
 from selfmodel.logs.files import partial_path
-from selfmodel.logs.log_file import FAILURES, MAGIC, Contents, Gatherer
+from selfmodel.logs.growing_file import GrowingFile
+from selfmodel.logs.log_file import FAILURES, Contents, Gatherer
 from selfmodel.logs.messages import COMMANDS, Part, Topic, topics
 from selfmodel.logs.robots import describe_difference
+from selfmodel.logs.writer import FLUSH_STEPS
 from selfmodel.trials.signals import SIGNALS, Names
 from selfmodel.trials.trajectory import Sample, StepTiming
 
 _NAMING = ("/joint_states", "/sensors", COMMANDS)
 """Topics whose messages have the names of the signals."""
 
-_HEAD = 9
-"""Bytes of a record before its content: its kind, and the length of the content."""
-
 
 class GrowingLog:
-    """A trial log that is read as far as it is written; a context manager that closes the file.
+    """A trial log that is read as far as it is written.
 
     Of what is read, the checksums of chunks, the layout of messages and the names are verified; the
     digests and the result of a finished log are not: ``read_log`` does that.
@@ -39,46 +34,47 @@ class GrowingLog:
 
     Attributes:
         path: The file that is read.
-        has_ended: Whether the log is finished, and read to its end.
         steps: Number of steps that were read.
         start: Time stamp of the first step, ns.
+        most_new: Number of new steps that a look may find.
 
     Raises:
         InputError: There is no such file; or, of ``new_steps``, the log is of another robot.
         LogError: Of ``new_steps``: the log is damaged, or no trial log.
     """
 
+    most_new = 2 * FLUSH_STEPS  # a trial is written in parts
+
     def __init__(self, path: Path, names: Names) -> None:
         self.path = path if path.exists() else partial_path(path)
         if not self.path.is_file():
-            raise InputError(f"{path}: expected a trial log, finished or being written")
-        self.has_ended = False
+            raise InputError(
+                f"{path}: expected a trial log, finished or being written; a recording of a robot "
+                f"needs --mapping"
+            )
+        self._file = GrowingFile(self.path)
         self._names, self.steps, self.start = names, 0, 0
         self._contents = Contents(self.path)
         self._gatherer = Gatherer(self._contents, (records.HIDDEN,))
         self._topics: tuple[Topic, ...] = ()
 
-    def __enter__(self) -> Self:
-        self._file = self.path.open("rb")
-        if self._file.read(len(MAGIC)) != MAGIC:
-            self._file.close()
-            what = "this is not an MCAP file"
-            raise errors.NotMcapError(self.path, what, advice=errors.ANOTHER)
-        return self
+    @property
+    def has_ended(self) -> bool:
+        """Whether the log is finished, and read to its end."""
+        return self._file.has_ended
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Closes the file."""
         self._file.close()
 
     def new_steps(self) -> list[Sample]:
         """Returns the steps that were completed since the last call."""
         try:
-            for record in self._new_records():
+            for record in chain.from_iterable(self._file.parts()):
                 self._gatherer.add(record)
+        except InvalidMagic:
+            what = "this is not an MCAP file"
+            raise errors.NotMcapError(self.path, what, advice=errors.ANOTHER) from None
         except FAILURES as failure:
             what = f"the file is damaged: {failure or type(failure).__name__}"
             advice = errors.salvage_it(self.path)
@@ -118,20 +114,3 @@ class GrowingLog:
             elapsed, *marks = rows["timing"][row].tolist()
             moment = StepTiming(elapsed, *(mark != 0 for mark in marks))  # unknown counts as late
         return Sample(step * self._period, values, moment)
-
-    def _new_records(self) -> Iterator[mcap.McapRecord]:
-        """Yields the records that are complete from the place of the file on, and moves it."""
-        while not self.has_ended:
-            begin, head = self._file.tell(), self._file.read(_HEAD)
-            size = int.from_bytes(head[1:], "little")
-            data = head + (self._file.read(size) if len(head) == _HEAD else b"")
-            if len(data) < _HEAD + size:
-                self._file.seek(begin)
-                return
-            reader = StreamReader(io.BytesIO(data), skip_magic=True, emit_chunks=True)
-            record = next(reader.records)
-            self.has_ended = isinstance(record, mcap.DataEnd)
-            if isinstance(record, mcap.Chunk):
-                yield from breakup_chunk(record, validate_crc=True)
-            else:
-                yield record

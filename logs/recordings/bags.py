@@ -13,21 +13,17 @@ import shutil
 import sqlite3
 import struct
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, NamedTuple
 
 import mcap.records
-import numpy as np
 import zstandard
 from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
 from mcap.stream_reader import StreamReader
 from rosbags import rosbag1
-from rosbags.serde import SerdeError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -35,17 +31,8 @@ from selfmodel.errors import InputError
 from selfmodel.files import check_regular, file_digest, read_file
 from selfmodel.isolation import RECORDING_SECONDS, Message, run_isolated
 from selfmodel.logs.recordings import messages
-from selfmodel.logs.recordings.recording import (
-    MAX_TIME,
-    Column,
-    Recording,
-    Series,
-    packed,
-    unpacked,
-)
-
-if TYPE_CHECKING:
-    from selfmodel.arrays import FloatArray
+from selfmodel.logs.recordings.recording import Recording, packed, unpacked
+from selfmodel.logs.recordings.topics import McapTopics, Stored, Topic
 
 _EXPECTED = "give a bag's folder, or its .mcap, .db3 or .bag"
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -73,14 +60,14 @@ def read_bag(path: Path, topics: Mapping[str, Collection[str]] | None = None) ->
 def read_in_child(request: Message) -> Message:
     """Task of the child process; see ``read_bag``."""
     path, wanted = Path(request.header["path"]), request.header["topics"]
-    topics: dict[str, _Topic] = {}
+    topics: dict[str, Topic] = {}
     files = bag_files(path)
     place, found = count(), _Found()
     for file in files:
-        with _explained(file):
+        with explained(file):
             for item in _stored(file, found):
                 columns = () if wanted is None else wanted.get(item.topic)
-                topics.setdefault(item.topic, _Topic()).add(item, next(place), columns)
+                topics.setdefault(item.topic, Topic()).add(item, next(place), columns)
     series = {name: topic.series() for name, topic in topics.items()}
     return packed(Recording(series, found.digests, tuple(found.notes)))
 
@@ -92,10 +79,7 @@ def bag_files(path: Path) -> list[Path]:
         return [path]
     metadata = path / "metadata.yaml"
     if not metadata.exists():
-        storage = [file for file in path.iterdir() if _STORAGE.search(file.name) and file.is_file()]
-        if not storage:
-            raise InputError(f"{path}: expected a bag, got a folder without one: {_EXPECTED}")
-        return sorted(storage, key=_natural)
+        return files_in(path)
     advice = "add what is missing, or remove it to read the files that are there"
     data = read_file(metadata, "a list of files", 2**20)
     try:
@@ -114,22 +98,20 @@ def bag_files(path: Path) -> list[Path]:
     return files
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def files_in(folder: Path) -> list[Path]:
+    """Returns the files in a folder that have messages, in the order of the numbers in names."""
+    storage = [file for file in folder.iterdir() if _STORAGE.search(file.name) and file.is_file()]
+    if not storage:
+        raise InputError(f"{folder}: expected a bag, got a folder without one: {_EXPECTED}")
+    return sorted(storage, key=in_order)
+
+
+def in_order(path: Path) -> list[tuple[int, str]]:
+    """Returns the key by which files are in the order of the numbers in their names."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split(r"(\d+)", path.name)]
 
 
 # ---------------------------------------------------------------- files
-
-
-class _Stored(NamedTuple):
-    """Message in a file, or without ``data`` the announcement of its topic."""
-
-    topic: str
-    type: str
-    encoding: str
-    definition: str = ""
-    time: int = 0
-    data: bytes | None = None
 
 
 @dataclass(frozen=True)
@@ -140,7 +122,7 @@ class _Found:
     notes: list[str] = field(default_factory=list)
 
 
-def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
+def _stored(file: Path, found: _Found) -> Iterator[Stored]:
     """Yields topics and messages of a file in any format, compressed or not."""
     with file.open("rb") as opened:
         head = opened.read(16)
@@ -154,10 +136,7 @@ def _stored(file: Path, found: _Found) -> Iterator[_Stored]:
         return
     for magic, (read, _) in _FORMATS.items():
         if head.startswith(magic):
-            for item in read(file, found):
-                if not (isinstance(item.time, int) and 0 <= item.time < MAX_TIME):
-                    raise ValueError(f"a message has the log time {item.time!r} ns")
-                yield item
+            yield from read(file, found)
             return
     raise InputError(f"{file}: expected a recording of ROS, got another file: {_EXPECTED}")
 
@@ -182,41 +161,27 @@ class _HashedReader(io.BufferedReader):
         return self._hash.hexdigest()
 
 
-def _mcap(file: Path, found: _Found) -> Iterator[_Stored]:
-    types, topics = {0: ("", "")}, {}
-    number, claimed = 0, None
+def _mcap(file: Path, found: _Found) -> Iterator[Stored]:
+    topics, claimed = McapTopics(), None
     with _HashedReader(file) as opened:
         # No record is larger than its file.
         reader = StreamReader(opened, validate_crcs=True, record_size_limit=opened.size)
         try:
             for record in reader.records:
-                match record:
-                    case mcap.records.Schema():
-                        types[record.id] = record.name, messages.text(record.encoding, record.data)
-                    case mcap.records.Channel():
-                        kind, text = types.get(record.schema_id, ("", ""))
-                        encoding = record.message_encoding
-                        topics[record.id] = _Stored(record.topic, kind, encoding, text)
-                        yield topics[record.id]
-                    case mcap.records.Message():
-                        number += 1
-                        topic = topics[record.channel_id]
-                        yield topic._replace(time=record.log_time, data=record.data)
-                    case mcap.records.Statistics():
-                        claimed = record.message_count
+                if isinstance(record, mcap.records.Statistics):
+                    claimed = record.message_count
+                if item := topics.stored(record):
+                    yield item
             if opened.read(1):
                 raise ValueError("bytes follow its end")
         except (EndOfFile, RecordLengthLimitExceeded, struct.error) as failure:
             is_too_long = isinstance(failure, RecordLengthLimitExceeded)
             if _is_closed(file) or (opened.read(1) and not is_too_long):
                 raise
-            found.notes.append(
-                f"{file.name} has no end, as one that is still being recorded, or whose recorder "
-                f"was stopped: {number} messages are read, up to the last whole one"
-            )
+            found.notes.append(topics.cut(file))
         # The library skips records of a damaged type: their messages would be missing silently.
-        if claimed not in (None, number):
-            raise ValueError(f"its statistics have {claimed} messages, its records {number}")
+        if claimed not in (None, topics.count):
+            raise ValueError(f"its statistics have {claimed} messages, its records {topics.count}")
         found.digests[file.name] = opened.hexdigest()
 
 
@@ -226,7 +191,7 @@ def _is_closed(file: Path) -> bool:
         return opened.read() == _MCAP_MAGIC
 
 
-def _sqlite(file: Path, found: _Found) -> Iterator[_Stored]:
+def _sqlite(file: Path, found: _Found) -> Iterator[Stored]:
     log, journal = (file.with_name(file.name + suffix) for suffix in ("-wal", "-journal"))
     if _has_data(journal):  # SQLite deletes the file that a journal names as its super-journal
         raise InputError(
@@ -256,7 +221,7 @@ def _has_data(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0
 
 
-def _rows(file: Path) -> Iterator[_Stored]:
+def _rows(file: Path) -> Iterator[Stored]:
     # Immutable: SQLite cannot create its lock files on a read-only disk.
     address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as database:
@@ -274,7 +239,7 @@ def _rows(file: Path) -> Iterator[_Stored]:
         defined = {str(kind): messages.text(e, str(text).encode()) for kind, e, text in definitions}
         texts = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         topics = {
-            number: _Stored(str(n), str(t), str(e), defined.get(str(t), ""))
+            number: Stored(str(n), str(t), str(e), defined.get(str(t), ""))
             for number, n, t, e in database.execute(texts)
         }
         yield from topics.values()
@@ -283,11 +248,11 @@ def _rows(file: Path) -> Iterator[_Stored]:
             yield topics[number]._replace(time=time, data=bytes(memoryview(data)))
 
 
-def _ros1(file: Path, found: _Found) -> Iterator[_Stored]:
+def _ros1(file: Path, found: _Found) -> Iterator[Stored]:
     found.digests[file.name] = file_digest(file)  # the library reads from many places
     with rosbag1.Reader(file) as reader:
         topics = {
-            c.id: _Stored(c.topic, c.msgtype, messages.ROS1, c.msgdef.data)
+            c.id: Stored(c.topic, c.msgtype, messages.ROS1, c.msgdef.data)
             for c in reader.connections
         }
         yield from topics.values()
@@ -304,7 +269,7 @@ def _ros1(file: Path, found: _Found) -> Iterator[_Stored]:
             raise ValueError(f"its chunks have {claimed} messages, its index {number}")
 
 
-_FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[_Stored]], str]] = {
+_FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[Stored]], str]] = {
     _MCAP_MAGIC: (_mcap, "mcap recover"),
     b"SQLite format 3\0": (_sqlite, "sqlite3 FILE .recover"),
     b"#ROSBAG V": (_ros1, "rosbag reindex"),
@@ -313,7 +278,8 @@ _FORMATS: Mapping[bytes, tuple[Callable[[Path, _Found], Iterator[_Stored]], str]
 
 
 @contextmanager
-def _explained(file: Path) -> Iterator[None]:
+def explained(file: Path) -> Iterator[None]:
+    """Makes any error of the libraries that read a file one that says what to do."""
     try:
         yield
     except (InputError, MemoryError):
@@ -329,85 +295,3 @@ def _explained(file: Path) -> Iterator[None]:
             f"{file}: the bag is damaged, or ends too early: {reason}: record it again, or recover "
             f"its intact part with the tool of its format, {tools}"
         ) from failure
-
-
-# ---------------------------------------------------------------- topics
-
-
-@dataclass
-class _Topic:
-    """Topic of a bag, with the messages that were decoded.
-
-    Attributes:
-        types: Message types, one in nearly every bag.
-        times: Time stamp (0 without one) and log time of each decoded message, ns, and its place
-            in the bag.
-        layouts: Indices and rows of these by the names in them, nearly always the same.
-        refused: Numbers of messages left out, by reason.
-        listed: Columns to decode of the messages after the first.
-        absent: Those that the first does not have: a list in another one may be longer.
-    """
-
-    types: dict[str, None] = field(default_factory=dict)
-    count: int = 0
-    times: list[tuple[int, int, int]] = field(default_factory=list)
-    layouts: dict[tuple[str, ...], list[tuple[int, "FloatArray"]]] = field(default_factory=dict)
-    refused: Counter[str] = field(default_factory=Counter)
-    listed: tuple[str, ...] = ()
-    absent: frozenset[str] = frozenset()
-
-    def add(self, item: _Stored, place: int, columns: Collection[str] | None) -> None:
-        """Adds a message, or an announcement; ``columns`` of it, all if empty, or None."""
-        package, _, name = item.type.rpartition("/")
-        kind = item.type if package.endswith("/msg") else f"{package}/msg/{name}"  # old bags
-        known = item.encoding in (messages.CDR, messages.ROS1)
-        self.types[(kind if package else name) + ("" if known else f" in {item.encoding!r}")] = None
-        if item.data is None:
-            return
-        self.count += 1
-        by_place = kind not in messages.DECODERS
-        is_done = by_place and self.layouts and not self.listed
-        if columns is None or not known or not package or is_done:
-            return
-        try:
-            stamp, (names, rows) = messages.decode(
-                item.data, kind, item.encoding, item.definition, self.listed
-            )
-        except (messages.UndefinedError, SerdeError) as failure:
-            # Only a suggestion decodes what nobody has asked for.
-            if isinstance(failure, SerdeError) and (columns or not by_place):
-                raise
-            return
-        except messages.RefusedError as refused:
-            self.refused[str(refused)] += 1
-            return
-        if by_place and not self.layouts:
-            self.listed = tuple(columns)
-            self.absent = frozenset(columns) - set(names)
-            rows = np.append(rows, np.full((len(self.absent), 1), np.nan), axis=0)
-            names = (*names, *sorted(self.absent))
-        if names or not by_place:
-            self.layouts.setdefault(names, []).append((len(self.times), rows))
-            self.times.append((stamp, item.time, place))
-
-    def series(self) -> Series:
-        """Returns the messages as arrays; a column may be in messages of several layouts."""
-        parts: dict[str, list[Column]] = {}
-        for names, decoded in self.layouts.items():
-            indices, blocks = zip(*decoded, strict=True)
-            index, rows = np.array(indices, dtype=np.int64), np.array(blocks)
-            for k, name in enumerate(names):
-                parts.setdefault(name, []).append(Column(index, rows[:, k]))
-        columns = {}
-        for name, some in parts.items():
-            index = np.concatenate([part.index for part in some])
-            order = np.argsort(index)
-            values = np.concatenate([part.values for part in some])
-            if name not in self.absent or not np.isnan(values).all():
-                columns[name] = Column(index[order], values[order])
-        stamps, logged, places = np.array(self.times, dtype=np.int64).reshape(-1, 3).T
-        kind, names, count = " and ".join(self.types), tuple(columns), self.count
-        by_place = bool(columns) and not self.types.keys() & messages.DECODERS.keys()
-        return Series(
-            kind, count, stamps, logged, places, names, columns, self.refused, by_place=by_place
-        )

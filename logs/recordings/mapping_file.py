@@ -33,6 +33,14 @@ class RecordingMapping:
         """Places by quantity and part; see ``Trial.places``."""
         return dict(self.trial.places())
 
+    @property
+    def topics(self) -> dict[str, set[str]]:
+        """Columns by topic."""
+        found: dict[str, set[str]] = {}
+        for place in self.places.values():
+            found.setdefault(place.topic, set()).update(place.columns)
+        return found
+
     def error(self, path: Keys, sentence: str) -> InputError:
         """Returns an error that names the line of an entry, or that of its table."""
         return _error(self.name, self.text, path, sentence)

@@ -55,6 +55,19 @@ class Track:
             return self  # 0 would change the sign of a zero
         return Track(self.times, self.values * scale + offset)
 
+    def joined(self, later: "Track") -> "Track":
+        """Returns the track with values that were recorded later, but may have earlier times."""
+        if not (len(self) and len(later)):
+            return self if len(self) else later
+        times = np.concatenate([self.times, later.times])
+        times, first = np.unique(times, return_index=True)
+        return Track(times, np.concatenate([self.values, later.values])[first])
+
+    def since(self, time: int) -> "Track":
+        """Returns the track from the last value before a time on, ns."""
+        first = max(0, int(np.searchsorted(self.times, time)) - 1)
+        return Track(self.times[first:], self.values[first:])
+
 
 NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
 
@@ -107,17 +120,39 @@ Method = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 limits (``reach``): ``(steps, width)``."""
 
 
-def at_steps(track: Track, origin: int, steps: IntArray, method: Method, width: int) -> FloatArray:
-    """Returns a track at times after the first step, the origin, ns; NaN where not observed.
+@dataclass(frozen=True, eq=False)
+class ControlSteps:
+    """Control steps of a trial.
+
+    Attributes:
+        origin: Time of the first step of the trial, ns.
+        timestep: Control time step, s.
+        numbers: Numbers of the steps, from 0, ``(steps,)``.
+    """
+
+    origin: int
+    timestep: float
+    numbers: IntArray
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Times of the steps, ``(steps,)`` s."""
+        return self.numbers.astype(np.float64) * self.timestep
+
+
+def at_steps(track: Track, steps: ControlSteps, method: Method, width: int) -> FloatArray:
+    """Returns a track at control steps; NaN where not observed.
 
     Returns:
         Numbers of the quantity, ``(steps, width)``.
     """
     if not len(track):
-        return np.full((len(steps), width), np.nan)
+        return np.full((len(steps.numbers), width), np.nan)
     # float64 represents nanoseconds exactly for a hundred days.
-    times = (track.times - origin).astype(np.float64)
-    return method(times, track.values, steps.astype(np.float64), reach(times, float(steps[1])))
+    times = (track.times - steps.origin).astype(np.float64)
+    period = steps.timestep * 1e9
+    at = np.rint(steps.numbers * period)
+    return method(times, track.values, at, reach(times, float(np.rint(period))))
 
 
 def reach(times: FloatArray | IntArray, step: float = 0.0) -> FloatArray:

@@ -32,7 +32,7 @@ def chosen_run(
     found = {}  # places in the recording of the messages with which the clock of a topic restarts
     for topic, clock in clocks.items():
         usable = np.flatnonzero(clock.usable)
-        first_ones = usable[[*_restarts(clock.times[usable])]]
+        first_ones = usable[[*restarts(clock.times[usable])]]
         found[topic] = recording.series[topic].places[first_ones]
     most = max(map(len, found.values()))
     if not most and run in (None, 1):
@@ -61,7 +61,8 @@ def chosen_run(
     )
 
 
-def _restarts(times: IntArray) -> Iterator[int]:
+def restarts(times: IntArray) -> Iterator[int]:
+    """Yields the places at which the clock of a topic restarts, in the order of the recording."""
     if len(times) <= _SUCCESSION:
         return
     forward = np.diff(times) >= 0

@@ -203,13 +203,16 @@ class Diagnose(FromLogs):
 class WatchLog(Command):
     """Watch a robot through its trial log: alarms, since when, and which single fault explains it.
 
-    With --follow, the log may be one that is being written. Findings are JSON lines unless standard
-    output is a terminal; with --out, they are diagnostics of ROS 2 too, and the steps around the
-    change are a trial log.
+    With --mapping, it is a recording of ROS or a table, as for `selfmodel logs import`. With
+    --follow, it may be one that is being written, a recording as MCAP. Findings are JSON lines
+    unless standard output is a terminal; with --out, they are diagnostics of ROS 2 too, and the
+    steps around the change are a trial log.
     """
 
     file: Path
     healthy: list[Path]
+    mapping: Path | None = None
+    run: int | None = None
     follow: bool = False
     out: Path | None = None
     kinds: str = "default"

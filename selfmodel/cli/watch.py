@@ -1,19 +1,22 @@
-"""``selfmodel watch``: findings about a robot while its trial log is written, or from one."""
+"""``selfmodel watch``: findings about a robot while its log is written, or from a finished one."""
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import chain
 
 from selfmodel import arguments, plugins
 from selfmodel.cli.commands import WatchLog
 from selfmodel.cli.output import print_json, print_lines, print_notes
-from selfmodel.errors import counted
+from selfmodel.errors import InputError, counted
 from selfmodel.logs.growing import GrowingLog
-from selfmodel.logs.writer import FLUSH_STEPS
-from selfmodel.trials.trajectory import Sample
+from selfmodel.logs.recordings.growing import GrowingBag
+from selfmodel.logs.recordings.importer import import_recording
+from selfmodel.logs.recordings.mapping_file import read_mapping
+from selfmodel.robot.robot import Robot
+from selfmodel.trials.trajectory import Sample, samples_of
 from selfmodel.watching.finding import ENDS, Finding
 from selfmodel.watching.record import AFTER, WatchRecord
 from selfmodel.watching.watch import Watch
@@ -21,12 +24,12 @@ from selfmodel.watching.watch import Watch
 POLL = 0.05
 """Time between two looks at a log that grows, s."""
 
-MOST_NEW = 2 * FLUSH_STEPS
-"""New steps that a look may find: a trial is written in parts of ``FLUSH_STEPS``."""
-
 SILENCE = 2.0
-"""Time without a step after which the input is stale, s, or that of ``MOST_NEW`` steps if it is
-longer: a trial at 50 Hz is written in parts of 1 s, and ROS's aggregator waits 5 s for a status."""
+"""Time without a step after which the input is stale, s, or that of the steps that a look may find
+if it is longer: a trial at 50 Hz is written in parts of 1 s, and ROS's aggregator waits 5 s."""
+
+Steps = Iterator[Sample | float]
+"""Steps in order, and the time for which none came, s, once it is that of a silence."""
 
 
 def watch(options: WatchLog) -> None:
@@ -38,12 +41,11 @@ def watch(options: WatchLog) -> None:
     robot = arguments.robot_of_logs(logs, options.self_model)
     as_lines = sys.stdout.isatty() and not options.as_json
     with ExitStack() as files:
-        log = files.enter_context(GrowingLog(options.file, robot.anatomy.names))
+        steps, start = _opened(options, robot, files)
         record = None
         if options.out is not None:  # a diagnosis of the black box takes the healthy logs, too
             own = arguments.robot_of_logs(logs, None)
             record = files.enter_context(WatchRecord(options.out, own))
-        first = log.new_steps()  # a file that is no log of the robot is refused before the fit
         watched = Watch(
             robot,
             [one.trial for one in logs],
@@ -52,16 +54,15 @@ def watch(options: WatchLog) -> None:
             calibrate=options.calibrate,
             threads=options.threads,
         )
-        silence = max(SILENCE, MOST_NEW * robot.control_timestep) if options.follow else None
         until = None
-        for step, findings in _watched(watched, chain(first, _steps(log, silence)), silence):
+        for step, findings in _watched(watched, steps):
             for finding in findings:
                 if as_lines:
                     print_lines(str(finding))
                 else:
                     print_json(finding.to_dict(), indent=None)
             if record is not None:
-                record.add(step, findings, log.start)
+                record.add(step, findings, start())
             if findings and findings[-1].status in ENDS:
                 until = findings[-1].time + (0.0 if record is None else AFTER)
             if until is not None and (step is None or step.time >= until):
@@ -70,47 +71,72 @@ def watch(options: WatchLog) -> None:
         print_notes(record.note)
 
 
-def _watched(
-    watched: Watch, steps: Iterator[Sample | None], silence: float | None
-) -> Iterator[tuple[Sample | None, Sequence[Finding]]]:
+def _opened(options: WatchLog, robot: Robot, files: ExitStack) -> tuple[Steps, Callable[[], int]]:
+    """Opens a log or a recording, of which a first look refuses what is none.
+
+    Returns:
+        Its steps, and what returns the time stamp of the first one, ns.
+    """
+    follow, mapping = options.follow, options.mapping
+    if options.run is not None and (follow or mapping is None):
+        raise InputError("--run is for a finished recording: it needs --mapping, without --follow")
+    if mapping is not None and not follow:
+        found = import_recording(options.file, read_mapping(mapping), robot, options.run)
+        for note in found.notes:
+            _note(note)
+        return samples_of(found.trajectory), lambda: found.origin
+    log: GrowingLog | GrowingBag
+    if mapping is None:
+        log = GrowingLog(options.file, robot.anatomy.names)
+    else:
+        log = GrowingBag(options.file, read_mapping(mapping), robot, _note)
+    files.enter_context(closing(log))
+    steps = _steps(log, robot.control_timestep, follow=follow)
+    return chain(log.new_steps(), steps), lambda: log.start
+
+
+def _note(sentence: str) -> None:
+    print_notes(f"note: {sentence}")
+
+
+def _watched(watched: Watch, steps: Steps) -> Iterator[tuple[Sample | None, Sequence[Finding]]]:
     """Yields the steps with their findings; None is a silence, after which the last one is said."""
     last, is_stale, now = None, False, 0.0
     for step in steps:
         found: Sequence[Finding]
-        if step is None:
+        if isinstance(step, float):
             is_stale = last is None or last.status not in ENDS
-            found = [Finding(now, "stale", f"no step for {silence:g} s")] if is_stale else []
-        else:
-            found, now = watched.update(step), round(step.time, 6)
-            if is_stale and last is not None:
-                found = [replace(last, time=now), *found]
-            last, is_stale = found[-1] if found else last, False
+            found = [Finding(now, "stale", f"no step for {step:g} s")] if is_stale else []
+            yield None, found
+            continue
+        found, now = watched.update(step), round(step.time, 6)
+        if is_stale and last is not None:
+            found = [replace(last, time=now), *found]
+        last, is_stale = found[-1] if found else last, False
         yield step, found
 
 
-def _steps(log: GrowingLog, silence: float | None) -> Iterator[Sample | None]:
-    """Yields the further steps of a log in order.
-
-    With a silence, s, they are awaited, and None is yielded once if none came for that time.
-    """
+def _steps(log: GrowingLog | GrowingBag, timestep: float, *, follow: bool) -> Steps:
+    """Yields the further steps of a log; if it is followed, as they are written."""
     has_caught_up, is_behind = False, False
     heard: float | None = time.monotonic()
     while not log.has_ended:
         new = log.new_steps()
-        was_behind, is_behind = is_behind, has_caught_up and len(new) > MOST_NEW
+        was_behind, is_behind = is_behind, has_caught_up and len(new) > log.most_new
         if is_behind and not was_behind:
-            print_notes(f"note: behind by {counted(len(new), 'step')}")
+            _note(f"behind by {counted(len(new), 'step')}")
         yield from new
         if new:
             heard = time.monotonic()
         if new or log.has_ended:
             continue
-        if silence is None:
-            print_notes(f"note: {log.path} has no end: it is cut, or --follow waits for what comes")
+        if not follow:
+            _note(f"{log.path} has no end: it is cut, or --follow waits for what comes")
             return
         has_caught_up = True
+        silence = max(SILENCE, log.most_new * timestep)
         if heard is not None and time.monotonic() - heard >= silence:
             heard = None
-            yield None
+            yield silence
         time.sleep(POLL)
     print_notes(f"{log.path}: {counted(log.steps, 'step')}")

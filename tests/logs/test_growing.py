@@ -1,6 +1,6 @@
 """A log that is read while it is written: each step once, as soon as it is on the disk."""
 
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +34,7 @@ def test_each_step_is_read_once_as_soon_as_it_is_written(
     path, read = tmp_path / "a.mcap", list[Sample]()
     header, written = TrialHeader(Settings(), timed=clock), ExitStack()
     writer = written.enter_context(TrialWriter(path, biped, plan_of(biped, STEPS), header))
-    with GrowingLog(path, biped.anatomy.names) as growing:
+    with closing(GrowingLog(path, biped.anatomy.names)) as growing:
         assert growing.path.suffix == ".part"
         for count, step in enumerate(steps, start=1):
             writer.add(step)
@@ -55,7 +55,7 @@ def test_the_time_stamp_of_the_first_step_is_that_of_the_recording(
     imported = Imported({"start": str(start)}, "") if start else None
     header, steps = TrialHeader(Settings(), imported=imported), made_up(biped, STEPS)
     path = write_trial(tmp_path / "a.mcap", biped, plan_of(biped, STEPS), steps, header)
-    with GrowingLog(path, biped.anatomy.names) as growing:
+    with closing(GrowingLog(path, biped.anatomy.names)) as growing:
         growing.new_steps()
         assert growing.start == start
 
@@ -65,12 +65,15 @@ def test_a_log_that_is_cut_anywhere_grows_to_the_same_steps(
 ):
     data, part, read = log.read_bytes(), tmp_path / "b.mcap.part", list[Sample]()
     part.write_bytes(data[:8])
-    with GrowingLog(tmp_path / "b.mcap", biped.anatomy.names) as growing, part.open("ab") as file:
+    with (
+        closing(GrowingLog(tmp_path / "b.mcap", biped.anatomy.names)) as growing,
+        part.open("ab") as file,
+    ):
         for begin in range(8, len(data), 997):
             file.write(data[begin : begin + 997])
             file.flush()
             read += growing.new_steps()
-    with GrowingLog(log, biped.anatomy.names) as finished:
+    with closing(GrowingLog(log, biped.anatomy.names)) as finished:
         assert_equal(read, finished.new_steps())
     assert len(read) == STEPS
 
@@ -82,13 +85,19 @@ def test_a_damaged_chunk_a_log_of_another_robot_and_no_log_are_refused(
     data = bytearray(log.read_bytes())
     data[len(data) // 2] ^= 0x10
     bad.write_bytes(data)
-    with GrowingLog(bad, names) as growing, pytest.raises(CorruptError, match="logs salvage"):
+    with (
+        closing(GrowingLog(bad, names)) as growing,
+        pytest.raises(CorruptError, match="logs salvage"),
+    ):
         growing.new_steps()
     other = Names(names.sensors, names.motors, ("left_hip_x",))
-    with GrowingLog(log, other) as growing, pytest.raises(InputError, match="of another robot"):
+    with (
+        closing(GrowingLog(log, other)) as growing,
+        pytest.raises(InputError, match="of another robot"),
+    ):
         growing.new_steps()
     bad.write_text("nothing")
-    with pytest.raises(NotMcapError), GrowingLog(bad, names):
-        pass
+    with closing(GrowingLog(bad, names)) as growing, pytest.raises(NotMcapError):
+        growing.new_steps()
     with pytest.raises(InputError, match="finished or being written"):
         GrowingLog(tmp_path / "none.mcap", names)

@@ -19,10 +19,12 @@ from selfmodel.logs.records import TrialHeader
 from selfmodel.logs.writer import TrialWriter, write_trial
 from selfmodel.robot.robot import Robot
 from selfmodel.settings import Settings
-from selfmodel.trials.trajectory import Sample, StepTiming
+from selfmodel.trials.trajectory import Sample, StepTiming, collect
 from selfmodel.trials.trial import TrialPlan
 from selfmodel.watching.record import AFTER, BLACK_BOX, FINDINGS
-from tests.helpers.command import Done, succeeds
+from tests.helpers.command import Done, refused, succeeds
+from tests.logs.recordings.bags import storage
+from tests.logs.recordings.driver import mapping, record
 from tests.watching.conftest import stream, trial_of, walk
 
 pytestmark = pytest.mark.search
@@ -194,3 +196,34 @@ def test_a_robot_that_stops_after_its_fault_is_not_waited_for(
 
     assert statuses(done)[-1] == "explained"
     assert (folder / "stopped" / BLACK_BOX).exists()
+
+
+def test_a_recording_is_watched_by_its_mapping_also_while_it_grows(
+    run: Run, folder: Path, quadruped: Robot, failed: list[Sample], monkeypatch: pytest.MonkeyPatch
+):
+    bag = record(folder / "bag", quadruped, collect(quadruped.anatomy.names, failed))
+    (folder / "map.toml").write_text(mapping(quadruped, STEPS - 10, None))
+    finished = run("bag", "--mapping", "map.toml")
+
+    data, grown = storage(bag).read_bytes(), folder / "grown.mcap"
+    grown.write_bytes(data[:50_000])
+    size = len(data) // 20
+
+    def written_meanwhile(_seconds: float) -> None:
+        done = grown.stat().st_size
+        grown.write_bytes(data[: done + size])
+
+    monkeypatch.setattr(watch.time, "sleep", written_meanwhile)
+    followed = run("grown.mcap", "--mapping", "map.toml", "--follow")
+
+    assert statuses(finished)[-1] == "explained"
+    assert "jam:back_right_knee" in finished.stdout.splitlines()[-1]
+    assert followed.stdout == finished.stdout
+    assert "note: not observed at all: joint_efforts" in finished.stderr
+    assert "note" not in followed.stderr
+
+
+def test_a_run_of_a_recording_is_one_of_a_finished_recording(folder: Path):
+    said = "--run is for a finished recording: it needs --mapping, without --follow"
+    for given in (["--run", "2"], ["--mapping", "map.toml", "--follow", "--run", "2"]):
+        refused("watch", "a.mcap", "--healthy", "healthy.mcap", *given, said=said, cwd=folder)
