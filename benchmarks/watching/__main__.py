@@ -87,7 +87,9 @@ def healthy(machine: Machine, key: Row) -> Row:
                 alarms.append([step.time, *finding.shown_by])
             status = finding.status
             if status in ENDS:
-                causes.append(f"{status} {finding.remaining[0].hypothesis}")
+                causes.append(
+                    " ".join([status, *(str(r.hypothesis) for r in finding.remaining[:1])])
+                )
                 watch.restart()
         judged += status == "watching"
     return {
@@ -106,6 +108,7 @@ def faulty(machine: Machine, key: Row) -> Row:
     start = time.process_time()
     for step in samples_of(trial.trajectory):
         findings += watch.update(step)
+    findings += watch.finish()
     seconds = time.process_time() - start
     alarm = next((one for one in findings if one.status == "changed"), None)
     last = findings[-1]

@@ -70,6 +70,7 @@ def watched(recording: Recording) -> Row:
     watch, rows = Watch(recording.robot, recording.healthy), recording.trial.trajectory
     fitted = time.process_time()
     findings = [one for step in samples_of(rows) for one in watch.update(step)]
+    findings += watch.finish()
     return {
         "findings": [str(one).strip() for one in findings],
         "length": round(float(rows.time[-1]), 2),

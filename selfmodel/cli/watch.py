@@ -114,6 +114,8 @@ def _watched(watched: Watch, steps: Steps) -> Iterator[tuple[Sample | None, Sequ
             found = [replace(last, time=now), *found]
         last, is_stale = found[-1] if found else last, False
         yield step, found
+    if found := watched.finish():
+        yield None, found
 
 
 def _steps(log: GrowingLog | GrowingBag, timestep: float, *, follow: bool) -> Steps:

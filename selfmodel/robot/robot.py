@@ -105,7 +105,7 @@ class Robot:
 
     @property
     def has_unknown_ground(self) -> bool:
-        """Whether the ground is of the import, and no calibration has fitted its contacts."""
+        """Whether the ground is of the import, and no calibration was made on the real one."""
         return custom_numeric(self.model, UNKNOWN_GROUND) is not None and not self.is_calibrated
 
     @property

@@ -1,13 +1,14 @@
 """A bank of single faults, whose losses since a change are kept up to date segment by segment."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
+from selfmodel.comparators.segment_prediction import SegmentPrediction
 from selfmodel.diagnosis import significance
-from selfmodel.diagnosis.comparator import Comparator
 from selfmodel.diagnosis.direct_evidence import observed_faults, standing_joints
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -18,7 +19,10 @@ from selfmodel.trials.trial import Trial, TrialPart
 from selfmodel.watching.finding import Rated
 
 AT_ONCE = 8
-"""Hypotheses that are simulated in one control step, at most."""
+"""Hypotheses that are simulated in one control step, or as many as keep up with the segments."""
+
+MAX_PIECES = 40
+"""Segments since a change after which the hypotheses that are left are the answer."""
 
 
 class Bank:
@@ -41,12 +45,13 @@ class Bank:
     def __init__(
         self,
         simulator: Simulator,
-        comparator: Comparator,
+        comparator: SegmentPrediction,
         space: HypothesisSpace,
         since: Trial,
         hinges: Sequence[int],
     ) -> None:
         self._table, self.hinges = LossTable(simulator, comparator), list(hinges)
+        self._horizon = comparator.horizon
         anatomy = space.anatomy
         standing = standing_joints([since], anatomy)
         observed = observed_faults([since], anatomy, standing)
@@ -64,8 +69,14 @@ class Bank:
         return len(self._compared)
 
     def add(self, segment: TrialPart) -> None:
-        """Adds a segment since the change."""
-        self._new.append(segment)
+        """Adds a segment since the change, unless there are enough."""
+        if self.segments + len(self._new) < MAX_PIECES:
+            self._new.append(segment)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there are segments by which the hypotheses are not compared yet."""
+        return bool(self._new)
 
     def advance(self) -> Sequence[Rated]:
         """Simulates a few hypotheses, and once all were, returns those that are left, best first.
@@ -79,16 +90,19 @@ class Bank:
         while True:
             while not self._new:
                 yield ()
-            every = list(dict.fromkeys([*self._left, INTACT]))
-            new, self._new = self._new, []
+            every, new = list(dict.fromkeys([*self._left, INTACT])), [*self._new]
+            size = max(AT_ONCE, math.ceil(len(every) / self._horizon))
             for part in new:
-                for first in range(0, len(every), AT_ONCE):
+                for first in range(0, len(every), size):
                     yield ()
-                    self._table.losses(every[first : first + AT_ONCE], [part])
-            segments = [*self._compared, *new]
-            if rated := self._rated(every, segments):
-                self._compared = segments
-            yield rated
+                    self._table.losses(every[first : first + size], [part])
+            finite = [part for part in new if self._is_finite(every, part)]
+            del self._new[: len(new)]
+            self._compared += finite
+            yield self._rated(every, self._compared) if finite else ()
+
+    def _is_finite(self, every: Sequence[Hypothesis], part: TrialPart) -> bool:
+        return bool(np.isfinite(self._table.losses(every, [part])).any())
 
     def _rated(self, every: Sequence[Hypothesis], segments: Sequence[TrialPart]) -> list[Rated]:
         """Returns the hypotheses that are left, and forgets the others."""
@@ -100,8 +114,6 @@ class Bank:
         # The first row is of the comparator, the others are of hinges, (1 + hinges, pieces).
         rows = np.concatenate([losses[:, np.newaxis], at_hinges.swapaxes(1, 2)], axis=1)
         self._losses = dict(zip(every, rows, strict=True))
-        if not np.isfinite(losses.sum(axis=1)).any():
-            return []
         order = sorted(self._left, key=lambda one: float(self._losses[one][0].sum()))
         best = order[0]
         for one in order:

@@ -116,4 +116,4 @@ def _parts(fault: Fault, anatomy: Anatomy) -> set[str]:
 def _code(hypothesis: Hypothesis) -> str:
     """Returns the kind and the part of each fault, whatever its severity, in capitals."""
     faults = sorted(f"{kind.name} {part}" for kind, part in hypothesis.without_severities)
-    return re.sub(r"\W+", "_", " ".join(faults), flags=re.ASCII).strip("_").upper()
+    return re.sub(r"\W+", "_", " ".join(faults)).strip("_").upper()

@@ -24,7 +24,7 @@ from selfmodel.settings import Settings
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import TrialPlan
 from selfmodel.watching.diagnostics import PartStatus, part_statuses
-from selfmodel.watching.finding import Finding
+from selfmodel.watching.finding import ENDS, Finding
 
 FINDINGS, BLACK_BOX = "findings.mcap", "black-box.mcap"
 
@@ -65,7 +65,8 @@ class WatchRecord:
         self._robot = robot
         self._steps: deque[Sample] = deque(maxlen=round(KEPT / robot.control_timestep))
         self._said: Template | None = None
-        self._has_changed, self.note = False, ""
+        self._has_changed = self._has_ended = False
+        self.note = ""
         self._messages = self._due = 0
         self._log = LogFile(folder / FINDINGS)
         self._channel = self._log.channel(DIAGNOSTICS, DIAGNOSTICS_TYPE)
@@ -85,16 +86,16 @@ class WatchRecord:
         with safety.hold_stop_signals():
             if step is not None:
                 self._steps.append(step)
+            now = start + round(self._steps[-1].time * 1e9 if self._steps else 0)
             for finding in findings:
                 self._said = _array(part_statuses(self._robot, finding))
-                self._publish(self._said, start + round(finding.time * 1e9))
+                self._publish(self._said, now)
                 self._log.flush()
-                if finding.status != "stale":
-                    self._has_changed = finding.onset is not None
-            if step is not None and self._said is not None:
-                now = start + round(step.time * 1e9)
-                if now >= self._due:
-                    self._publish(self._said, now)
+                self._has_ended |= finding.status in ENDS
+                if finding.status != "stale":  # a false alarm leaves no black box
+                    self._has_changed = finding.onset is not None or self._has_ended
+            if step is not None and self._said is not None and now >= self._due:
+                self._publish(self._said, now)
 
     def _publish(self, said: Template, now: int) -> None:
         (payload,) = said.encode(np.array([now]), _NO_NUMBERS)
@@ -104,7 +105,11 @@ class WatchRecord:
     def _write_black_box(self) -> None:
         """Writes the steps that are kept, from the first with all commands on, as a trial."""
         commands = np.stack([one.values["commands"] for one in self._steps])
-        first = int(np.isfinite(commands).all(axis=1).argmax())
+        known = np.isfinite(commands).all(axis=1)
+        if not known.any():
+            self.note = f"{self._black_box} is not written: the last steps have no commands"
+            return
+        first = int(known.argmax())
         steps, timestep = list(self._steps)[first:], self._robot.control_timestep
         driver = played_back(self._robot.anatomy.motors, commands[first:])
         plan = TrialPlan("black-box", "single", driver, len(steps), seed=0)

@@ -2,10 +2,11 @@
 
 The scores of the segments of each half of the healthy trials are **held out**: the self-model that
 predicts them is fitted to the other halves. The p-value of a score of a watched robot is its rank
-among them; beyond the largest, that of a Pareto tail whose index is Hill's estimate of the largest
-tenth. Its **e-value** is proportional to 1 / p down to ``SMALLEST_P``. The expected value of a
-healthy score is at most 1 if it is exchangeable with those and the tail is right, on average over
-healthy trials; given some of them, it may be larger, the more the fewer they are.
+among them; beyond the largest, its predictive probability by the largest tenth, if these have a
+Pareto tail of unknown index. Its **e-value** is proportional to 1 / p down to ``SMALLEST_P``. The
+expected value of a healthy score is at most 1 if it is exchangeable with those and the tail is
+right, on average over healthy trials; given some of them, it may be larger, the more the fewer they
+are.
 
 Besides, neighbouring segments depend on each other, and gaits differ in how well they are
 predicted. So a score is first divided by a **margin** of its channel: the smallest with which no
@@ -16,11 +17,11 @@ logarithms, which is lower than theirs. The margin has to absorb all that; no pr
 does.
 
 Sources: Shafer, "Testing by betting", Journal of the Royal Statistical Society A 184 (2021), for
-e-values of p-values; Hill, "A simple general approach to inference about the tail of a
-distribution", Annals of Statistics 3 (1975).
+e-values of p-values. The predictive tail is the posterior mean over the index, whose prior is
+proportional to its inverse.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -34,7 +35,7 @@ from selfmodel.diagnosis.significance import LOSS_FLOOR
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trajectory import Trajectory, samples_of
+from selfmodel.trials.trajectory import Sample, StepTiming, Trajectory, samples_of
 from selfmodel.trials.trial import Trial
 from selfmodel.watching.segments import Window, scores_of
 
@@ -49,10 +50,10 @@ DEPENDENT = 8
 
 SMALLEST_P = 1e-4
 """Smallest p-value: with it, an alarm needs two segments or more. The delays and the false alarms
-of four robots were about the same from 1e-3 to 1e-5 (docs/results/watching.md)."""
+of four robots were about the same from 1e-4 to 1e-6."""
 
 TAIL = 0.1
-"""Share of the healthy scores, the largest, whose tail is continued."""
+"""Share of the healthy scores, the largest, that tell how their tail goes on."""
 
 MARGINS = tuple(float(1.25**power) for power in range(1, 16))
 """Margins that are tried, up to 28; the smallest is that of the speeds of commands."""
@@ -66,7 +67,6 @@ class Reference:
         robot: The self-model, fitted.
         channels: Names of the scores.
         scores: Held-out scores of each channel in increasing order, ``(n, channels)``.
-        tails: Index of the Pareto tail of each channel, ``(channels,)``; 0 without one.
         margins: Factor by which a score may be larger than those, ``(channels,)``.
         loss: Median held-out loss of the comparator.
         speeds: Largest speed of each motor's commands, per s, ``(motors,)``.
@@ -77,7 +77,6 @@ class Reference:
     robot: Robot
     channels: tuple[str, ...]
     scores: FloatArray
-    tails: FloatArray
     margins: FloatArray
     loss: float
     speeds: FloatArray
@@ -86,8 +85,8 @@ class Reference:
 
     def log_e_values(self, scores: FloatArray) -> FloatArray:
         """Returns the logarithms of the e-values of a segment; 0 for what was not observed."""
-        channels = zip(_allowed(scores, self.margins), self.scores.T, self.tails, strict=True)
-        logs = np.array([_log_e_values(own, healthy, tail) for own, healthy, tail in channels])
+        channels = zip(_allowed(scores, self.margins), self.scores.T, strict=True)
+        logs = np.array([_log_e_values(own, healthy) for own, healthy in channels])
         return np.where(np.isnan(scores), 0.0, logs)
 
     def loss_with(self, hinges: Sequence[int]) -> float:
@@ -136,7 +135,7 @@ def reference_of(
         simulator = Simulator(fitted([each[others] for each in halves]), threads=1)
         for half in (each[held_out] for each in halves):
             window, scores = Window(robot, comparator.horizon), list[FloatArray]()
-            for newest in filter(None, map(window.add, samples_of(half.trajectory))):
+            for newest in filter(None, map(window.add, _steps_of(half.trajectory))):
                 with suppress(TrialRefusedError):
                     own, channels = scores_of(simulator, comparator, newest)
                     # A healthy robot may lack a value at times; its watch says nothing then.
@@ -144,7 +143,7 @@ def reference_of(
             if scores:
                 count = max(1, round(len(scores) / STRETCH))
                 stretches += np.array_split(np.array(scores), count)
-    if (count := sum(map(len, stretches))) < MIN_HELD_OUT:
+    if (count := sum(map(len, stretches))) < MIN_HELD_OUT or len(stretches) == 1:
         needed = MIN_HELD_OUT + 2 * len(trials) * MIN_SEGMENTS
         seconds = needed * comparator.horizon * robot.control_timestep
         raise InputError(
@@ -153,14 +152,12 @@ def reference_of(
         )
     lowest, highest, speeds = _extent([trial.trajectory for trial in trials])
     names, every = robot.anatomy.names, np.concatenate(stretches)
-    tails = np.array([_tail_index(column) for column in every.T])
     first_signal = len(names.hinges) + len(names.sensors)
     return Reference(
         robot=fitted(trials),
         channels=channels,
         scores=np.sort(every, axis=0),
-        tails=tails,
-        margins=_margins(stretches, tails),
+        margins=_margins(stretches),
         loss=float(np.median(every[:, first_signal:].sum(axis=1))),
         speeds=speeds,
         lowest=lowest,
@@ -178,30 +175,26 @@ def _halves(trial: Trial) -> list[Trial]:
     ]
 
 
-def _tail_index(scores: FloatArray) -> float:
-    """Returns Hill's estimate of the index of the tail of some scores; 0 without one."""
-    ordered = np.sort(scores)[::-1]
-    count = max(1, round(TAIL * len(ordered)))
-    if not 0.0 < ordered[count] < ordered[0] < np.inf:
-        return 0.0
-    return float(1.0 / np.log(ordered[:count] / ordered[count]).mean())
+def _steps_of(trajectory: Trajectory) -> Iterator[Sample]:
+    late = [None] * trajectory.steps if trajectory.late is None else trajectory.late.tolist()
+    for sample, is_late in zip(samples_of(trajectory), late, strict=True):
+        moment = None if is_late is None else StepTiming(sample.time, is_late, missing=False)
+        yield replace(sample, moment=moment)
 
 
-def _margins(stretches: Sequence[FloatArray], tails: FloatArray) -> FloatArray:
+def _margins(stretches: Sequence[FloatArray]) -> FloatArray:
     """Returns the margin of each channel; see the module."""
+    columns = zip(*(scores.T for scores in stretches), strict=True)
     return np.array(
-        [
-            next((m for m in MARGINS if _is_enough(m, tail, own)), MARGINS[-1])
-            for tail, *own in zip(tails, *(scores.T for scores in stretches), strict=True)
-        ]
+        [next((m for m in MARGINS if _is_enough(m, own)), MARGINS[-1]) for own in columns]
     )
 
 
-def _is_enough(margin: float, tail: float, stretches: Sequence[FloatArray]) -> bool:
+def _is_enough(margin: float, stretches: Sequence[FloatArray]) -> bool:
     """Returns whether no stretch is evidence against the others."""
     for number, own in enumerate(stretches):
         others = np.sort(np.concatenate([*stretches[:number], *stretches[number + 1 :]]))
-        logs_of = _log_e_values(_allowed(own, margin), others, tail)
+        logs_of = _log_e_values(_allowed(own, margin), others)
         sums = np.append(0.0, np.cumsum(logs_of))
         for length in range(1, min(DEPENDENT, len(own)) + 1):
             logs = sums[length:] - sums[:-length]
@@ -215,14 +208,17 @@ def _allowed(scores: FloatArray, margin: FloatArray | float) -> FloatArray:
     return np.asarray(np.maximum(scores / margin - LOSS_FLOOR, 0.0))
 
 
-def _log_e_values(scores: FloatArray, healthy: FloatArray, tail: float) -> FloatArray:
+def _log_e_values(scores: FloatArray, healthy: FloatArray) -> FloatArray:
     """Returns the logarithms of the e-values of scores, by healthy ones in increasing order."""
-    above = len(healthy) - np.searchsorted(healthy, scores)
-    p = (above + 1) / (len(healthy) + 1)
-    with np.errstate(divide="ignore", invalid="ignore"):  # scores of 0, and infinite ones
-        beyond = np.where(scores > healthy[-1], scores / healthy[-1], 1.0)
-    p = np.maximum(p * beyond**-tail, SMALLEST_P)
-    return np.asarray(-np.log(p) - np.log(1.0 - np.log(SMALLEST_P)))
+    above, n = len(healthy) - np.searchsorted(healthy, scores), len(healthy)
+    largest = healthy[-max(1, round(TAIL * n)) - 1 :]
+    p, count = (above + 1) / (n + 1), len(largest) - 1
+    if 0.0 < largest[0] < largest[-1] < np.inf:
+        spread = np.log(largest[1:] / largest[0]).sum()
+        beyond = np.log(np.maximum(scores, largest[-1]) / largest[0]) / spread
+        tail = (count + 1) / (n + 1) * (1.0 + beyond) ** -count
+        p = np.where(scores > largest[-1], np.minimum(p, tail), p)
+    return np.asarray(-np.log(np.maximum(p, SMALLEST_P)) - np.log(1.0 - np.log(SMALLEST_P)))
 
 
 def _extent(trajectories: Sequence[Trajectory]) -> tuple[FloatArray, FloatArray, FloatArray]:

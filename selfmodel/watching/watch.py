@@ -24,7 +24,7 @@ from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator, thread_count
 from selfmodel.trials.trajectory import Sample
 from selfmodel.trials.trial import Trial, TrialPart
-from selfmodel.watching.bank import Bank
+from selfmodel.watching.bank import MAX_PIECES, Bank
 from selfmodel.watching.detector import MEMORY, Detector
 from selfmodel.watching.finding import ENDS, Finding, Rated, Status
 from selfmodel.watching.reference import reference_of
@@ -33,9 +33,8 @@ from selfmodel.watching.segments import Window, last_segment, scores_of
 SEGMENT = 0.12
 """Length of a segment, s, at any control time step."""
 
-FIRST_PIECES, MAX_PIECES = 4, 40
-"""Segments since a change from which on causes are compared, and after which those that are left
-are the answer."""
+FIRST_PIECES = 4
+"""Segments since a change from which on causes are compared."""
 
 PAUSE = 8
 """Segments that the healthy trials have to cover before the robot is judged again: a motion of
@@ -72,7 +71,7 @@ class Watch:
     Args:
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
         healthy: Trials of the healthy robot, or paths of their logs, in the motions that are to be
-            judged: the first half of each fits the self-model, the second half shows its errors.
+            judged. The errors in each half are those of a self-model fitted to the other halves.
         kinds: Fault kinds of the causes, or names of kinds and of their sets, in a sequence or
             separated by commas.
         false_alarm_every: Mean time between false alarms that the threshold aims at, s of motions
@@ -133,11 +132,16 @@ class Watch:
             return ()
         if self._status != "changed":
             return () if newest is None else tuple(self._judge(newest))
-        if newest is not None:
-            self._add(newest)
-        if self._bank is None or not (remaining := self._bank.advance()):
-            return ()
-        return tuple(self._compared(remaining, self._bank))
+        if newest is not None and (found := self._add(newest)):
+            return found
+        return self._advanced()
+
+    def finish(self) -> tuple[Finding, ...]:
+        """Returns what the steps so far say about the cause of a change: no other step comes."""
+        found: tuple[Finding, ...] = ()
+        while self._status == "changed" and self._bank is not None and self._bank.is_busy:
+            found += self._advanced()
+        return found
 
     def restart(self) -> None:
         """Begins anew with the next step, at time 0: of another log, or of a repaired robot."""
@@ -152,7 +156,7 @@ class Watch:
         self._ends: deque[float] = deque(maxlen=MEMORY + 1)
         self._change = Finding(0.0, "watching")
         self._bank: Bank | None = None
-        self._since = 0
+        self._since = self._refused = 0
         self._named: tuple[object, ...] = ()
 
     def _judge(self, newest: Trial) -> list[Finding]:
@@ -197,16 +201,19 @@ class Watch:
     def _shown_by(self) -> tuple[str, ...]:
         return tuple(self._reference.channels[k] for k in self._detector.shown_by())
 
-    def _add(self, newest: Trial) -> None:
+    def _add(self, newest: Trial) -> tuple[Finding, ...]:
         """Adds a segment after a change; the first ones also date it anew."""
         try:
             if self._bank is not None:
                 last_segment(self.robot, self._comparator, newest)
                 self._bank.add(self._part(newest))
-                return
+                return ()
             scores, _ = scores_of(self._simulator, self._comparator, newest)
-        except TrialRefusedError:
-            return
+        except TrialRefusedError as error:
+            self._refused += 1
+            if self._refused < MAX_PIECES:
+                return ()
+            return (self._about("unexplained", (), f"since the change, {error.reason}"),)
         self._since += 1
         self._has_alarm(newest, scores)
         if self._since >= FIRST_PIECES:
@@ -219,6 +226,13 @@ class Watch:
             for one in segments:
                 bank.add(one)
             self._bank = bank
+        return ()
+
+    def _advanced(self) -> tuple[Finding, ...]:
+        """Simulates a few causes, and returns what is new about them."""
+        if self._bank is None or not (remaining := self._bank.advance()):
+            return ()
+        return tuple(self._compared(remaining, self._bank))
 
     def _compared(self, remaining: Sequence[Rated], bank: Bank) -> list[Finding]:
         """Returns what is new about the cause, by the hypotheses that are left."""

@@ -89,7 +89,7 @@ def test_a_base_that_was_not_observed_tilts_by_half_of_the_joints_deviation(
     assert found.delays == assumed_uncertainty(quadruped).delays
 
 
-def test_the_contacts_with_a_ground_that_no_file_has_are_unknown_until_a_calibration_fits_them(
+def test_a_ground_that_no_file_has_is_unknown_until_a_calibration(
     quadruped: Robot,
 ):
     spec = quadruped.specification()
