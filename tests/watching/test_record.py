@@ -153,6 +153,31 @@ def test_there_is_a_black_box_of_a_change_that_was_no_false_alarm_even_if_it_is_
     assert not list(tmp_path.glob("*.part"))
 
 
+def test_there_is_a_black_box_of_a_watch_that_ended_and_began_anew(
+    tmp_path: Path, quadruped: Robot, steps: list[Sample]
+):
+    """The times of the new watch begin at 0, the stamps are those of the steps."""
+    with WatchRecord(tmp_path, quadruped) as written:
+        for step in steps:
+            found = [one for one in (CHANGED, explained(quadruped)) if one.time == step.time]
+            written.add(step, found if step.time != 3.0 else [WATCHING], START)
+
+    stamps = [stamp for stamp, _ in messages(tmp_path / FINDINGS)]
+    assert stamps == sorted(stamps)
+    assert (tmp_path / BLACK_BOX).exists()
+
+
+def test_steps_without_any_command_are_no_black_box(
+    tmp_path: Path, quadruped: Robot, steps: list[Sample]
+):
+    unknown = {"commands": np.full(len(quadruped.anatomy.motors), np.nan)}
+    blind = [replace(one, values={**one.values, **unknown}) for one in steps]
+    written = recorded(tmp_path, quadruped, blind, [CHANGED, explained(quadruped)])
+
+    assert "the last steps have no commands" in written.note
+    assert not (tmp_path / BLACK_BOX).exists()
+
+
 def test_without_a_finding_there_is_no_file_and_another_record_is_kept(
     tmp_path: Path, quadruped: Robot, steps: list[Sample]
 ):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Sample
@@ -107,6 +108,61 @@ def test_a_robot_without_odometry_is_watched_by_its_onboard_sensors(
 
     assert last.status == "explained"
     assert str(last.remaining[0].hypothesis).startswith("jam:back_right_knee")
+
+
+def test_a_log_that_ends_soon_after_a_change_is_answered_by_its_end(
+    watch: Watch, quadruped: Robot, healthy: list[Sample]
+):
+    failed = stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 54)[BEFORE:]
+    *_, before = findings(watch, [*healthy[:BEFORE], *failed])
+    last = watch.finish()[-1]
+
+    assert (before.status, before.remaining) == ("changed", ())
+    assert str(last.remaining[0].hypothesis).startswith("jam:back_right_knee")
+    assert watch.finish() == ()
+
+
+def test_a_watch_whose_segments_lack_a_signal_after_a_change_ends_and_says_so(
+    watch: Watch, quadruped: Robot, healthy: list[Sample]
+):
+    failed = stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 640)[BEFORE:]
+    lost = {"base_orientation": np.full(4, np.nan)}
+    blind = [replace(one, values={**one.values, **lost}) for one in failed[24:]]
+    _, alarm, *_, last = findings(watch, [*healthy[:BEFORE], *failed[:24], *blind])
+
+    assert (alarm.status, last.status) == ("changed", "unexplained")
+    assert "base_orientation" in last.reason
+
+
+def test_a_segment_in_which_all_simulations_diverge_is_left_out_alone(
+    watch: Watch, quadruped: Robot, healthy: list[Sample], monkeypatch: pytest.MonkeyPatch
+):
+    of_table, added = LossTable.losses, list[object]()
+
+    def losses(table: LossTable, some: list[object], parts: list[object]) -> np.ndarray:
+        found = of_table(table, some, parts)  # type: ignore[arg-type]
+        added.extend(part for part in parts if part not in added)
+        bad = [k for k, part in enumerate(parts) if added.index(part) % 4 == 3]
+        found[:, bad] = np.inf
+        return found
+
+    monkeypatch.setattr(LossTable, "losses", losses)
+    failed = stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 400)[BEFORE:]
+    *_, last = findings(watch, [*healthy[:BEFORE], *failed])
+
+    assert last.status == "explained"
+    assert str(last.remaining[0].hypothesis).startswith("jam:back_right_knee")
+
+
+def test_late_steps_of_healthy_trials_are_no_part_of_what_is_healthy(
+    quadruped: Robot, healthy: list[Sample]
+):
+    trial = trial_of(quadruped, healthy)
+    late = (np.arange(trial.trajectory.steps) > 600) & (np.arange(len(healthy)) % 12 == 5)
+    disturbed = replace(trial, trajectory=replace(trial.trajectory, late=late))
+
+    with pytest.raises(InputError, match=r"50 segments without late steps, got 4"):
+        Watch(quadruped, disturbed, calibrate=False)
 
 
 def test_healthy_trials_that_are_too_short_are_refused(quadruped: Robot, healthy: list[Sample]):
