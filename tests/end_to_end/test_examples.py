@@ -61,6 +61,19 @@ def test_lanes_are_drawn_with_the_opengl_that_works_of_itself(tmp_path: Path):
     assert min(np.sum(each > 20) for each in (blue, red, green)) > 500  # beside the caption
 
 
+@pytest.mark.process
+def test_a_robot_that_breaks_while_it_is_watched_is_explained(tmp_path: Path):
+    walk = ("trial", "quadruped", "--controller", "cpg", "--gap", "0.05", "--steps", "2400")
+    logged = selfmodel(*walk, "--out", "healthy.mcap", cwd=tmp_path)
+    told = run("watch_a_robot.py", "healthy.mcap", cwd=tmp_path)
+    first, alarm, *_, last = told.splitlines()
+
+    assert logged.returncode == 0, logged.stderr
+    assert "watching" in first
+    assert 4.0 < float(alarm.split()[0]) < 5.0
+    assert last.endswith("the limb has come off at the joint front_left_knee")
+
+
 def turning(rate: float) -> np.ndarray:
     """Orientations of a base that turns to the left, rad/s."""
     half = np.arange(1000) * 0.01 * rate / 2
