@@ -252,7 +252,7 @@ def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:
         60
 
     Args:
-        trial: The trial, or the path of its log; its step timing is not written.
+        trial: The trial, or the path of its log; of its step timing, what is late is written.
         path: Name of the log, ``NAME.mcap``; it must not exist.
         robot: The nominal robot, its name, or the path of its MJCF or URDF file.
 
@@ -266,7 +266,7 @@ def write_log(trial: TrialSource, path: str | Path, robot: RobotSource) -> Path:
         arguments.load_robot(robot),
         trial.plan,
         samples_of(trial.trajectory),
-        TrialHeader(Settings()),
+        TrialHeader(Settings(), timed=trial.trajectory.late is not None),
     )
 
 

@@ -173,9 +173,13 @@ class Trajectory:
 
 
 def samples_of(trajectory: Trajectory) -> Iterator[Sample]:
-    """Yields the samples of the trajectory of one run, without its step timing."""
-    for k, time in enumerate(trajectory.time.tolist()):
-        yield Sample(time, {signal: values[k] for signal, values in trajectory.signals.items()})
+    """Yields the samples of the trajectory of one run; of their timing, they have what is late."""
+    moments: Sequence[StepTiming | None] = [None] * trajectory.steps
+    if trajectory.late is not None:
+        moments = [StepTiming(np.nan, late, missing=False) for late in trajectory.late.tolist()]
+    for k, (time, moment) in enumerate(zip(trajectory.time.tolist(), moments, strict=True)):
+        values = {signal: rows[k] for signal, rows in trajectory.signals.items()}
+        yield Sample(time, values, moment)
 
 
 def collect(names: Names, samples: Iterable[Sample]) -> Trajectory:

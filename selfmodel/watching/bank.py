@@ -84,7 +84,7 @@ class Bank:
         What is left is not significantly worse than the best. Of those that differ in severities
         alone, the best one is returned. A segment in which all simulations diverge says nothing.
         """
-        return next(self._work, ())
+        return next(self._work)
 
     def _compare(self) -> Iterator[Sequence[Rated]]:
         while True:

@@ -21,7 +21,7 @@ e-values of p-values. The predictive tail is the posterior mean over the index, 
 proportional to its inverse.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ from selfmodel.diagnosis.significance import LOSS_FLOOR
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
-from selfmodel.trials.trajectory import Sample, StepTiming, Trajectory, samples_of
+from selfmodel.trials.trajectory import Trajectory, samples_of
 from selfmodel.trials.trial import Trial
 from selfmodel.watching.segments import Window, scores_of
 
@@ -135,7 +135,7 @@ def reference_of(
         simulator = Simulator(fitted([each[others] for each in halves]), threads=1)
         for half in (each[held_out] for each in halves):
             window, scores = Window(robot, comparator.horizon), list[FloatArray]()
-            for newest in filter(None, map(window.add, _steps_of(half.trajectory))):
+            for newest in filter(None, map(window.add, samples_of(half.trajectory))):
                 with suppress(TrialRefusedError):
                     own, channels = scores_of(simulator, comparator, newest)
                     # A healthy robot may lack a value at times; its watch says nothing then.
@@ -173,13 +173,6 @@ def _halves(trial: Trial) -> list[Trial]:
         replace(trial, trajectory=half, path=f"{trial.path}, {name} half")
         for name, half in (("first", rows.first(middle)), ("second", second))
     ]
-
-
-def _steps_of(trajectory: Trajectory) -> Iterator[Sample]:
-    late = [None] * trajectory.steps if trajectory.late is None else trajectory.late.tolist()
-    for sample, is_late in zip(samples_of(trajectory), late, strict=True):
-        moment = None if is_late is None else StepTiming(sample.time, is_late, missing=False)
-        yield replace(sample, moment=moment)
 
 
 def _margins(stretches: Sequence[FloatArray]) -> FloatArray:

@@ -133,15 +133,15 @@ class Watch:
         if self._status != "changed":
             return () if newest is None else tuple(self._judge(newest))
         if newest is not None and (found := self._add(newest)):
-            return found
-        return self._advanced()
+            return tuple(found)
+        return tuple(self._advanced())
 
     def finish(self) -> tuple[Finding, ...]:
         """Returns what the steps so far say about the cause of a change: no other step comes."""
-        found: tuple[Finding, ...] = ()
+        found = list[Finding]()
         while self._status == "changed" and self._bank is not None and self._bank.is_busy:
             found += self._advanced()
-        return found
+        return tuple(found)
 
     def restart(self) -> None:
         """Begins anew with the next step, at time 0: of another log, or of a repaired robot."""
@@ -201,38 +201,44 @@ class Watch:
     def _shown_by(self) -> tuple[str, ...]:
         return tuple(self._reference.channels[k] for k in self._detector.shown_by())
 
-    def _add(self, newest: Trial) -> tuple[Finding, ...]:
+    def _add(self, newest: Trial) -> list[Finding]:
         """Adds a segment after a change; the first ones also date it anew."""
         try:
             if self._bank is not None:
                 last_segment(self.robot, self._comparator, newest)
                 self._bank.add(self._part(newest))
-                return ()
-            scores, _ = scores_of(self._simulator, self._comparator, newest)
+            else:
+                scores, _ = scores_of(self._simulator, self._comparator, newest)
+                self._since += 1
+                self._has_alarm(newest, scores)
+                if self._since >= FIRST_PIECES:
+                    self._bank = self._new_bank()
         except TrialRefusedError as error:
             self._refused += 1
             if self._refused < MAX_PIECES:
-                return ()
-            return (self._about("unexplained", (), f"since the change, {error.reason}"),)
-        self._since += 1
-        self._has_alarm(newest, scores)
-        if self._since >= FIRST_PIECES:
-            segments = [*self._recent][-self._since :]
-            since = self._window.trial(len(segments) * self._horizon + 1)
-            self._change = dataclasses.replace(self._change, shown_by=self._shown_by())
-            hinges = self.robot.anatomy.hinges
-            shown = [hinges.index(name) for name in self._change.shown_by if name in hinges]
-            bank = Bank(self._simulator, self._comparator, self._space, since, shown)
-            for one in segments:
-                bank.add(one)
-            self._bank = bank
-        return ()
+                return []
+            reason = f"the last {MAX_PIECES} segments cannot be used: {error.reason}"
+            return [self._about("unexplained", (), reason)]
+        self._refused = 0
+        return []
 
-    def _advanced(self) -> tuple[Finding, ...]:
+    def _new_bank(self) -> Bank:
+        """Returns the causes, with the segments since the change."""
+        segments = [*self._recent][-self._since :]
+        since = self._window.trial(len(segments) * self._horizon + 1)
+        self._change = dataclasses.replace(self._change, shown_by=self._shown_by())
+        hinges = self.robot.anatomy.hinges
+        shown = [hinges.index(name) for name in self._change.shown_by if name in hinges]
+        bank = Bank(self._simulator, self._comparator, self._space, since, shown)
+        for one in segments:
+            bank.add(one)
+        return bank
+
+    def _advanced(self) -> list[Finding]:
         """Simulates a few causes, and returns what is new about them."""
         if self._bank is None or not (remaining := self._bank.advance()):
-            return ()
-        return tuple(self._compared(remaining, self._bank))
+            return []
+        return self._compared(remaining, self._bank)
 
     def _compared(self, remaining: Sequence[Rated], bank: Bank) -> list[Finding]:
         """Returns what is new about the cause, by the hypotheses that are left."""

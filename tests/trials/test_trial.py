@@ -136,6 +136,15 @@ def test_a_trial_of_the_arrays_of_a_log_is_that_of_the_log(quadruped: Robot, tmp
     assert trial.content == logged.content == selfmodel.read_log(again).trial.content
 
 
+def test_a_copy_of_a_log_has_its_late_steps(biped: Robot, tmp_path: Path):  # noqa: F811
+    one = Trial.from_arrays(biped, **arrays(biped))
+    late = np.arange(one.trajectory.steps) % 3 == 1
+    disturbed = dataclasses.replace(one, trajectory=dataclasses.replace(one.trajectory, late=late))
+    again = selfmodel.read_log(selfmodel.write_log(disturbed, tmp_path / "a.mcap", biped)).trial
+
+    assert again.content == disturbed.content != one.content
+
+
 def test_a_trial_is_known_by_what_was_run_and_observed_and_not_by_its_path(biped: Robot):  # noqa: F811
     one = Trial.from_arrays(biped, **arrays(biped))
     signals = dict(one.trajectory.signals)

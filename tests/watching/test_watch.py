@@ -10,7 +10,9 @@ from selfmodel.diagnosis.losses import LossTable
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.trials.trajectory import Sample
-from selfmodel.watching import Finding, Watch
+from selfmodel.trials.trial import TrialPart
+from selfmodel.watching import Finding, Watch, bank
+from selfmodel.watching.bank import Bank
 from tests.watching.conftest import stream, trial_of
 
 pytestmark = pytest.mark.search
@@ -147,11 +149,30 @@ def test_a_segment_in_which_all_simulations_diverge_is_left_out_alone(
         return found
 
     monkeypatch.setattr(LossTable, "losses", losses)
+    compared, add = list[int](), Bank.add
+
+    def counted(bank: Bank, part: TrialPart) -> None:
+        compared.append(bank.segments)
+        add(bank, part)
+
+    monkeypatch.setattr(Bank, "add", counted)
     failed = stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 400)[BEFORE:]
     *_, last = findings(watch, [*healthy[:BEFORE], *failed])
 
     assert last.status == "explained"
     assert str(last.remaining[0].hypothesis).startswith("jam:back_right_knee")
+    assert len(compared) * 3 / 4 - max(compared) <= 2  # of each four, one says nothing
+
+
+def test_causes_that_are_simulated_one_at_a_time_keep_up_with_the_segments(
+    watch: Watch, quadruped: Robot, healthy: list[Sample], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(bank, "AT_ONCE", 1)
+    failed = stream(quadruped, "jam:back_right_knee=0.3", BEFORE + 400)[BEFORE:]
+    *_, last = findings(watch, [*healthy[:BEFORE], *failed])
+
+    assert last.status == "explained"
+    assert last.time < BEFORE * quadruped.control_timestep + 2.0  # 3.5 s at one in each step
 
 
 def test_late_steps_of_healthy_trials_are_no_part_of_what_is_healthy(
