@@ -398,14 +398,19 @@ def refit_reason(accused: Hypothesis, problem: Problem) -> str:
     """Returns why a self-model that is fitted to all trials leaves a doubt; empty without.
 
     It leaves one if it predicts neither the trials significantly worse than the fault does, nor the
-    healthy trials significantly worse than the self-model that is fitted to them alone.
+    healthy trials significantly worse than the self-model that is fitted to them alone. A fault of
+    readings alone, which no fit changes, is compared by the same refit: errors of motion cancel.
     """
     if (refit := problem.refitted(INTACT)) is None:
         return f"the trials are too short for a fit that could explain them without {accused}"
     known, fitted = problem.table.losses, refit.table.losses
+    with_fault = known if len(accused.dynamics_part) else fitted  # no parameter changes a reading
     is_needed = any(
-        significance.is_better(known([fault], trials)[0], fitted([INTACT], trials)[0])
-        for fault, trials in ((accused, problem.trials), (INTACT, problem.healthy_trials))
+        significance.is_better(by([fault], trials)[0], fitted([INTACT], trials)[0])
+        for by, fault, trials in (
+            (with_fault, accused, problem.trials),
+            (known, INTACT, problem.healthy_trials),
+        )
     )
     without = f"a self-model that is fitted to all trials predicts them as well without {accused}"
     return "" if is_needed else without

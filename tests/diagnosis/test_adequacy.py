@@ -358,6 +358,19 @@ def test_speeds_are_those_of_commands_by_joint(table: LossTable, quadruped: Robo
     assert faster_joints(other.trials, other) == {}
 
 
+def test_no_refit_explains_a_dead_sensor(table: LossTable, real: Robot, healthy: list[Trial]):
+    problem = problem_of(table, moved(real, "third", truth=DEAD), healthy, refit=real)
+    dead, (trial,) = parse(DEAD, problem.space.anatomy), problem.trials
+    ((by_fault,), (by_refit,)) = (
+        table.losses([dead], [trial]),
+        table_of(real).losses([INTACT], [trial]),
+    )
+
+    assert by_refit.mean() < by_fault.mean()  # the refit has the robot's motion
+    assert doubted(problem, DEAD) is None
+    assert doubted(problem, "sensor:back_right_touch") is not None
+
+
 def test_the_refit_is_to_the_healthy_trials_and_those_to_explain(
     table: LossTable, healthy: list[Trial], weak: Trial, weaker: Robot
 ):
