@@ -146,9 +146,6 @@ def unsearched_fault(best: Hypothesis, problem: Problem) -> UnsearchedFault | No
         healthy = problem.healthy([problem.space.canonical([fault]), INTACT])
         if healthy is None:
             continue
-        # A reading that healthy trials predict better with the fault is predicted badly as such.
-        if not fault.kind.affects_dynamics and significance.is_better(*healthy):
-            continue
         is_gain = significance.gain_exceeds_healthy_gain(losses, best_losses, *healthy)
         if is_gain and fault not in candidate.lacking(supported(candidate, problem)[0]):
             better[fault.kind.name] = candidate

@@ -159,8 +159,10 @@ def gain_exceeds_healthy_gain(
 ) -> bool:
     """Returns whether a gain is significant, and significantly larger than on healthy trials.
 
-    An equal gain on healthy trials is a correction of model error. Both tests require
-    ``MIN_Z_ACROSS_TRIALS`` standard errors, because hundreds of hypotheses are tested.
+    An equal gain on healthy trials is a correction of model error. So is a smaller one that is
+    significant, since the trials may load a part more; a fault that came later makes healthy trials
+    worse. The first two tests require ``MIN_Z_ACROSS_TRIALS`` standard errors, because hundreds of
+    hypotheses are tested.
 
     Args:
         one: Losses of the better hypothesis on the damaged trials, ``(pieces,)``.
@@ -169,6 +171,8 @@ def gain_exceeds_healthy_gain(
         healthy_other: As ``other``, on the healthy trials.
     """
     if not (is_gain(one, other) and _are_comparable(healthy_one, healthy_other)):
+        return False
+    if is_better(healthy_one, healthy_other):
         return False
     _, more, error = _gains(one, other, healthy_one, healthy_other)
     return more >= MIN_Z_ACROSS_TRIALS * error

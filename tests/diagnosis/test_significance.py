@@ -141,7 +141,8 @@ def test_what_became_better_did_so_by_five_standard_errors(errors: float, told: 
 def at_the_edge(errors: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Losses, gains on healthy trials, and gains that exceed them by some standard errors."""
     rng = np.random.default_rng(2)
-    one, gain, earlier = rng.normal(10, 1, 80), rng.normal(1, 0.3, 80), rng.normal(0.9, 0.3, 40)
+    one, gain, earlier = rng.normal(10, 1, 80), rng.normal(0.2, 0.3, 80), rng.normal(0.1, 0.3, 40)
+    assert 0 < paired_z(earlier, np.zeros(40)) < MIN_Z
     z = stats.ttest_ind(gain, earlier, equal_var=False).statistic
     assert 0 < z < errors
     return one, earlier, gain + (errors - z) * (gain.mean() - earlier.mean()) / z
@@ -156,6 +157,14 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     assert paired_z(one + gain, one) > MIN_Z_ACROSS_TRIALS
     assert not gain_exceeds_healthy_gain(one, one + gain - 0.002, BEFORE, BEFORE + earlier)
     assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
+
+
+def test_what_was_significantly_better_before_is_no_gain_since_however_large():
+    one, earlier = np.full(40, 10.0), of_mean_and_error(MIN_Z * 0.1, 0.1)
+
+    for margin, told in ((-0.01, True), (0.01, False)):
+        before = np.full(100, 10.0), 10.0 + earlier + margin
+        assert gain_exceeds_healthy_gain(one, one + 5.0 + 0.01 * np.arange(40), *before) == told
 
 
 @pytest.mark.parametrize("has_helped", [False, True])
