@@ -57,9 +57,9 @@ MAX_JOINTS = 3
 """Joints that are named, the fastest relative to the healthy trials first."""
 
 REMEDY = (
-    "record this robot again, {}, and repeat the diagnosis with the new log. Or record a healthy "
-    "robot of the same type, moving as this one did, and repeat the diagnosis with its log too "
-    "(--healthy FILE)"
+    "record this robot again, {}, and diagnose the new log in place of this one. Or send the "
+    "commands of this robot to a healthy one of the same type, and repeat the diagnosis with its "
+    "log as one more healthy one (--healthy FILE, beside the others)"
 )
 """What decides on a doubt: trials that a user can have of a robot that is damaged now."""
 
@@ -229,7 +229,7 @@ def _have_one_gait(trials: Sequence[TrialPart]) -> bool:
 
 def _doubt(reason: str, faster: Mapping[str, tuple[float, float]], problem: Problem) -> Doubt:
     if not faster:
-        return Doubt(reason, REMEDY.format("with the same commands as in the healthy log"))
+        return Doubt(reason, REMEDY.format("with the commands of a healthy log"))
     joint, (speed, covered) = next(iter(faster.items()))
     listed = "; ".join(
         f"{joint}: commands up to {speed:.2g} rad/s, healthy {covered:.2g}"
