@@ -57,6 +57,8 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     leads = {}
     for one in by_total_loss(others, problem.losses):
         lead = significance.lead(*problem.losses([best, one]))
+        if one == INTACT:
+            lead = max(lead, problem.contrast(best))
         if problem.has_joints:
             lead = max(lead, lead_at_joints(best, one, problem))
         if lead < significance.MIN_Z and search.any_fault_is_model_error(one, problem):
