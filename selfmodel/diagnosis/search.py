@@ -17,8 +17,8 @@ of distances is 10 % larger. The local search:
    total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A
    hypothesis has at most as many faults as a genome has genes.
 3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
-   not significantly better (``significance.is_better``), or its gain is model error
-   (``is_model_error``).
+   not significantly better (``significance.is_better``) nor told by a healthy trial of the same
+   movement (``Problem.contrast``), or its gain is model error (``is_model_error``).
 4. **Second descent** over the neighbours with one fault replaced, then pruning, until a hypothesis
    repeats. Every pruned hypothesis is a local optimum.
 5. **Fit** of each local optimum's severities between the levels, and pruning again.
