@@ -177,7 +177,9 @@ def doubt_of(accused: Hypothesis, fit: Fit, problem: Problem) -> Doubt | None:
             self-model that is not calibrated.
     """
     hardest, healthy = problem.hardest, problem.healthy_trials
-    if problem.calibrate is None or problem.healthy([INTACT]) is None or hardest is None:
+    # In the same movement of a healthy robot, the error of the self-model is on both sides.
+    is_told = problem.contrast(accused) >= significance.MIN_Z_ACROSS_TRIALS
+    if problem.calibrate is None or problem.healthy([INTACT]) is None or hardest is None or is_told:
         return None
     worst, reason = float(hardest.mean()), ""
     if known := sufficient_trials(accused, problem):

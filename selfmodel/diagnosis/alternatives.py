@@ -56,7 +56,10 @@ def leads_of(best: Hypothesis, problem: Problem) -> dict[Hypothesis, float]:
     others = [*filter(is_rival, dict.fromkeys([*few, *fitted, INTACT]))]
     leads = {}
     for one in by_total_loss(others, problem.losses):
-        lead = significance.lead(*problem.losses([best, one]))
+        own, other, intact = problem.losses([best, one, INTACT])
+        lead = significance.lead(own, other)
+        if np.array_equal(other, intact):  # the empty one, and faults without an effect
+            lead = max(lead, problem.contrast(best))
         if problem.has_joints:
             lead = max(lead, lead_at_joints(best, one, problem))
         if lead < significance.MIN_Z and search.any_fault_is_model_error(one, problem):

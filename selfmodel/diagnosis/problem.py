@@ -20,7 +20,7 @@ from selfmodel.faults.kind import Fault
 from selfmodel.progress import Observer, ignore
 from selfmodel.settings import Settings
 from selfmodel.simulation.calibration import Calibration
-from selfmodel.trials.trial import Trial, TrialPart, observed_as, whole
+from selfmodel.trials.trial import Trial, TrialPart, command_difference, observed_as, whole
 
 
 class Calibrate(Protocol):
@@ -37,6 +37,11 @@ MIN_SURROGATE_PIECES = 2
 
 TOLD_APART = (0.2, 0.5)
 """Severities at which the gain of a servo is compared with the torque of its motor."""
+
+SAME_MOVEMENT = 0.05
+"""Largest difference of the commands of one movement, in which the model has the same error. Of 36
+healthy synthetic servos with friction that no model has, which repeated a movement, the largest
+contrast was 0.6, and with 0.8 times its amplitude, a difference of 0.2, 4.2."""
 
 
 @dataclass(eq=False)
@@ -158,6 +163,31 @@ class Problem:
         if not self._is_comparable:
             return None
         return self.table.losses(hypotheses, self.healthy_trials)
+
+    def contrast(self, hypothesis: Hypothesis) -> float:
+        """Returns by how many standard errors a fault gains more here than on healthy trials.
+
+        Those are the trials with the same movement: one robot in both, however wrong its model,
+        gains about as much in either. 0 for several faults, without such a healthy trial for each
+        trial, and with a free base: contacts make two trials of one robot differ.
+        """
+        if len(hypothesis) != 1 or self.space.anatomy.floating_base or not self._repeated:
+            return 0.0
+        pair = [hypothesis, INTACT]
+        return significance.contrast(*self.losses(pair), *self.table.losses(pair, self._repeated))
+
+    @cached_property
+    def _repeated(self) -> list[TrialPart]:
+        """Healthy trials whose movements those to explain repeat; none if one repeats none."""
+        is_repeated = [
+            [
+                self._is_comparable and command_difference(part.rows, own.rows) <= SAME_MOVEMENT
+                for own in self.healthy_trials
+            ]
+            for part in self.trials
+        ]
+        every = [*zip(self._observed, *is_repeated, strict=True)]
+        return [own for own, *by in every if any(by)] if all(map(any, is_repeated)) else []
 
     @cached_property
     def reference(self) -> FloatArray | None:

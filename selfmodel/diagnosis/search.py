@@ -17,8 +17,8 @@ of distances is 10 % larger. The local search:
    total loss falls no further, or a further fault does not improve it by ``MIN_Z_OF_STEP``. A
    hypothesis has at most as many faults as a genome has genes.
 3. **Pruning**: the fault whose removal costs least is removed, as long as the hypothesis with it is
-   not significantly better (``significance.is_better``), or its gain is model error
-   (``is_model_error``).
+   not significantly better (``significance.is_better``) nor told by a healthy trial of the same
+   movement (``Problem.contrast``), or its gain is model error (``is_model_error``).
 4. **Second descent** over the neighbours with one fault replaced, then pruning, until a hypothesis
    repeats. Every pruned hypothesis is a local optimum.
 5. **Fit** of each local optimum's severities between the levels, and pruning again.
@@ -154,7 +154,11 @@ class LocalSearch:
             self.pruned(fitted(optimum, losses=self.coarse))
             for optimum in step([*local_optima], before=2)
         }
-        best = self.pruned(fitted(chosen_of(refits, self.losses), losses=self.losses))
+        contrasting = filter(self._contrasts, refits)
+        chosen = chosen_of(refits, self.losses) or min(
+            contrasting, key=self.total_loss, default=INTACT
+        )
+        best = self.pruned(fitted(chosen, losses=self.losses))
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
 
@@ -292,9 +296,13 @@ class LocalSearch:
 
     def _is_required(self, hypothesis: Hypothesis, fewer: Hypothesis) -> bool:
         """Returns whether the gain of the extra faults is significant and no model error."""
-        return significance.is_better(*self.losses([hypothesis, fewer])) and not is_model_error(
+        is_gain = significance.is_better(*self.losses([hypothesis, fewer]))
+        return (is_gain or self._contrasts(hypothesis)) and not is_model_error(
             hypothesis, fewer, self.problem
         )
+
+    def _contrasts(self, hypothesis: Hypothesis) -> bool:
+        return self.problem.contrast(hypothesis) >= significance.MIN_Z_ACROSS_TRIALS
 
     def _allowed(self, hypotheses: Iterable[Hypothesis]) -> list[Hypothesis]:
         return [one for one in hypotheses if len(one) <= self._max_faults]

@@ -178,6 +178,19 @@ def gain_exceeds_healthy_gain(
     return more >= MIN_Z_ACROSS_TRIALS * error
 
 
+def contrast(
+    one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
+) -> float:
+    """Returns by how many standard errors a gain exceeds that on healthy trials; 0 for no gain.
+
+    The arguments are those of ``gain_exceeds_healthy_gain``.
+    """
+    if not _are_comparable(one, other, healthy_one, healthy_other):
+        return 0.0
+    gain, more, error = _gains(one, other, healthy_one, healthy_other)
+    return more / error if gain > NEGLIGIBLE_LOSS and error > 0 else 0.0
+
+
 def gain_is_model_error(
     one: FloatArray, other: FloatArray, healthy_one: FloatArray, healthy_other: FloatArray
 ) -> bool:

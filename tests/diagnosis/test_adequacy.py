@@ -292,6 +292,17 @@ def test_a_loss_as_small_as_that_of_healthy_trials_has_to_beat_a_refit_in_any_ga
     assert doubted(problem_of(table, same, harder), WEAK, 9.0) is None
 
 
+def test_a_contrast_with_a_healthy_trial_of_the_same_movement_leaves_no_doubt(
+    table: LossTable, real: Robot, healthy: list[Trial], weaker: Robot
+):
+    harder = [*healthy, moved(real, "second", truth="motor:back_right_knee=0.5")]
+    problem = problem_of(table, moved(real, "first", truth=WEAK), harder, weaker)
+
+    for z, is_doubted in ((4.9, True), (5.1, False)):
+        problem.contrast = lambda _, z=z: z
+        assert (doubted(problem, WEAK, 9.0) is not None) == is_doubted
+
+
 @pytest.mark.parametrize("accused", ["intact", WEAK])
 def test_a_loss_beyond_any_error_of_a_fitted_model_is_not_doubted(
     table: LossTable, covering: list[Trial], weak: Trial, weaker: Robot, accused: str
