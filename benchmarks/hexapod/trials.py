@@ -12,9 +12,9 @@ from benchmarks.hexapod.environment import HexapodEnvironment
 from benchmarks.hexapod.robots import LEGS, STEPS, self_model
 from benchmarks.other_engine.environment import physical_robot
 from benchmarks.other_engine.recovery import heading_change, in_mujoco
+from benchmarks.rows import kept_gait
 from selfmodel import Controller, Diagnosis, EnvironmentRobot, Settings, Simulator, Trial
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.falls import falls_of
 from selfmodel.studies.study import Row
 
@@ -39,18 +39,8 @@ class Bench:
         model, seed = key["model"], key["gait"]
         size = f"{self.settings.population}x{self.settings.generations}"
         path = self.folder / f"{model}-{self.design}-{self.score}-{size}-{seed}.npz"
-        if not path.exists():
-            self.folder.mkdir(parents=True, exist_ok=True)
-            gait = selfmodel.evolve(
-                model_of(model),
-                design=self.design,
-                score=self.score,
-                settings=self.settings,
-                seed=seed,
-                threads=1,
-            )
-            save_controller(path, gait)
-        return load_controller(path)
+        search = {"design": self.design, "score": self.score, "seed": seed}
+        return kept_gait(path, model_of(model), settings=self.settings, **search)
 
 
 @contextmanager
