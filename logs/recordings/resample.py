@@ -75,9 +75,8 @@ NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
 def clocked(series: Series, clock: str) -> Clocked:
     """Returns the times of a topic's messages.
 
-    Args:
-        series: Messages of the topic.
-        clock: ``header`` for stamps, with log times for messages without a stamp; else log times.
+    The clock ``header`` is that of stamps, with log times for messages without a stamp; any other
+    is that of log times.
 
     Raises:
         ValueError: The stamps of the topic and its log times are of different clocks.

@@ -355,12 +355,7 @@ FORMATS: Mapping[str, Format] = {
 def export(path: Path, trajectory: Trajectory) -> tuple[str, ...]:
     """Writes the observed signals of a trial as a table, which ``logs import`` reads again.
 
-    Args:
-        path: Name of the file, which must not exist, with the suffix of a format.
-        trajectory: Trajectory of the trial.
-
-    Returns:
-        Names of the columns.
+    The file must not exist; its suffix is that of a format. Returns the names of the columns.
     """
     write = writer_of(path)
     columns = columns_of(trajectory)

@@ -238,11 +238,7 @@ class Watchdog:
     After a call that did not return, because of the time limit or of a signal, the end of the block
     makes the thread send the safe command once more as soon as the call returns: the driver may
     have sent targets after the first safe command. The end of the block waits for that for at most
-    ``seconds``; the thread waits longer, until the process ends.
-
-    Args:
-        seconds: Time limit of a call, s.
-        send_safe: Sends the safe command.
+    ``seconds``, the time limit of a call; the thread waits longer, until the process ends.
     """
 
     def __init__(self, seconds: float, send_safe: Callable[[], object]) -> None:

@@ -143,13 +143,9 @@ def converged(
 ) -> Candidates:
     """Returns the candidates that keep their scores at a quarter of the physics time step.
 
-    What a stiff servo or a massless rotor does at a coarse time step is no motion of a robot.
-
-    Args:
-        candidates: Candidates, best first.
-        fitness: What scored them.
-        steps: Control steps of a rollout.
-        rng: Random number generator in the state in which their conditions were drawn.
+    What a stiff servo or a massless rotor does at a coarse time step is no motion of a robot. The
+    fitness is what scored the candidates, best first, and the generator in the state in which their
+    conditions were drawn.
     """
     finer = replace(fitness, simulator=fitness.simulator.finer(FINER))
     conditions = max(1, len(candidates[0].scores) // FINER)

@@ -212,11 +212,7 @@ def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, 
     """Returns the gaits with a finite score in another evaluation, best first.
 
     No physical trial is needed for the gaits of a damaged robot: they are evaluated in simulation
-    under the diagnosed hypothesis.
-
-    Args:
-        repertoire: The repertoire.
-        evaluate: The evaluation, such as ``simulated_evaluation(simulator, diagnosed, steps)``.
+    under the diagnosed hypothesis, by ``simulated_evaluation(simulator, diagnosed, steps)``.
     """
     gaits = [repertoire.controller(k) for k in range(len(repertoire))]
     scores, _ = evaluate(gaits)

@@ -219,12 +219,7 @@ Base = FreeBase | SlidingBase | FixedBase
 
 
 def read_base(models: Sequence[mujoco.MjModel], root: str) -> Base:
-    """Returns the base of a robot.
-
-    Args:
-        models: One model for all rows of a state, or one model per row; they share one layout.
-        root: Name of the root body; see ``find_root_body``.
-    """
+    """Returns the base of a robot, with one model for all rows of a state, or one per row."""
     model = models[0]
     body = int(model.body(root).id)
     joints = joints_of_body(model, body)
@@ -260,9 +255,7 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
 def observed_fields(robot: Robot, variants: Sequence[ModelVariant]) -> dict[Signal, SignalSource]:
     """Returns ``signal_fields`` as robots log them: joint positions with the encoders' offsets.
 
-    Args:
-        robot: The healthy robot.
-        variants: A variant for all states, or one per state.
+    There is one variant of the healthy robot for all states, or one per state.
     """
     fields = signal_fields(robot, *(variant.model for variant in variants))
     offsets = np.array([variant.encoder_offset for variant in variants])

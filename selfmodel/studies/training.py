@@ -99,12 +99,7 @@ class Moments:
 
 
 class Training:
-    """An evolution of a policy for a task, generation by generation.
-
-    Args:
-        robot: Name of a body of the suite, such as ``suite-walker-walk``.
-        settings: What determines the training.
-        threads: Threads of the physics.
+    """An evolution of a policy for a task, such as ``suite-walker-walk``, by generations.
 
     Raises:
         InputError: The task has no observation or reward that a policy is evolved for, or the body

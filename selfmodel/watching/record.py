@@ -46,10 +46,6 @@ class WatchRecord:
     ``findings.mcap`` is ``findings.mcap.part`` until the end; a kill leaves that.
     ``black-box.mcap`` is written at the end, if the robot has changed.
 
-    Args:
-        folder: The folder, which has no other record.
-        robot: The nominal robot.
-
     Attributes:
         note: What the black box has, once it is written; "" without one.
 
