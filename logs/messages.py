@@ -278,7 +278,7 @@ Part = Signal | Derived | Literal["acceleration", "timing"]
 included, ``(steps, 3)`` m/s^2. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a
 late step and for a missing observation."""
 
-_XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
+XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
 
 
 class Topic:
@@ -306,7 +306,7 @@ class Topic:
 
 
 def _order(part: Part, width: int) -> Sequence[int]:
-    return _XYZW if part == "base_orientation" else range(width)
+    return XYZW if part == "base_orientation" else range(width)
 
 
 def topics(

@@ -8,7 +8,6 @@ digest detects damage; it is no signature.
 
 import dataclasses
 import hashlib
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,6 +22,7 @@ from selfmodel.files import read_file
 from selfmodel.logs.controllers import (
     check_types,
     controller_bytes,
+    npz_bytes,
     npz_errors,
     parse_controller,
     read_arrays,
@@ -60,9 +60,7 @@ def repertoire_bytes(repertoire: Repertoire) -> bytes:
         "descriptors": repertoire.descriptors,
         "origin": _as_array(json.dumps(dataclasses.asdict(repertoire.origin)).encode()),
     }
-    file = io.BytesIO()
-    np.savez_compressed(file, allow_pickle=False, **arrays, sha256=_digest(arrays))
-    return file.getvalue()
+    return npz_bytes({**arrays, "sha256": _digest(arrays)}, np.savez_compressed)
 
 
 def save_repertoire(path: Path, repertoire: Repertoire) -> None:
