@@ -83,12 +83,9 @@ def table(rows: Sequence[Row], methods: Sequence[Row]) -> str:
     """Returns a Markdown table, a line per robot, case and gap, and one per robot and gap.
 
     Rows of several repairs are in lines of their own, with the repair after the robot. A ratio is a
-    median, with its 95 % bootstrap interval and the lowest tenth.
-
-    Args:
-        rows: Rows of recoveries.
-        methods: Rows of ``benchmarks.rivals``, of which those of the oracle count, each with the
-            mean of its trials. The oracle of the healthy robot is that of case 9.
+    median, with its 95 % bootstrap interval and the lowest tenth. The methods are rows of
+    ``benchmarks.rivals``, of which those of the oracle count, each with the mean of its trials. The
+    oracle of the healthy robot is that of case 9.
     """
     best = oracles(frame_of(methods)) if methods else {}
     several = len({row["repair"] for row in rows}) > 1

@@ -316,14 +316,10 @@ def topics(
 
     ``/odom`` contains the velocity of the base in the frame of the base, as its type requires.
     Rotating back would change the last bits, so the trajectory is read from
-    ``/base_linear_velocity``, which contains the velocity in the world frame.
-
-    Args:
-        names: Columns of the trajectory's signals.
-        root: Name of the root body, the child frame of ``/odom``.
-        timed: Whether the robot has its own clock, and thereby the topic ``TIMING``.
-        driven: Names of the motors in the messages, such as of the joints that they drive; by
-            default their own.
+    ``/base_linear_velocity``, which contains the velocity in the world frame. The child frame of
+    ``/odom`` is the root body. A timed robot has its own clock, and thereby the topic ``TIMING``.
+    ``driven`` are names of the motors in the messages, such as of the joints that they drive; by
+    default their own.
     """
     hinges, motors, sensors = len(names.hinges), len(names.motors), len(names.sensors)
     state, readings = "sensor_msgs/msg/JointState", "selfmodel_msgs/msg/SensorReadings"

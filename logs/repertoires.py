@@ -69,11 +69,7 @@ def save_repertoire(path: Path, repertoire: Repertoire) -> None:
 
 
 def load_repertoire(path: Path, robot: "selfmodel.robot.robot.Robot | None" = None) -> Repertoire:
-    """Returns the verified repertoire in a file.
-
-    Args:
-        path: The file.
-        robot: Robot of which the repertoire must be; None for any.
+    """Returns the verified repertoire in a file, which must be of a robot if one is given.
 
     Raises:
         InputError: The file is no repertoire, is damaged, or is of another model.

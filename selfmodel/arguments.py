@@ -323,13 +323,8 @@ def recorded_robot(name: str, control_timestep: float | None, names: Names | Non
     """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
 
     A model that a calibration wrote is a robot already, and is not adapted; nor is one that has the
-    recorded names as it is only.
-
-    Args:
-        name: Name of a robot of selfmodel, or the path of a model file.
-        control_timestep: Duration of a control step of a model file, s; None for that of its
-            settings.
-        names: Names of the recorded signals.
+    recorded names as it is only. Without a control time step, a model file has that of its
+    settings.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.

@@ -140,11 +140,7 @@ class ControlSteps:
 
 
 def at_steps(track: Track, steps: ControlSteps, method: Method, width: int) -> FloatArray:
-    """Returns a track at control steps; NaN where not observed.
-
-    Returns:
-        Numbers of the quantity, ``(steps, width)``.
-    """
+    """Returns a track at control steps, ``(steps, width)``; NaN where not observed."""
     if not len(track):
         return np.full((len(steps.numbers), width), np.nan)
     # float64 represents nanoseconds exactly for a hundred days.

@@ -50,11 +50,8 @@ def is_table(path: Path) -> bool:
 def read_table(path: Path, wanted: Collection[str], *, time: str = "", unit: int = 1) -> Recording:
     """Returns a table; without a time column, its rows have no times.
 
-    Args:
-        path: A file with a suffix of ``FORMATS``.
-        wanted: Names of the columns to read; a name that the table does not have is left out.
-        time: Name of the time column, whose unit is in ns; rows without a time are left out.
-        unit: That unit.
+    A wanted column that the table does not have is left out, and so are rows without a time. The
+    unit is that of the times, ns.
 
     Raises:
         InputError: The file cannot be read, a wanted column has no numbers or another length than

@@ -206,10 +206,8 @@ def cleanup(action: Callable[[], object]) -> Iterator[None]:
 
     An exception of the block, such as Ctrl-C, is raised in any case: a failure of the action is
     added to it as a note, where ``contextlib.ExitStack`` would raise the failure instead. After
-    a block without an exception, or in a closed generator, a failure of the action is raised.
-
-    Args:
-        action: The action; it may raise ``OSError`` or ``WorkError``.
+    a block without an exception, or in a closed generator, a failure of the action is raised. The
+    action may raise ``OSError`` or ``WorkError``.
     """
     try:
         yield

@@ -193,11 +193,9 @@ class Training:
     ) -> FloatArray:
         """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
 
-        Args:
-            controllers: Policies of the task, of one design.
-            seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
-            steps: Control steps of the episode; None for those of the task's.
-            learn: Whether the observations count in the normalisation.
+        The controllers are policies of one design, and the seeds those of each initial state, as
+        ``random`` of the suite's environment. An episode has the steps of the task's if none are
+        given. With ``learn``, the observations count in the normalisation.
         """
         robot, count = self._robot, len(controllers)
         start, speeds = self._starts.draw(seeds)

@@ -72,12 +72,9 @@ class WatchRecord:
         return self
 
     def add(self, step: Sample | None, findings: Sequence[Finding], start: int = 0) -> None:
-        """Adds a step, if one came, and the findings since the one before.
+        """Adds a step, if one came, and the findings since the one before, in order.
 
-        Args:
-            step: The newest step; None without a new one.
-            findings: What is new, in order.
-            start: Time stamp of the first step, ns.
+        The start is the time stamp of the first step, ns.
         """
         with safety.hold_stop_signals():
             if step is not None:
