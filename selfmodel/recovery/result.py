@@ -287,9 +287,15 @@ def shortfall(
     """Returns a sentence on a trial that falls short of its prediction; None for any other.
 
     The cause is the fall of the robot, an early end, a diagnosis that the trial refuted, or else
-    the self-model: its time step, if it loses the score at a quarter of it, or its parameters. The
-    predicted score is NaN if none was; so is that of a robot without noise, which ``simulated``
-    returns, if it diverges. ``tried`` is the hypothesis at the time, and the robot today's.
+    the self-model: its time step, if it loses the score at a quarter of it, or its parameters.
+
+    Args:
+        found: Score of the trial.
+        predicted: Score that was predicted; NaN if none was.
+        tried: Hypothesis at the time.
+        robot: The self-model of today.
+        simulated: Returns the score of the controller in one simulation of a robot without noise;
+            NaN if it diverges.
     """
     if not (predicted > 0 and found.value < SHORTFALL * predicted):
         return None

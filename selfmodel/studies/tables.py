@@ -169,11 +169,15 @@ def table_of(
     texts: int = 0,
     note: str = "",
 ) -> Table:
-    """Returns rows as a table; the note says what its columns are.
+    """Returns rows as a table.
 
-    The name is that of its file, without an extension. An interval becomes three columns, as
-    ``correct_low``, and the names of a table in a frame one text. ``shown`` has the texts for
-    readers, by the title of the column, of which ``texts`` lead; None for the values themselves.
+    Args:
+        name: Name of its file, without an extension.
+        records: The rows; an interval becomes three columns, as ``correct_low``, and the names of a
+            table in a frame one text.
+        shown: Their texts for readers, by the title of the column; None for the values themselves.
+        texts: Number of leading columns of texts.
+        note: What the columns are.
     """
     if isinstance(records, pd.DataFrame):
         named = "table" in records
