@@ -230,8 +230,8 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
 
     Commands are ``ctrl``. Sensor readings are not included: ``SensorReader`` computes them.
 
-    The robot's parts name the columns of the signals. There is no model for the robot's own, one
-    for all states, or one per state, of one layout. It may have more parts than the robot.
+    The robot's parts name the columns of the signals. The models are one for all states, or one per
+    state, of one layout, by default the robot's own. They may have more parts than the robot.
     """
     models = models or (robot.model,)
     motors = columns([int(models[0].actuator(name).id) for name in robot.anatomy.motors])
