@@ -23,15 +23,23 @@ from statistics import median
 import numpy as np
 
 import selfmodel
-from benchmarks.foreign.scoring import add_rows, rate, read_rows
 from benchmarks.hexapod.robots import LEGS, self_model
+from benchmarks.rows import (
+    add_rows,
+    add_search,
+    kept_gait,
+    lines_of,
+    markdown,
+    parsed,
+    rate,
+    settings_of,
+    spread,
+)
 from selfmodel import Controller, Robot, Settings, Trial
 from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.falls import fall_of
 from selfmodel.studies.study import Row
-from selfmodel.studies.tables import markdown_of, table_of
 
 ROBOTS = {
     "hexapod": partial(selfmodel.load_robot, "hexapod"),
@@ -51,21 +59,18 @@ def main() -> None:
     run.add_argument("robot", choices=ROBOTS)
     run.add_argument("folder", type=Path, help="folder of the first gaits")
     run.add_argument("--seeds", type=int, nargs="+", default=[0], help="physical robots")
-    run.add_argument("--limit", type=int, help="number of new rows")
     run.add_argument("--design", default="network+heading", help="of gaits")
     run.add_argument("--score", default="upright", help="of gaits")
     run.add_argument("--trials", type=int, default=1, help="of a recovery")
-    run.add_argument("--population", type=int, default=Settings.population)
-    run.add_argument("--generations", type=int, default=Settings.generations)
-    commands.add_parser("table", help="print the table of the rows")
-    for command in commands.choices.values():
-        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
-    given = parser.parse_args()
-    if given.command == "table":
-        print(table(read_rows(given.rows)))
-        return
+    add_search(run)
+    given = parsed(parser, commands, table)
     robot = ROBOTS[given.robot]()
-    of = partial(recovered, robot, first_gait(robot, given), settings_of(robot, given))
+    settings = settings_of(given, round(SECONDS / robot.control_timestep))
+    size = f"{given.population}x{given.generations}"
+    path = given.folder / f"{given.robot}-{given.design}-{given.score}-{size}.npz"
+    search = {"design": given.design, "score": given.score}
+    gait = kept_gait(path, robot, settings=settings, **search)
+    of = partial(recovered, robot, gait, settings)
     add_rows(given.rows, cases(given), given.limit, of)
 
 
@@ -77,24 +82,6 @@ def cases(given: argparse.Namespace) -> Iterator[Row]:
     rows = [{**own, "legs": "+".join(legs), "seed": seed} for seed in given.seeds for legs in lost]
     random.Random(0).shuffle(rows)  # noqa: S311  # an order
     return iter(rows)
-
-
-def settings_of(robot: Robot, given: argparse.Namespace) -> Settings:
-    """Returns the settings of trials and searches."""
-    steps = round(SECONDS / robot.control_timestep)
-    sized = Settings(steps=steps, trials=given.trials, generations=given.generations)
-    return sized.scaled(given.population)
-
-
-def first_gait(robot: Robot, given: argparse.Namespace) -> Controller:
-    """Returns the first gait of a robot: of the folder, or evolved for it."""
-    size = f"{given.population}x{given.generations}"
-    path = given.folder / f"{given.robot}-{given.design}-{given.score}-{size}.npz"
-    if not path.exists():
-        given.folder.mkdir(parents=True, exist_ok=True)
-        search = {"design": given.design, "score": given.score, "threads": 1}
-        save_controller(path, selfmodel.evolve(robot, settings=settings_of(robot, given), **search))
-    return load_controller(path)
 
 
 def recovered(robot: Robot, gait: Controller, settings: Settings, key: Row, work: Path) -> Row:
@@ -147,29 +134,23 @@ def walks(trial: Mapping[str, float]) -> bool:
 
 def table(rows: Sequence[Row]) -> str:
     """Returns the table of the rows by robot and group, with Wilson's 95 % intervals."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        for group in (group_of(row["legs"]), "all"):
-            groups.setdefault((row["robot"], group), []).append(row)
-    lines = []
-    for (robot, group), chosen in sorted(groups.items()):
-        first = [row["recovered"][0] for row in chosen]
-        before = [row["before"]["speed"] for row in chosen]
-        ratios = [one["speed"] / own for one, own in zip(first, before, strict=True)]
-        middle, low, high = (of(ratios) for of in (median, min, max))
-        lines.append(
-            {
-                "robot": robot,
-                "lost": group,
-                "right": rate([row["right"] for row in chosen]),
-                "walks without recovery": rate([walks(row["after"]) for row in chosen]),
-                "recovered in one trial": rate(list(map(walks, first))),
-                "in all trials": rate([any(map(walks, row["recovered"])) for row in chosen]),
-                "first ÷ before": f"{middle:.2f} ({low:.2f} to {high:.2f})",
-                "CPU seconds": f"{median([row['seconds'] for row in chosen]):.0f}",
-            }
-        )
-    return markdown_of(table_of("lost legs", lines, lines, texts=2))
+    every = [{**row, "lost": lost} for row in rows for lost in (group_of(row["legs"]), "all")]
+    every.sort(key=lambda row: (row["robot"], row["lost"]))
+    return markdown(lines_of(every, {"robot": "robot", "lost": "lost"}, _rates), texts=2)
+
+
+def _rates(rows: Sequence[Row]) -> dict[str, str]:
+    first = [row["recovered"][0] for row in rows]
+    before = [row["before"]["speed"] for row in rows]
+    ratios = [one["speed"] / own for one, own in zip(first, before, strict=True)]
+    return {
+        "right": rate([row["right"] for row in rows]),
+        "walks without recovery": rate([walks(row["after"]) for row in rows]),
+        "recovered in one trial": rate(list(map(walks, first))),
+        "in all trials": rate([any(map(walks, row["recovered"])) for row in rows]),
+        "first ÷ before": spread(ratios, ".2f"),
+        "CPU seconds": f"{median([row['seconds'] for row in rows]):.0f}",
+    }
 
 
 if __name__ == "__main__":

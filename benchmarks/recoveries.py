@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rows import markdown, read_rows
 from selfmodel.studies.rows import frame_of, oracles
 from selfmodel.studies.statistics import proportion
 from selfmodel.studies.study import Row, grouped, rows_in
@@ -26,11 +27,6 @@ NOTHING_BREAKS = 9
 
 MIN_SAMPLE = 5
 """Smallest number of values whose median has a bootstrap interval."""
-
-HEADER = """\
-| robot | case | gap | n | diagnosis right | before, m | ÷ oracle | first trial ÷ oracle | best ÷ \
-oracle | observed ÷ predicted | fell |
-|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|"""
 
 RUN = ("robot", "case", "gap", "seed")
 
@@ -50,11 +46,8 @@ def main() -> None:
             for row in rows_of(folder):
                 print(json.dumps(row, allow_nan=False))
     else:
-        print(table(_read(options.rows), _read(options.oracles) if options.oracles else []))
-
-
-def _read(path: Path) -> list[Row]:
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        oracles_of = read_rows(options.oracles) if options.oracles else []
+        print(table(read_rows(options.rows), oracles_of))
 
 
 def rows_of(folder: Path) -> list[Row]:
@@ -90,27 +83,24 @@ def table(rows: Sequence[Row], methods: Sequence[Row]) -> str:
     """Returns a Markdown table, a line per robot, case and gap, and one per robot and gap.
 
     Rows of several repairs are in lines of their own, with the repair after the robot. A ratio is a
-    median, with its 95 % bootstrap interval and the lowest tenth.
-
-    Args:
-        rows: Rows of recoveries.
-        methods: Rows of ``benchmarks.rivals``, of which those of the oracle count, each with the
-            mean of its trials. The oracle of the healthy robot is that of case 9.
+    median, with its 95 % bootstrap interval and the lowest tenth. The methods are rows of
+    ``benchmarks.rivals``, of which those of the oracle count, each with the mean of its trials. The
+    oracle of the healthy robot is that of case 9.
     """
     best = oracles(frame_of(methods)) if methods else {}
     several = len({row["repair"] for row in rows}) > 1
-    lines = [HEADER]
+    lines = []
     for (robot, gap, repair), own in sorted(grouped(rows, "robot", "gap", "repair").items()):
         name = f"{robot}, {repair}" if several else robot
         cases = sorted(grouped(own, "case").items())
         lines += [_line(name, case, gap, same, best) for (case,), same in cases]
         lines.append(_line(name, "all", gap, own, best))
-    return "\n".join(lines)
+    return markdown(lines, texts=3)
 
 
 def _line(
     robot: str, case: object, gap: float, rows: Sequence[Row], best: dict[tuple[object, ...], float]
-) -> str:
+) -> dict[str, str]:
     right = proportion(sum(row["correct"] for row in rows), len(rows))
     befores, healthy = {}, {}
     first: list[float] = []
@@ -127,17 +117,20 @@ def _line(
         largest.append(_ratio(max(recovered), oracle))
         transfer += map(_ratio, recovered, row["predicted"][2:])
     falls = sum(row["falls"][2 + int(np.argmax(row["upright"][2:]))] is not None for row in rows)
-    cells = (
-        robot,
-        str(case),
-        f"{gap:g}",
-        str(len(rows)),
-        f"{100 * right.estimate:.0f} % ({100 * right.low:.0f} to {100 * right.high:.0f})",
-        f"{np.mean(list(befores.values())):.1f}",
-        *map(_median, (healthy.values(), first, largest, transfer)),
-        f"{falls} of {len(rows)}",
-    )
-    return f"| {' | '.join(cells)} |"
+    return {
+        "robot": robot,
+        "case": str(case),
+        "gap": f"{gap:g}",
+        "n": str(len(rows)),
+        "diagnosis right": f"{100 * right.estimate:.0f} % "
+        f"({100 * right.low:.0f} to {100 * right.high:.0f})",
+        "before, m": f"{np.mean(list(befores.values())):.1f}",
+        "÷ oracle": _median(healthy.values()),
+        "first trial ÷ oracle": _median(first),
+        "best ÷ oracle": _median(largest),
+        "observed ÷ predicted": _median(transfer),
+        "fell": f"{falls} of {len(rows)}",
+    }
 
 
 def _ratio(value: float, reference: float | None) -> float:

@@ -98,8 +98,13 @@ def controller_bytes(controller: Controller) -> bytes:
     }
     if any(one != PAPER_RANGE for one in design.ranges):
         arrays["ranges"] = np.array(design.ranges)
+    return npz_bytes(arrays)
+
+
+def npz_bytes(arrays: Arrays, write: Callable[..., None] = np.savez) -> bytes:
+    """Returns arrays as the bytes of an ``.npz`` file; equal arrays, equal bytes."""
     file = io.BytesIO()
-    np.savez(file, allow_pickle=False, **arrays)
+    write(file, allow_pickle=False, **arrays)
     return file.getvalue()
 
 

@@ -22,14 +22,7 @@ def salvage_it(path: str | PathLike[str]) -> str:
 
 
 class LogError(WorkError):
-    """A log cannot be used.
-
-    Attributes:
-        path: The file.
-        what: Description of the damage.
-        good: Description of the intact part, or "".
-        advice: Remedy.
-    """
+    """A log cannot be used: what is damaged, what is intact, and a remedy."""
 
     def __init__(
         self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
@@ -67,11 +60,7 @@ class SchemaMismatchError(LogError):
 class LogWriteError(OSError):
     """Writing a log failed; the file keeps all earlier data.
 
-    Args:
-        path: The file.
-        cause: Error of the operating system.
-        again: Remedy after some space is free.
-        kept: Description of the data that are kept.
+    Its text ends with a remedy, ``again``, and the data that are ``kept``.
     """
 
     def __init__(

@@ -67,8 +67,7 @@ def replace_file(path: Path, data: bytes) -> None:
 def write_new(path: Path, data: bytes) -> Path:
     """Writes a new file in one atomic step, and replaces none that was created meanwhile.
 
-    Returns:
-        ``path``; if that name was taken, the next one that is free, such as ``NAME-2.html``.
+    Returns the path; if it was taken, the next one that is free, such as ``NAME-2.html``.
     """
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     names = chain([path], numbered)

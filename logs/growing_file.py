@@ -20,12 +20,7 @@ _KINDS = frozenset(map(int, Opcode))
 
 
 class GrowingFile:
-    """An MCAP file that may be unfinished.
-
-    Attributes:
-        path: The file.
-        has_ended: Whether the end of its data was read.
-    """
+    """An MCAP file that may be unfinished; it ``has_ended`` once the end of its data was read."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.has_ended = path, False

@@ -80,12 +80,9 @@ class Verified:
 def verify(path: Path, expected: str = "") -> Verified:
     """Verifies a log.
 
-    Verified are the checks of ``read_log``; that the model names no other files; and, if MuJoCo is
+    Verified are the checks of ``read_log``; the expected SHA-256, if one is given; that the model
+    names no other files; and, if MuJoCo is
     installed, that the model loads and is of the robot of the messages.
-
-    Args:
-        path: The log.
-        expected: SHA-256 that the file must have, or "".
 
     Raises:
         LogError: A check failed.

@@ -278,7 +278,7 @@ Part = Signal | Derived | Literal["acceleration", "timing"]
 included, ``(steps, 3)`` m/s^2. ``timing`` is ``(steps, 3)``: elapsed time in s, and 1 or 0 for a
 late step and for a missing observation."""
 
-_XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
+XYZW = (1, 2, 3, 0)  # index in MuJoCo's quaternion of each element of a message's
 
 
 class Topic:
@@ -306,7 +306,7 @@ class Topic:
 
 
 def _order(part: Part, width: int) -> Sequence[int]:
-    return _XYZW if part == "base_orientation" else range(width)
+    return XYZW if part == "base_orientation" else range(width)
 
 
 def topics(
@@ -316,14 +316,10 @@ def topics(
 
     ``/odom`` contains the velocity of the base in the frame of the base, as its type requires.
     Rotating back would change the last bits, so the trajectory is read from
-    ``/base_linear_velocity``, which contains the velocity in the world frame.
-
-    Args:
-        names: Columns of the trajectory's signals.
-        root: Name of the root body, the child frame of ``/odom``.
-        timed: Whether the robot has its own clock, and thereby the topic ``TIMING``.
-        driven: Names of the motors in the messages, such as of the joints that they drive; by
-            default their own.
+    ``/base_linear_velocity``, which contains the velocity in the world frame. The child frame of
+    ``/odom`` is the root body. A timed robot has its own clock, and thereby the topic ``TIMING``.
+    ``driven`` are names of the motors in the messages, such as of the joints that they drive; by
+    default their own.
     """
     hinges, motors, sensors = len(names.hinges), len(names.motors), len(names.sensors)
     state, readings = "sensor_msgs/msg/JointState", "selfmodel_msgs/msg/SensorReadings"

@@ -25,12 +25,8 @@ def run_trial(
 ) -> Trial:
     """Runs a physical trial, logs it while it runs, and returns the trial read from the log.
 
-    Args:
-        physical: Physical robot.
-        plan: Plan of the trial.
-        path: Name of the log; it must not exist.
-        robot: Robot as its model describes it.
-        header: Other content of the log's preamble; ``timed`` is taken from the physical robot.
+    The log must not exist. The robot is that which its model describes, and the header is other
+    content of the log's preamble; ``timed`` is taken from the physical robot.
     """
     timed = isinstance(physical, TimedRobot)
     samples = physical.run(plan.controller, plan.steps)

@@ -270,12 +270,7 @@ def read_network(path: Path, activation: str = "Elu", last: str = "Identity") ->
     """Returns the network in an ``.onnx`` file, or in an ``.npz`` of layers.
 
     Such an archive has the arrays ``weight0``, ``(outputs, inputs)``, ``bias0``, ``weight1`` and so
-    on.
-
-    Args:
-        path: The file.
-        activation: Operator between the layers of an ``.npz``, such as ``Elu``.
-        last: Operator after its last layer.
+    on. The operators are those between its layers, and after its last one.
 
     Raises:
         InputError: The file cannot be read, or has another content; the message names the file.

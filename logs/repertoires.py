@@ -8,7 +8,6 @@ digest detects damage; it is no signature.
 
 import dataclasses
 import hashlib
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,6 +22,7 @@ from selfmodel.files import read_file
 from selfmodel.logs.controllers import (
     check_types,
     controller_bytes,
+    npz_bytes,
     npz_errors,
     parse_controller,
     read_arrays,
@@ -60,9 +60,7 @@ def repertoire_bytes(repertoire: Repertoire) -> bytes:
         "descriptors": repertoire.descriptors,
         "origin": _as_array(json.dumps(dataclasses.asdict(repertoire.origin)).encode()),
     }
-    file = io.BytesIO()
-    np.savez_compressed(file, allow_pickle=False, **arrays, sha256=_digest(arrays))
-    return file.getvalue()
+    return npz_bytes({**arrays, "sha256": _digest(arrays)}, np.savez_compressed)
 
 
 def save_repertoire(path: Path, repertoire: Repertoire) -> None:
@@ -71,11 +69,7 @@ def save_repertoire(path: Path, repertoire: Repertoire) -> None:
 
 
 def load_repertoire(path: Path, robot: "selfmodel.robot.robot.Robot | None" = None) -> Repertoire:
-    """Returns the verified repertoire in a file.
-
-    Args:
-        path: The file.
-        robot: Robot of which the repertoire must be; None for any.
+    """Returns the verified repertoire in a file, which must be of a robot if one is given.
 
     Raises:
         InputError: The file is no repertoire, is damaged, or is of another model.

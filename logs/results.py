@@ -236,10 +236,7 @@ class RecoveryResult(DiagnosisResult, frozen=True, kw_only=True):
     ) -> None:
         """Writes ``result.json``, with settings and digests; its paths are relative to its folder.
 
-        Args:
-            folder: Folder of the run.
-            settings: Parameters of the recovery.
-            of_repair: Those of the repair; None for the same.
+        The repair has the settings of the recovery, unless it has its own.
         """
         trials = [replace(one, log=relpath(one.log, folder)) for one in self.trials or ()]
         content = replace(
@@ -313,13 +310,9 @@ def versions() -> Mapping[str, str]:
 def read_result(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
     """Returns the content of a result file, without versions and digest, which is checked.
 
-    Args:
-        path: The file.
-        what: Expected content for the error message, such as "the definition of a run".
-        remedy: Remedy for the error message.
-
     Raises:
-        InputError: The file cannot be read, is too large, no valid JSON, or has a wrong digest.
+        InputError: The file cannot be read, is too large, no valid JSON, or has a wrong digest; the
+            message has ``what`` was expected, such as "the definition of a run".
     """
     with _explained(path, what, remedy):
         return verified(parse_json(read_file(path, what, MAX_BYTES)))

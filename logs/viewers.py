@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.logs.messages import WORLD, Part, transforms
+from selfmodel.logs.messages import WORLD, XYZW, Part, transforms
 from selfmodel.robot.motion import POSE, Shape, body_poses, shapes_of
 from selfmodel.robot.robot import Robot
 from selfmodel.robot.state import state_writer
@@ -196,7 +196,7 @@ class Kinematics:
         with np.errstate(over="ignore", invalid="ignore"):  # unobserved or extreme values
             moved = in_body_frame(children[..., :3] - parents[..., :3], parents[..., 3:])
             turned = product(parents[..., 3:] * _INVERSE, children[..., 3:])
-        relative = to_micrometres(np.concatenate([moved, turned[..., _XYZW]], axis=-1))
+        relative = to_micrometres(np.concatenate([moved, turned[..., XYZW]], axis=-1))
         steps = np.flatnonzero(known), np.flatnonzero(~known)
         return [
             (chosen, relative[chosen][:, columns].reshape(len(chosen), 7 * len(columns)))
@@ -205,7 +205,6 @@ class Kinematics:
 
 
 _INVERSE = (1.0, -1.0, -1.0, -1.0)
-_XYZW = (1, 2, 3, 0)
 
 
 def to_micrometres(values: FloatArray) -> FloatArray:

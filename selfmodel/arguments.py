@@ -323,13 +323,8 @@ def recorded_robot(name: str, control_timestep: float | None, names: Names | Non
     """Returns the robot of a recording: by name, or of a model file, adapted as for a trial.
 
     A model that a calibration wrote is a robot already, and is not adapted; nor is one that has the
-    recorded names as it is only.
-
-    Args:
-        name: Name of a robot of selfmodel, or the path of a model file.
-        control_timestep: Duration of a control step of a model file, s; None for that of its
-            settings.
-        names: Names of the recorded signals.
+    recorded names as it is only. Without a control time step, a model file has that of its
+    settings.
 
     Raises:
         InputError: The name is unknown, or the model is unusable.
@@ -386,11 +381,7 @@ def _log_errors_as_input_errors() -> Iterator[None]:
 
 
 def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
-    """Returns the robot of logs.
-
-    Args:
-        found: At least one log.
-        override: Name of a robot, or an MJCF or URDF file, that replaces the model in the logs.
+    """Returns the robot of at least one log, or the robot or file that replaces its model.
 
     Raises:
         InputError: The logs have different robots, their model is unusable, or the replacement has
@@ -409,13 +400,9 @@ def robot_of_logs(found: Sequence[TrialLog], override: str | None) -> Robot:
 def read_controller(path: Path, robot: Robot, neurons: int | None = None) -> Controller:
     """Returns the controller in a ``.npz`` file, in a trial's log, or in a policy file, ``.toml``.
 
-    Args:
-        path: The file.
-        robot: The robot that the controller must fit.
-        neurons: Number of hidden neurons that the controller must have; any if not given.
-
     Raises:
-        InputError: The file contains no controller, or one that does not fit.
+        InputError: The file contains no controller, or one that does not fit the robot, or has
+            another number of hidden neurons.
     """
     if path.suffix.lower() == ".toml":
         from selfmodel.logs.policies import read_policy  # noqa: PLC0415  # few robots have one

@@ -42,11 +42,7 @@ def mean_of_known(values: FloatArray, axis: int | tuple[int, ...], empty: float)
 
 
 def median_of_known(columns: FloatArray) -> FloatArray:
-    """Returns the median of the finite values of each column; NaN without any.
-
-    Args:
-        columns: ``(rows, columns)``.
-    """
+    """Returns the median of each column's finite values, ``(rows, columns)``; NaN without any."""
     known = (column[np.isfinite(column)] for column in columns.T)
     return np.array([np.median(own) if len(own) else np.nan for own in known], dtype=np.float64)
 

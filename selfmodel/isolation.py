@@ -54,16 +54,12 @@ class IsolationError(InputError):
 def run_isolated(
     task: str, request: Message, *, what: str, seconds: int = MODEL_SECONDS
 ) -> Message:
-    """Returns the answer of a function that runs in a child process.
+    """Returns the answer of a ``Task``, ``module:function``, that runs in a child process.
 
-    Args:
-        task: The function as ``module:function``; see ``Task``.
-        request: Argument of the function.
-        what: Name of the input for an error message, such as the file's.
-        seconds: Limit of the child's processor time, s.
+    The child has that many seconds of processor time.
 
     Raises:
-        IsolationError: The child crashed, or reached a limit.
+        IsolationError: The child crashed, or reached a limit; the message has ``what`` it read.
         InputError: The function raised it.
         WorkError: The function raised it.
     """

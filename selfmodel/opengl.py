@@ -55,11 +55,8 @@ def choose_gl(instead: str) -> str:
 
     Each is tried in a process of its own, because a failed initialisation cannot always be undone.
 
-    Args:
-        instead: What can be done without one, for the message of the error.
-
     Raises:
-        WorkError: No library works.
+        WorkError: No library works; the message has what can be done ``instead``.
     """
     wanted = os.environ.get(GL, "")
     for library in (wanted,) if wanted else WITHOUT_SCREEN:

@@ -10,13 +10,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a stage, whose text is a line with the time left.
+    """Progress of a stage, in parts of about the same time; its text is a line with the time left.
 
-    Attributes:
-        stage: Name of the stage.
-        done: Parts of the stage that are done.
-        total: All parts of the stage, which take about the same time each.
-        seconds: Wall time since the start of the stage.
+    The seconds are wall time since the start of the stage.
     """
 
     stage: str

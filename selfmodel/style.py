@@ -228,16 +228,10 @@ def values_by_name(
     others: tuple[str, Sequence[float]] | None = None,
     reference: float | None = None,
 ) -> Figure:
-    """Returns a figure of values, the first above: bars from 0, or points with intervals.
+    """Returns a figure of values by name, the first above: bars from 0, or points with intervals.
 
-    Args:
-        title: Title of the figure.
-        x_label: Quantity and unit of the values.
-        names: Name of each value.
-        values: The values; one that is not finite is left out.
-        ends: Ends of the interval of each value, which is then a point.
-        others: Label of other values of the same names, drawn as open points, and these.
-        reference: Value that a vertical line marks.
+    A value that is not finite is left out. ``others`` is the label of other values of the same
+    names, drawn as open points, and these. A vertical line marks the reference.
     """
     places = np.arange(len(names))
     shown = np.where(np.isfinite(values), values, np.nan)

@@ -100,15 +100,9 @@ def draw_reality(
     start_noise: float | None,
     rng: np.random.Generator,
 ) -> Reality:
-    """Returns the body of a task as its arguments describe it.
+    """Returns the body of a task as its arguments describe it, from the healthy body.
 
-    Args:
-        model: The healthy body.
-        anatomy: Its parts.
-        hypothesis: Its faults, or their notation with built-in kinds.
-        gap: Level of the reality gap.
-        start_noise: Standard deviation of the initial joint angles, rad; None for that of the gap.
-        rng: Source of the random numbers.
+    The start noise is that of the initial joint angles, rad; None for that of the level of the gap.
 
     Raises:
         InputError: The hypothesis cannot be parsed, has another type, or names a part that the

@@ -47,11 +47,7 @@ CONTROL_TIMESTEP = 0.01
 
 
 def paper_robot(name: str) -> Entry:
-    """Returns the registry entry of a robot with the task of walking forward.
-
-    Args:
-        name: Name of the robot and of its MJCF file, without the suffix.
-    """
+    """Returns the registry entry of a robot, named as its MJCF file, with the task of walking."""
     return Entry(partial(_robot, name), {"walk": partial(_walk, name)}, None, WALKING_RETURN)
 
 

@@ -98,15 +98,8 @@ def motion_capture(
 class Walk(base.Task):
     """The task of walking forward; the reward is the forward speed, m/s.
 
-    The sum of the rewards times the control time step is the distance, m.
-
-    Args:
-        robot: The healthy robot.
-        reality: Its faults and its gap.
-        random: Generator of the episodes.
-
-    Attributes:
-        variant: The robot with its faults and its gap.
+    The sum of the rewards times the control time step is the distance, m. The variant is the robot
+    with the faults and the gap of its reality.
     """
 
     def __init__(self, robot: Robot, reality: Reality, random: np.random.RandomState) -> None:

@@ -14,13 +14,13 @@ from benchmarks.foreign.robots import NAMES
 from benchmarks.foreign.scoring import (
     QUESTIONS,
     Question,
-    read_rows,
     reliability,
     score,
     summary,
     table,
     write_csv,
 )
+from benchmarks.rows import read_rows
 from selfmodel.style import files_of
 
 

@@ -120,6 +120,10 @@ def _nowhere(_robot: Robot, _rng: np.random.Generator) -> str:
 Severity = Callable[[np.random.Generator], float]
 
 
+def _always(value: float) -> Severity:
+    return lambda _rng: value
+
+
 def _between(low: float, high: float, digits: int | None = 3) -> Severity:
     return lambda rng: _rounded(rng.uniform(low, high), digits)
 
@@ -170,10 +174,6 @@ def _jam_angle(robot: Robot, rng: np.random.Generator) -> Faults:
     return (Fault("jam", part, round(float(low + side * (high - low)), 3)),)
 
 
-def _sensor(robot: Robot, rng: np.random.Generator) -> Faults:
-    return (Fault("dead-sensor", _one_of(rng, list(robot.touches))),)
-
-
 def _lost_and_sensor(robot: Robot, rng: np.random.Generator) -> Faults:
     (limb,) = _LOST(robot, rng)
     others = [name for name in robot.touches if name not in robot.part(limb.part).touches]
@@ -205,14 +205,6 @@ def _heavier(robot: Robot, _rng: np.random.Generator) -> Faults:
     return (Fault("payload", value=round(float(part), 3)),)
 
 
-def _grip(factor: float) -> Draw:
-    def draw(robot: Robot, rng: np.random.Generator) -> Faults:
-        feet = [part.name for part in robot.parts if part.body in robot.touches.values()]
-        return (Fault("grip", _one_of(rng, feet), factor),)
-
-    return draw
-
-
 def _encoder(robot: Robot, rng: np.random.Generator) -> Faults:
     """An encoder that is not recorded; nothing else is wrong."""
     hinge = _one_of(rng, list(robot.hinges))
@@ -229,9 +221,13 @@ def _tether(robot: Robot, rng: np.random.Generator) -> Faults:
     return (Fault("tether", value=float(weight * rng.uniform(0.3, 0.8))),)
 
 
-def _jam_there(robot: Robot, rng: np.random.Generator) -> Faults:
-    """A jam at the angle at which the joint is at the onset."""
-    return (Fault("jam", _hinge_part(robot, rng), float("nan")),)
+def _touch(robot: Robot, rng: np.random.Generator) -> str:
+    return _one_of(rng, list(robot.touches))
+
+
+def _foot_part(robot: Robot, rng: np.random.Generator) -> str:
+    feet = robot.touches.values()
+    return _one_of(rng, [part.name for part in robot.parts if part.body in feet])
 
 
 def _foot(robot: Robot, rng: np.random.Generator) -> str:
@@ -260,7 +256,7 @@ _GROUPS: dict[str, dict[str, Draw]] = {
     "paper": {
         "break": _LOST,
         "jam": _jam,
-        "sensor": _sensor,
+        "sensor": _single("dead-sensor", _touch, _always(0.0)),
         "break-debris": _limb("freezes", "follows", debris=True),
         "break+sensor": _lost_and_sensor,
         "break+jam": _lost_and_jam,
@@ -270,12 +266,12 @@ _GROUPS: dict[str, dict[str, Draw]] = {
         "jam-angle": _jam_angle,
         "motor": _MOTOR,
         "heavier": _heavier,
-        "damping": _single("damping", _hinge_part, lambda _rng: 8.0),
+        "damping": _single("damping", _hinge_part, _always(8.0)),
         "joint-friction": _single("joint-friction", _hinge_part, _between(0.15, 0.4)),
         "delay": _single("delay", _nowhere, _between(2, 3, digits=2)),
         "encoder-offset": _single("encoder-offset", _hinge_part, _OFFSET),
         "encoder-slip": _single("encoder-slip", _hinge_part, _OFFSET),
-        "grip": _grip(0.1),
+        "grip": _single("grip", _foot_part, _always(0.1)),
         "backlash": _single("backlash", _hinge, _between(0.1, 0.3)),
     },
     "default": {
@@ -289,15 +285,16 @@ _GROUPS: dict[str, dict[str, Draw]] = {
         "break+payload": _together(_LOST, _payload),
     },
     "onset": {
-        "onset-jam": _jam_there,
+        # At the angle at which the joint is at the onset.
+        "onset-jam": _single("jam", _hinge_part, _always(float("nan"))),
         "onset-motor": _single("motor", _part, _between(0.01, 0.3)),
         "onset-break": _LOST,
     },
     "lost-encoder": {"break-nan": _limb("nan"), "break-none": _limb("none"), "encoder": _encoder},
     "long": {
-        "long-motor": _single("motor", _thigh, lambda _rng: 0.5),
+        "long-motor": _single("motor", _thigh, _always(0.5)),
         "long-payload": _two_kilograms,
-        "long-grip": _grip(0.15),  # friction 0.12 in place of 0.8
+        "long-grip": _single("grip", _foot_part, _always(0.15)),  # friction 0.12 in place of 0.8
         "long-healthy": _together(),
     },
     "outside": {

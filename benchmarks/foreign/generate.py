@@ -51,11 +51,7 @@ class Plan:
 
 
 def generate(out: Path, plan: Plan) -> Path:
-    """Writes a recording: bags, mappings and ``truth.json``, which is written last.
-
-    Returns:
-        Its folder.
-    """
+    """Writes a recording: bags, mappings and ``truth.json``, the last; returns its folder."""
     folder = out / plan.name
     written, asked = folder / "truth.json", dataclasses.asdict(plan)
     if written.exists() and asked.items() <= json.loads(written.read_text()).items():

@@ -13,9 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,8 +21,9 @@ import pandas as pd
 from benchmarks.foreign.cases import CASES, GROUPS
 from benchmarks.foreign.generate import MATTERS
 from benchmarks.foreign.model import LEVELS
+from benchmarks.rows import markdown, rate, read_rows
 from selfmodel.arrays import FloatArray, IndexArray
-from selfmodel.studies.statistics import proportion
+from selfmodel.studies.study import Row
 
 LIMIT = 1800
 """Longest time of one command, s."""
@@ -34,10 +33,6 @@ JAM_TOLERANCE = 0.1
 
 ANGLES = ("jam", "slope", "encoder-offset", "encoder-slip")
 """Names in ``Terms`` of the kinds whose severities are angles."""
-
-Row = dict[str, Any]
-"""Name and truth of a recording, how it was diagnosed (``asked``), the answer of ``diagnose`` or
-None, the error, and the seconds."""
 
 Terms = dict[tuple[str, str], float | None]
 """Severity of each fault by name and part; None without a severity. The name is that of the kind,
@@ -94,36 +89,12 @@ def score(
             yield future.result()
 
 
-def read_rows(path: Path) -> list[Row]:
-    """Returns the rows of a file; none if it does not exist."""
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines if line.strip()]
-
-
-def add_rows(
-    path: Path, keys: Iterable[Row], limit: int | None, values_of: Callable[[Row, Path], Row]
-) -> None:
-    """Appends a row for each key that has none yet, at most ``limit``, and prints it.
-
-    A row is its key, the values and, if these have none, the seconds of processor time. The values
-    are of a key and an empty folder, which is removed.
-    """
-    done = read_rows(path)
-    new = (key for key in keys if not any(key.items() <= row.items() for row in done))
-    for key in islice(new, limit):
-        start = time.process_time()
-        with tempfile.TemporaryDirectory() as work:
-            row = {**key, **values_of(key, Path(work))}
-        row.setdefault("seconds", round(time.process_time() - start))
-        with path.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps(row)}\n")
-        print(json.dumps(row), flush=True)
-
-
 def _diagnosed(folder: Path, question: Question) -> Row:
-    """Imports and diagnoses one recording; the seconds are those of the diagnosis.
+    """Imports and diagnoses one recording.
 
-    One with a gait of its own has two healthy trials and one to explain.
+    The row has its name and truth, how it was diagnosed (``asked``), the answer of ``diagnose`` or
+    None, the error, and the seconds of the diagnosis. A recording with a gait of its own has two
+    healthy trials and one to explain.
     """
     row: Row = {
         "name": folder.name,
@@ -348,8 +319,7 @@ def table(rows: Sequence[Row], by: str) -> str:
     Faults outside all kinds that change the displacement by less than a tenth are left out.
     """
     used = [row for row in rows if row["truth"]["group"] != "outside" or _matters(row["truth"])]
-    headings = (by, "gap", "recordings", *HEADINGS.values())
-    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
+    lines = []
     for name in GROUPS if by == "group" else CASES:
         for gap in (*LEVELS, "all"):
             chosen = [
@@ -357,17 +327,12 @@ def table(rows: Sequence[Row], by: str) -> str:
                 for row in used
                 if row["truth"][by] == name and gap in (row["truth"]["gap"], "all")
             ]
-            if chosen:
-                values = (
-                    [v for one in chosen if (v := getattr(one, key)) is not None]
-                    for key in HEADINGS
-                )
-                cells = (
-                    _median(found) if key in MEDIANS else rate(found)
-                    for key, found in zip(HEADINGS, values, strict=True)
-                )
-                lines.append(f"| {' | '.join((name, gap, str(len(chosen)), *cells))} |")
-    return "\n".join(lines)
+            line = {by: name, "gap": gap, "recordings": str(len(chosen))}
+            for key, heading in HEADINGS.items():
+                found = [v for one in chosen if (v := getattr(one, key)) is not None]
+                line[heading] = _median(found) if key in MEDIANS else rate(found)
+            lines += [line] if chosen else []
+    return markdown(lines, texts=2)
 
 
 BINS = (0.0, 0.5, 0.7, 0.9, 0.95, 1.0)
@@ -390,13 +355,15 @@ def reliability(rows: Sequence[Row]) -> str:
     said = np.array([one.probability for one in found], dtype=float)
     so = np.array([one.is_so for one in found], dtype=float)
     place = row_of(said)
-    lines = ["| probability | recordings | mean probability | so |", "|---|---|---|---|"]
-    for row in np.unique(place):
-        inside = place == row
-        lines.append(
-            f"| {BINS[row]:.0%} to {BINS[row + 1]:.0%} | {inside.sum()} "
-            f"| {said[inside].mean():.1%} | {rate(so[inside].astype(bool).tolist())} |"
-        )
+    lines = [
+        {
+            "probability": f"{BINS[row]:.0%} to {BINS[row + 1]:.0%}",
+            "recordings": str((place == row).sum()),
+            "mean probability": f"{said[place == row].mean():.1%}",
+            "so": rate(so[place == row].astype(bool).tolist()),
+        }
+        for row in np.unique(place)
+    ]
     rng = np.random.default_rng(0)
     drawn = rng.integers(len(said), size=(RESAMPLES, len(said)))
     errors = [calibration_error(said[one], so[one], place[one]) for one in drawn]
@@ -406,7 +373,7 @@ def reliability(rows: Sequence[Row]) -> str:
     exact = [calibration_error(said, one, place) for one in chosen]
     chance = f"{np.mean(exact):.1%}, and {np.quantile(exact, 0.95):.1%} or more in one of 20 cases"
     measured = f"{error:.1%} ({low:.1%} to {high:.1%})"
-    return "\n".join([*lines, "", f"Calibration error {measured}; if they were exact, {chance}"])
+    return f"{markdown(lines, 1)}\nCalibration error {measured}; if they were exact, {chance}"
 
 
 def row_of(said: FloatArray) -> IndexArray:
@@ -417,17 +384,6 @@ def row_of(said: FloatArray) -> IndexArray:
 def calibration_error(said: FloatArray, so: FloatArray, place: IndexArray) -> float:
     """Returns the expected calibration error of probabilities, what was so, and their rows."""
     return float(np.abs(np.bincount(place, said - so)).sum() / len(said))
-
-
-def rate(values: Sequence[bool]) -> str:
-    """Returns the share of true values with Wilson's 95 % interval, as text."""
-    if not values:
-        return ""
-    found = proportion(sum(values), len(values))
-    return (
-        f"{sum(values)}/{len(values)}, {100 * found.estimate:.0f} % "
-        f"({100 * found.low:.0f} to {100 * found.high:.0f})"
-    )
 
 
 def _median(values: Sequence[float]) -> str:

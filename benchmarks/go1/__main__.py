@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import selfmodel
-from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.go1 import robots
 from benchmarks.go1.robots import OTHERS, WALK, Go1
 from benchmarks.go1.tables import table
+from benchmarks.rows import add_rows, add_search, parsed, settings_of
 from selfmodel import Diagnosis, Hypothesis, Robot, Settings
 from selfmodel.studies.study import Row
 
@@ -31,19 +31,11 @@ def main() -> None:
         command = commands.add_parser(name)
         command.add_argument("files", type=Path, help="folder of the files of others")
         command.add_argument("--seeds", type=int, default=seeds, help="physical robots")
-        command.add_argument("--limit", type=int, help="number of new rows")
         command.add_argument("--cases", default="", help="only those whose name has this text")
-        command.add_argument("--population", type=int, default=Settings.population)
-        command.add_argument("--generations", type=int, default=Settings.generations)
+        add_search(command)
         command.add_argument("--healthy", type=float, default=1.2, help="command of a log, m/s")
-    commands.add_parser("table", help="print tables of the rows")
-    for command in commands.choices.values():
-        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
-    given = parser.parse_args()
-    if given.command == "table":
-        print(table(read_rows(given.rows)))
-        return
-    settings = Settings(steps=robots.STEPS, generations=given.generations).scaled(given.population)
+    given = parsed(parser, commands, table)
+    settings = settings_of(given, robots.STEPS)
     robot = selfmodel.load_robot(given.files / robots.SCENE, robots.SETTINGS)
 
     def values_of(key: Row, work: Path) -> Row:

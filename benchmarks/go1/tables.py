@@ -1,11 +1,10 @@
 """Tables of the rows of ``benchmarks.go1``, in Markdown."""
 
 from collections.abc import Mapping, Sequence
-from statistics import median
+from functools import partial
 
-from benchmarks.foreign.scoring import rate
+from benchmarks.rows import lines_of, markdown, rate, spread
 from selfmodel.studies.study import Row
-from selfmodel.studies.tables import markdown_of, table_of
 
 GOALS: Mapping[str, tuple[str, float]] = {
     **{f"{how} thigh": ("first", 9.0) for how in ("dead", "locked")},
@@ -22,13 +21,12 @@ def table(rows: Sequence[Row]) -> str:
     parts = []
     for command in dict.fromkeys(row["command"] for row in rows):
         own = [row for row in rows if row["command"] == command]
-        names, answers = (sorted({row[key] for row in own}) for key in ("group", "answer"))
-        groups = {name: [row for row in own if row["group"] == name] for name in names}
-        lines = [
-            {"group": name, **(_scores(each) if command == "recover" else _rates(each, answers))}
-            for name, each in {**groups, "all": own}.items()
+        every = sorted(own, key=lambda row: str(row["group"])) + [
+            {**row, "group": "all"} for row in own
         ]
-        parts.append(markdown_of(table_of(command, lines, lines, texts=1)))
+        answers = sorted({row["answer"] for row in own})
+        columns = _scores if command == "recover" else partial(_rates, answers=answers)
+        parts.append(markdown(lines_of(every, {"group": "group"}, columns), texts=1))
     return "\n".join(parts)
 
 
@@ -44,8 +42,8 @@ def _scores(rows: Sequence[Row]) -> dict[str, str]:
     chosen = {"first": [each[0] for each in trials], "best": [max(each) for each in trials]}
     goals = {at for name, at in GOALS.items() if all(row["group"].startswith(name) for row in rows)}
     return {
-        **{name: _values([row[name] for row in rows]) for name in ("before", "unadapted")},
-        **{f"{of} trial": _values([score for score, _ in each]) for of, each in chosen.items()},
+        **{name: spread([row[name] for row in rows], ".1f") for name in ("before", "unadapted")},
+        **{f"{of} trial": spread([s for s, _ in each], ".1f") for of, each in chosen.items()},
         **{f"{of} upright": rate([not fell for _, fell in each]) for of, each in chosen.items()},
         "goal": "".join(
             f"{of} ≥ {least:g} m: {rate([score >= least for score, _ in chosen[of]])}"
@@ -56,10 +54,5 @@ def _scores(rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def _values(values: Sequence[float]) -> str:
-    return f"{median(values):.1f} ({min(values):.1f} to {max(values):.1f})"
-
-
 def _seconds(rows: Sequence[Row]) -> dict[str, str]:
-    seconds = [row["seconds"] for row in rows]
-    return {"CPU seconds": f"{median(seconds):.0f} ({min(seconds)} to {max(seconds)})"}
+    return {"CPU seconds": spread([row["seconds"] for row in rows], ".0f")}

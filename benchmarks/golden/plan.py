@@ -39,11 +39,9 @@ Scenario = tuple[str, Commands]
 
 
 def scenarios(material: Path | None) -> tuple[Scenario, ...]:
-    """Returns all scenarios.
+    """Returns all scenarios; those of an independent simulation with its folder as material only.
 
-    Args:
-        material: Folder of ``python -m benchmarks.foreign generate``; without it, the recordings of
-            an independent simulation are left out.
+    The folder is that of ``python -m benchmarks.foreign generate``.
     """
     foreign = () if material is None else _foreign(material.resolve())
     return (

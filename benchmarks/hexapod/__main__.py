@@ -10,9 +10,9 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from benchmarks.foreign.scoring import add_rows, read_rows
 from benchmarks.hexapod.robots import CASES, GAIN, MODELS, STEPS
 from benchmarks.hexapod.tables import table
+from benchmarks.rows import add_rows, add_search, parsed, settings_of
 from selfmodel import Settings
 from selfmodel.studies.study import Row
 
@@ -29,20 +29,12 @@ def main() -> None:
         command.add_argument("--seeds", type=int, nargs="+", default=[0], help="physical robots")
         command.add_argument("--gaits", type=int, nargs="+", help="seeds; those of the robots")
         command.add_argument("--cases", default="", help="only those whose name has this text")
-        command.add_argument("--limit", type=int, help="number of new rows")
         command.add_argument("--score", default="upright", help="of gaits")
         command.add_argument("--design", default="network", help="of gaits")
         command.add_argument("--repair", default="robust", help="of recoveries")
         command.add_argument("--trials", type=int, default=Settings.trials, help="of recoveries")
-        command.add_argument("--population", type=int, default=Settings.population)
-        command.add_argument("--generations", type=int, default=Settings.generations)
-    commands.add_parser("table", help="print tables of the rows")
-    for command in commands.choices.values():
-        command.add_argument("rows", type=Path, help="file of the rows, JSON lines")
-    given = parser.parse_args()
-    if given.command == "table":
-        print(table(read_rows(given.rows)))
-        return
+        add_search(command)
+    given = parsed(parser, commands, table)
     # Here, so that --help and the tables need no PyBullet.
     from benchmarks.hexapod import trials  # noqa: PLC0415  # see above
 
@@ -51,12 +43,9 @@ def main() -> None:
         "diagnose": trials.diagnosed,
         "recover": trials.recovered,
     }
-    settings = Settings(steps=STEPS, trials=given.trials, generations=given.generations).scaled(
-        given.population
-    )
+    settings = settings_of(given, STEPS)
     bench = trials.Bench(given.folder, settings, given.score, given.design, given.repair)
-    of = partial(run[given.command], bench)
-    add_rows(given.rows, cases(given), given.limit, of)
+    add_rows(given.rows, cases(given), given.limit, partial(run[given.command], bench))
 
 
 def cases(given: argparse.Namespace) -> Iterator[Row]:

@@ -1,11 +1,9 @@
 """Tables of the rows of ``benchmarks.hexapod``, in Markdown."""
 
 from collections.abc import Sequence
-from statistics import median
 
-from benchmarks.foreign.scoring import rate
+from benchmarks.rows import lines_of, markdown, rate, spread
 from selfmodel.studies.study import Row
-from selfmodel.studies.tables import markdown_of, table_of
 
 HEADINGS = {"model": "self-model", "gain": "gain", "design": "gaits", "group": "failed"}
 """Column of each part of what names a line."""
@@ -19,15 +17,8 @@ def table(rows: Sequence[Row]) -> str:
     parts, columns = [], {"walk": _walks, "diagnose": _diagnoses, "recover": _recoveries}
     for command in dict.fromkeys(row["command"] for row in rows):
         own = [row for row in rows if row["command"] == command]
-        groups: dict[tuple[str, ...], list[Row]] = {}
-        for row in own:
-            groups.setdefault(tuple(str(row[key]) for key in HEADINGS), []).append(row)
-        lines = []
-        for name, chosen in groups.items():
-            heading = dict(zip(HEADINGS.values(), name, strict=True))
-            seconds = _values([row["seconds"] for row in chosen])
-            lines.append({**heading, **columns[command](chosen), "CPU seconds": seconds})
-        parts.append(markdown_of(table_of(command, lines, lines, texts=len(HEADINGS))))
+        lines = lines_of(own, HEADINGS, columns[command])
+        parts.append(markdown(lines, texts=len(HEADINGS)))
     return "\n".join(parts)
 
 
@@ -38,6 +29,7 @@ def _walks(rows: Sequence[Row]) -> dict[str, str]:
         "walked, m": _values([row["walked"] for row in rows]),
         "walked ÷ predicted": _values([row["walked"] / row["predicted"] for row in rows]),
         **_courses(rows),
+        **_seconds(rows),
     }
 
 
@@ -46,6 +38,7 @@ def _diagnoses(rows: Sequence[Row]) -> dict[str, str]:
         "legs named": rate([row["right"] for row in rows]),
         "kinds": ", ".join(sorted({kind for row in rows for kind in row["kinds"]})),
         "seconds of the diagnosis": _values([row["spent"] for row in rows]),
+        **_seconds(rows),
     }
 
 
@@ -62,6 +55,7 @@ def _recoveries(rows: Sequence[Row]) -> dict[str, str]:
         "first ÷ before": _ratios(first, before),
         "best ÷ before": _ratios(best, before),
         **_courses(trials),
+        **_seconds(rows),
     }
 
 
@@ -78,5 +72,8 @@ def _courses(trials: Sequence[Row]) -> dict[str, str]:
 
 def _values(values: Sequence[float]) -> str:
     """Returns the median and the range, or the one value."""
-    middle = f"{median(values):.3g}"
-    return f"{middle} ({min(values):.3g} to {max(values):.3g})" if len(values) > 1 else middle
+    return spread(values) if len(values) > 1 else f"{values[0]:.3g}"
+
+
+def _seconds(rows: Sequence[Row]) -> dict[str, str]:
+    return {"CPU seconds": _values([row["seconds"] for row in rows])}

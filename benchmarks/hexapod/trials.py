@@ -1,27 +1,61 @@
-"""First gaits, walks, diagnoses and recoveries of the hexapod in PyBullet."""
+"""First gaits, walks, diagnoses and recoveries of the hexapod in PyBullet.
+
+It has Bullet's own position motors, and Bullet's own time step.
+"""
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
 
 import selfmodel
-from benchmarks.hexapod.environment import HexapodEnvironment
-from benchmarks.hexapod.robots import LEGS, STEPS, self_model
-from benchmarks.other_engine.environment import physical_robot
+from benchmarks.hexapod.robots import EFFORT, LEGS, STEPS, VELOCITY, retracted, self_model, urdf
+from benchmarks.other_engine.bullet import Bullet
+from benchmarks.other_engine.client import SUBSTEP, scale, with_faults
+from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
+from benchmarks.other_engine.reality import Damage, draw_reality
 from benchmarks.other_engine.recovery import heading_change, in_mujoco
-from selfmodel import Controller, Diagnosis, EnvironmentRobot, Settings, Simulator, Trial
+from benchmarks.rows import kept_gait
+from selfmodel import Controller, Diagnosis, EnvironmentRobot, Robot, Settings, Simulator, Trial
 from selfmodel.faults.hypothesis import INTACT
-from selfmodel.logs import load_controller, save_controller
 from selfmodel.recovery.falls import falls_of
 from selfmodel.studies.study import Row
 
 FINER = 4
 """Part of the time step of a self-model at which its predictions are made again."""
 
+TIMESTEP = 1 / 240
+"""Bullet's time step, s."""
+
 model_of = cache(self_model)
+
+
+class HexapodEnvironment(BulletEnvironment):
+    """The hexapod of a seed with failed legs, such as ``front_left+back_left``, or ``intact``.
+
+    The gain of its motors is the part of an error that a step of Bullet ends, as far as the effort
+    and the largest speed allow. Draws and noise are those of the robots of ``other_engine``.
+    """
+
+    def __init__(self, robot: Robot, seed: int, legs: str, gain: float, stream: int = 0) -> None:
+        reality, damage = draw_reality(robot, seed), Damage(fixed=retracted(legs))
+        reality = replace(reality, delay=round(reality.delay * SUBSTEP / TIMESTEP))
+        tree = ET.fromstring(urdf())  # noqa: S314  # our own text
+        for link in tree.findall("link"):
+            scale(link, reality.masses[robot.model.body(link.get("name")).id])
+        faulty = with_faults(tree, damage.lost, damage.fixed)
+        bullet = Bullet(robot, reality, damage, faulty, TIMESTEP)
+        super().__init__(robot, reality, damage, stream, bullet)
+        self._efforts = EFFORT * np.array(reality.torques)
+        self._motor = {"positionGain": gain, "velocityGain": 1.0, "maxVelocity": VELOCITY}
+
+    def _drive(self) -> None:
+        self._bullet.follow(self._targets, self._efforts, self._motor)
 
 
 @dataclass(frozen=True)
@@ -39,18 +73,8 @@ class Bench:
         model, seed = key["model"], key["gait"]
         size = f"{self.settings.population}x{self.settings.generations}"
         path = self.folder / f"{model}-{self.design}-{self.score}-{size}-{seed}.npz"
-        if not path.exists():
-            self.folder.mkdir(parents=True, exist_ok=True)
-            gait = selfmodel.evolve(
-                model_of(model),
-                design=self.design,
-                score=self.score,
-                settings=self.settings,
-                seed=seed,
-                threads=1,
-            )
-            save_controller(path, gait)
-        return load_controller(path)
+        search = {"design": self.design, "score": self.score, "seed": seed}
+        return kept_gait(path, model_of(model), settings=self.settings, **search)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.foreign.scoring import read_rows
+from benchmarks.rows import read_rows, settings_of
 from selfmodel.errors import InputError
 from selfmodel.settings import Settings
 from selfmodel.tasks import ROBOTS
@@ -58,15 +58,12 @@ def _run(options: argparse.Namespace) -> None:
 
     match options.command:
         case "recover":
-            settings = Settings(
-                steps=options.steps, trials=options.trials, generations=options.generations
-            ).scaled(options.population)
             row = recovery.recovered(
                 options.robot,
                 options.case,
                 options.seed,
                 options.out,
-                settings=settings,
+                settings=settings_of(options, options.steps),
                 design=options.design,
                 threads=options.threads,
             )

@@ -72,9 +72,7 @@ def record(out: Path, case: str, seed: int, *, own_gait: bool, duration: float =
     """Writes a healthy trial with a trot, and one of the robot with a fault, and ``truth.json``.
 
     With ``own_gait``, there are two healthy trials, and the other trial has another gait: a walk.
-
-    Returns:
-        Their folder.
+    The folder of the trials is returned.
     """
     plan, robot = Plan("a1", case, seed, GAP, duration, trials=1, own_gait=own_gait), a1()
     folder = out / f"a1-{case}-{seed}{'-own' * own_gait}"

@@ -4,14 +4,13 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 import selfmodel
-from benchmarks.foreign.scoring import rate
 from benchmarks.other_engine.environment import BulletEnvironment, physical_robot
 from benchmarks.other_engine.reality import Damage, Reality, damage_of, draw_reality, ideal_reality
+from benchmarks.rows import lines_of, markdown, rate, spread
 from selfmodel.controllers.controller import CommandSource, Controller
 from selfmodel.errors import WorkError, describe
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
@@ -24,11 +23,11 @@ from selfmodel.rotation import headings
 from selfmodel.settings import Settings
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.studies.experiment import is_correct
+from selfmodel.studies.study import Row
 from selfmodel.tasks import ROBOTS
 from selfmodel.trials.trajectory import Trajectory, collect, forward_displacement
 from selfmodel.version import __version__
 
-Row = dict[str, Any]
 PAPER = Settings()
 
 
@@ -160,29 +159,19 @@ def _in_bullet(robot: Robot, gait: Controller, reality: Reality, steps: int) -> 
     return f"{float(forward_displacement(walk)):.1f} ({heading_change(walk):.0f})"
 
 
-HEADINGS = (
-    *("recoveries", "diagnosis right", "before, m", "after, m", "recovered, m"),
-    *("recovered ÷ before", "first trial ÷ before", "physical ÷ simulated", "upright", "seconds"),
-)
-
-
 def table(rows: Sequence[Row]) -> str:
     """Returns rates with Wilson's 95 % intervals and medians as Markdown, by robot and case.
 
     A recovery that ended with an error counts as a wrong diagnosis, and as a recovery of 0 m that
     is not upright. One whose healthy robot went backwards has no ratio to the displacement before.
     """
-    headings = ("robot", "case", *HEADINGS)
-    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
-    for robot in dict.fromkeys(row["robot"] for row in rows):
-        of_robot = [row for row in rows if row["robot"] == robot]
-        for case in (*sorted({row["case"] for row in of_robot}), "all"):
-            chosen = [row for row in of_robot if case in ("all", row["case"])]
-            lines.append(f"| {robot} | {case} | {' | '.join(_cells(chosen))} |")
-    return "\n".join(lines)
+    robots = dict.fromkeys(row["robot"] for row in rows)
+    every = [{**row, "case": case} for row in rows for case in (row["case"], "all")]
+    every.sort(key=lambda row: ([*robots].index(row["robot"]), row["case"] == "all", row["case"]))
+    return markdown(lines_of(every, {"robot": "robot", "case": "case"}, _columns), texts=2)
 
 
-def _cells(rows: Sequence[Row]) -> list[str]:
+def _columns(rows: Sequence[Row]) -> dict[str, str]:
     complete = [row for row in rows if "error" not in row]
     forward = [row for row in complete if row["before"] > 0]
     errors = [0.0] * (len(rows) - len(complete))
@@ -190,23 +179,18 @@ def _cells(rows: Sequence[Row]) -> list[str]:
     ratios = [trial["displacement"] / trial["simulated"] for trial in trials if trial["simulated"]]
     first = [_recovery_trials(row)[0]["displacement"] / row["before"] for row in forward]
     best = [max(_recovery_trials(row), key=lambda trial: trial["displacement"]) for row in complete]
-    return [
-        str(len(rows)),
-        rate([row.get("correct", False) for row in rows]),
-        *(_median([row[key] for row in complete]) for key in ("before", "after", "recovered")),
-        _median([row["recovered"] / row["before"] for row in forward] + errors),
-        _median(first + errors),
-        _median(ratios),
-        rate([trial["upright"] for trial in best] + [False] * len(errors)),
-        _median([row["seconds"] for row in rows]),
-    ]
+    ends = {end: spread([row[end] for row in complete]) for end in ("before", "after", "recovered")}
+    return {
+        "recoveries": str(len(rows)),
+        "diagnosis right": rate([row.get("correct", False) for row in rows]),
+        **{f"{end}, m": values for end, values in ends.items()},
+        "recovered ÷ before": spread([r["recovered"] / r["before"] for r in forward] + errors),
+        "first trial ÷ before": spread(first + errors),
+        "physical ÷ simulated": spread(ratios),
+        "upright": rate([trial["upright"] for trial in best] + [False] * len(errors)),
+        "seconds": spread([row["seconds"] for row in rows]),
+    }
 
 
 def _recovery_trials(row: Row) -> list[Row]:
     return [trial for trial in row["trials"] if trial["stage"] == "recovery"]
-
-
-def _median(values: Sequence[float]) -> str:
-    if not values:
-        return ""
-    return f"{np.median(values):.3g} ({min(values):.3g} to {max(values):.3g})"

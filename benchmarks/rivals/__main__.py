@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.rivals.methods import METHODS, Fitness, Problem
+from benchmarks.rows import markdown
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.faults.build import build
@@ -41,7 +42,6 @@ from selfmodel.studies.cells import Cell
 from selfmodel.studies.experiment import draw_reality
 from selfmodel.studies.rows import AFTER, KINDS, ORACLE, frame_of, method_value, oracles
 from selfmodel.studies.study import Row, Study
-from selfmodel.studies.tables import markdown_of, table_of
 from selfmodel.tasks import ROBOTS
 
 FILE = "repertoire.npz"
@@ -229,7 +229,7 @@ def table(rows: Sequence[Row]) -> str:
                 "seconds": f"{own['seconds'].median():.0f}",
             }
         )
-    return markdown_of(table_of("rivals", lines, lines, texts=4)) if lines else ""
+    return markdown(lines, texts=4)
 
 
 if __name__ == "__main__":

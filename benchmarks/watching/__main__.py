@@ -11,7 +11,7 @@ from pathlib import Path
 
 import selfmodel
 from benchmarks.foreign.model import LEVELS
-from benchmarks.foreign.scoring import add_rows, read_rows
+from benchmarks.rows import add_rows, parsed
 from benchmarks.watching.monitors import METHODS
 from benchmarks.watching.recordings import recordings, watched
 from benchmarks.watching.rivals import compared
@@ -39,14 +39,7 @@ def main() -> None:
     commands.choices["faults"].add_argument("--cases", nargs="+", default=[*FAULTS])
     commands.choices["faults"].add_argument("--draws", type=int, default=1, help="of each case")
     commands.choices["rivals"].add_argument("--methods", nargs="+", default=[*METHODS])
-    commands.add_parser("table", help="print tables of the rows of files")
-    for name, command in commands.choices.items():
-        files = "+" if name == "table" else None
-        command.add_argument("rows", type=Path, nargs=files, help="file of the rows, JSON lines")
-    given = parser.parse_args()
-    if given.command == "table":
-        print(table([row for path in given.rows for row in read_rows(path)]))
-        return
+    given = parsed(parser, commands, table)
     if given.command == "recordings":
         found = recordings()
         keys = (one.key for one in found.values())

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from benchmarks.foreign.scoring import rate
+from benchmarks.rows import lines_of, markdown, rate
 from benchmarks.watching.streams import FAULTS
 from selfmodel.studies.study import Row
-from selfmodel.studies.tables import markdown_of, table_of
 
 HEADINGS = {"robot": "robot", "gap": "gap", "gaits": "gaits", "case": "fault"}
 """Column of each part of what names a line."""
@@ -21,16 +20,12 @@ def table(rows: Sequence[Row]) -> str:
         ("healthy", _healthy, ("robot", "gap", "gaits")),
         ("faults", _faults, ("robot", "case")),
     ):
-        groups: dict[tuple[str, ...], list[Row]] = {}
-        for row in rows:
-            if row["command"] == command:
-                groups.setdefault(tuple(str(row[name]) for name in names), []).append(row)
-        lines = [
-            {**dict(zip((HEADINGS[one] for one in names), name, strict=True)), **columns(chosen)}
-            for name, chosen in sorted(groups.items())
-        ]
-        if lines:
-            parts.append(markdown_of(table_of(command, lines, lines, texts=len(names))))
+        own = sorted(
+            (row for row in rows if row["command"] == command),
+            key=lambda row: [str(row[name]) for name in names],
+        )
+        lines = lines_of(own, {name: HEADINGS[name] for name in names}, columns)
+        parts.append(markdown(lines, texts=len(names)))
     recordings = [
         {
             "recording": row["recording"],
@@ -42,13 +37,12 @@ def table(rows: Sequence[Row]) -> str:
         for row in rows
         if row["command"] == "recordings"
     ]
-    if recordings:
-        parts.append(markdown_of(table_of("recordings", recordings, recordings, texts=3)))
+    parts.append(markdown(recordings, texts=3))
     if rivals := [row for row in rows if row["command"] == "rivals"]:
         parts.append(
             _compared(rivals, [row for row in rows if row["command"] in ("healthy", "faults")])
         )
-    return "\n".join(parts)
+    return "\n".join(filter(None, parts))
 
 
 def _healthy(rows: Sequence[Row]) -> dict[str, str]:
@@ -124,7 +118,7 @@ def _compared(rows: Sequence[Row], watches: Sequence[Row]) -> str:
     alarms = sum(len(row["alarms"]) for row in healthy)
     minutes = sum(row["judged"] for row in healthy) / 60
     lines.insert(0, _rival("`watch`", "its own", alarms, minutes, faults))
-    return markdown_of(table_of("rivals", lines, lines, texts=2))
+    return markdown(lines, texts=2)
 
 
 def _machine(row: Row) -> tuple[str, str, int]:

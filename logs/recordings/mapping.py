@@ -91,13 +91,7 @@ class Section(Struct, forbid_unknown_fields=True):
 
 
 class Link(Section):
-    """Conversion of a recorded angle: angle = sign * recorded + offset.
-
-    Attributes:
-        name: Name in the recording.
-        sign: Sign, 1 or -1.
-        offset: Offset in the unit of the recording.
-    """
+    """Conversion of a recorded angle, in its unit: angle = sign * recorded + offset."""
 
     name: str
     sign: Number = 1.0

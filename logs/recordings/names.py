@@ -56,11 +56,8 @@ def matched(wanted: Sequence[str], offered: Sequence[str]) -> dict[str, tuple[st
     """Returns the most similar offered name for each wanted name, each used once.
 
     Order, case and the usual abbreviations do not matter: ``FL_calf_joint`` is similar to
-    ``front_left_knee``.
-
-    Returns:
-        Offered name, and whether the match is certain, by wanted name; names without a match are
-        left out.
+    ``front_left_knee``. With an offered name is whether the match is certain. Wanted names without
+    a match are left out.
     """
     scores = {(ours, theirs): likeness(ours, theirs) for ours in wanted for theirs in offered}
     found: dict[str, tuple[str, bool]] = {}

@@ -75,9 +75,8 @@ NOTHING = Track(np.zeros(0, dtype=np.int64), np.zeros((0, 1)))
 def clocked(series: Series, clock: str) -> Clocked:
     """Returns the times of a topic's messages.
 
-    Args:
-        series: Messages of the topic.
-        clock: ``header`` for stamps, with log times for messages without a stamp; else log times.
+    The clock ``header`` is that of stamps, with log times for messages without a stamp; any other
+    is that of log times.
 
     Raises:
         ValueError: The stamps of the topic and its log times are of different clocks.
@@ -141,11 +140,7 @@ class ControlSteps:
 
 
 def at_steps(track: Track, steps: ControlSteps, method: Method, width: int) -> FloatArray:
-    """Returns a track at control steps; NaN where not observed.
-
-    Returns:
-        Numbers of the quantity, ``(steps, width)``.
-    """
+    """Returns a track at control steps, ``(steps, width)``; NaN where not observed."""
     if not len(track):
         return np.full((len(steps.numbers), width), np.nan)
     # float64 represents nanoseconds exactly for a hundred days.

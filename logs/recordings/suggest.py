@@ -62,13 +62,9 @@ class _Offer:
 
 
 def suggest(path: Path, robot: Robot, name: str, *, with_timestep: bool) -> str:
-    """Returns the suggestion of a mapping, as TOML.
+    """Returns the suggestion of a mapping of a bag or a table, as TOML.
 
-    Args:
-        path: Folder or file of a bag, or a table.
-        robot: Robot of the recording.
-        name: Name of the robot in the mapping, or its MJCF or URDF file.
-        with_timestep: Whether the mapping must contain the control time step.
+    The name is that of the robot in the mapping, or its MJCF or URDF file.
     """
     offer = _in_table(path, robot) if is_table(path) else _in_bag(read_bag(path), robot)
     physics = float(robot.model.opt.timestep)

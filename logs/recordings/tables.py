@@ -50,11 +50,8 @@ def is_table(path: Path) -> bool:
 def read_table(path: Path, wanted: Collection[str], *, time: str = "", unit: int = 1) -> Recording:
     """Returns a table; without a time column, its rows have no times.
 
-    Args:
-        path: A file with a suffix of ``FORMATS``.
-        wanted: Names of the columns to read; a name that the table does not have is left out.
-        time: Name of the time column, whose unit is in ns; rows without a time are left out.
-        unit: That unit.
+    A wanted column that the table does not have is left out, and so are rows without a time. The
+    unit is that of the times, ns.
 
     Raises:
         InputError: The file cannot be read, a wanted column has no numbers or another length than
@@ -355,12 +352,7 @@ FORMATS: Mapping[str, Format] = {
 def export(path: Path, trajectory: Trajectory) -> tuple[str, ...]:
     """Writes the observed signals of a trial as a table, which ``logs import`` reads again.
 
-    Args:
-        path: Name of the file, which must not exist, with the suffix of a format.
-        trajectory: Trajectory of the trial.
-
-    Returns:
-        Names of the columns.
+    The file must not exist; its suffix is that of a format. Returns the names of the columns.
     """
     write = writer_of(path)
     columns = columns_of(trajectory)

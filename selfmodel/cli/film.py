@@ -144,14 +144,10 @@ def film_of(
     motions: Sequence[tuple[str, Trajectory]],
     moments: FloatArray,
 ) -> Film:
-    """Returns the film of some motions.
+    """Returns the film of some motions by title, all with the same times.
 
-    Args:
-        robot: The healthy robot.
-        hypothesis: Hypothesis whose detached and jammed bodies are marked.
-        motions: Title and trajectory of each motion, all with the same times.
-        moments: Times of the frames, ``(frames,)``, s; a frame shows the last step at or before its
-            time.
+    The detached and jammed bodies of the hypothesis are marked. The moments are times of frames,
+    s; a frame shows the last step at or before its time.
     """
     variant = build(robot, hypothesis)
     model, time = variant.model, motions[0][1].time

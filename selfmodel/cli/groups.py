@@ -79,15 +79,11 @@ def group(
     *,
     completion: bool = False,
 ) -> typer.Typer:
-    """Returns a command group.
+    """Returns a command group, with or without the options that install shell completion.
 
-    Args:
-        name: Name of the group.
-        summary: Help text of the group.
-        commands: In the order of the help page, per command: its one-line help; ``module:function``
-            of its work, which is imported as the command runs; and the class in ``commands`` of the
-            options that the work takes. A group has its application instead of the last two.
-        completion: Adds the options that install shell completion.
+    The commands are in the order of the help page. Each has its one-line help; ``module:function``
+    of its work, which is imported as the command runs; and the class in ``commands`` of the options
+    that the work takes. A group has its application instead of the last two.
     """
     app = _app(name=name, help=summary, no_args_is_help=True, add_completion=completion)
     for command, (text, *source) in commands.items():

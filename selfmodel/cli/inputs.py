@@ -30,12 +30,9 @@ def case_notation(
 
 
 def texts(option: str, given: str, every: Iterable[str] | None = None) -> tuple[str, ...]:
-    """Returns the distinct texts of a list with commas.
+    """Returns the distinct texts of a list with commas, the value of an option.
 
-    Args:
-        option: Name of the option, such as ``--robots``, for the message.
-        given: Value of the option.
-        every: Texts meant by ``all``; None if ``all`` has no meaning.
+    ``every`` has the texts meant by ``all``; None if ``all`` has no meaning.
 
     Raises:
         InputError: The list or an item of it is empty.

@@ -74,8 +74,7 @@ def watch(options: WatchLog) -> None:
 def _opened(options: WatchLog, robot: Robot, files: ExitStack) -> tuple[Steps, Callable[[], int]]:
     """Opens a log or a recording, of which a first look refuses what is none.
 
-    Returns:
-        Its steps, and what returns the time stamp of the first one, ns.
+    Returned are its steps, and what returns the time stamp of the first one, ns.
     """
     follow, mapping = options.follow, options.mapping
     if options.run is not None and (follow or mapping is None):

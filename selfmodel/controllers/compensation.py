@@ -61,11 +61,7 @@ class Compensated(Design):
 
     A genome has the offsets, then the gains of the motors, then the shift of the velocity if the
     base is a policy that is commanded one, then with ``feedback`` each motor's responses to gravity
-    (x, y) and to the angular velocity (x, y, z).
-
-    Attributes:
-        base: The controller within.
-        feedback: Whether the layer responds to tilt and turning.
+    (x, y) and to the angular velocity (x, y, z). The ``base`` is the controller within.
 
     Raises:
         ValueError: The controller within has a layer already, or other sensors, motors or ranges.

@@ -222,10 +222,8 @@ def make_batch(
 ) -> ControllerBatch:
     """Returns the batch of the command sources of many robots, in their initial state.
 
-    Args:
-        sources: Command sources, one per robot: controllers of one design, or playbacks.
-        silent: Indices of the silent hidden neurons per robot; they do not affect a playback.
-        sensors: Number of sensors of a robot.
+    The sources, one per robot, are controllers of one design, or playbacks. Silent are the hidden
+    neurons of each robot with these indices; they do not affect a playback.
 
     Raises:
         ValueError: The sources are not all playbacks or all controllers of one design.

@@ -81,12 +81,10 @@ class Cpg(Design):
         return f"a CPG of {self.decode(genome).frequency:.2f} Hz"
 
     def decode(self, genome: FloatArray) -> "CpgParameters":
-        """Returns the parameters of a genome.
+        """Returns the parameters of a genome, ``(weights,)``, each value in [-1, 1].
 
-        Args:
-            genome: ``(weights,)``, each value in [-1, 1]: the frequency, then per motor the
-                amplitudes, the offsets and the phases, then per sensor the feedback, then per motor
-                the heading hold.
+        It has the frequency, then per motor the amplitudes, the offsets and the phases, then per
+        sensor the feedback, then per motor the heading hold.
         """
         motors = len(self.motors)
         ends = np.cumsum([1, 3 * motors, len(self.sensors)])

@@ -49,10 +49,7 @@ class Node:
 class State:
     """Numbers that a recurrent network hands to its next evaluation, ``(1, n, width)``; 0 at first.
 
-    Attributes:
-        input: Name of the input that receives them.
-        output: Name of the output that has the next ones.
-        width: Numbers a row.
+    They are an input of the network, by name, and the next ones an output.
     """
 
     input: str

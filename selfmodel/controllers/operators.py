@@ -169,12 +169,9 @@ def _recurrent(
 ) -> Sequence[FloatArray]:
     """Returns the outputs of a recurrent cell of one direction after one time step.
 
-    Args:
-        arguments: Rows, ``(1, n, inputs)``, both matrices, bias, lengths, states.
-        attributes: Those of the node.
-        gates: Number of its gates.
-        cell: Function from the product of the rows, ``(n, gates * width)``, the matrix of the
-            states, both biases and the rows of the states to the next rows of the states.
+    The arguments are rows, ``(1, n, inputs)``, both matrices, bias, lengths and states. The cell is
+    a function from the product of the rows, ``(n, gates * width)``, the matrix of the states, both
+    biases and the rows of the states to the next rows of the states.
     """
     x, matrix, own, *more = arguments
     more += [None] * (4 - len(more))

@@ -265,11 +265,8 @@ class Policy(Design):
 class PolicyBatch:
     """The policies of many robots; a ``ControllerBatch``.
 
-    Args:
-        policy: The policy.
-        count: Number of robots.
-        tensors: Tensors of the network of each robot, ``(count, ...)``, by name; the others are
-            those of the policy.
+    Tensors of the network, by name, may differ from robot to robot, ``(count, ...)``; the others
+    are those of the policy.
 
     Attributes:
         velocity: Commanded velocity of each robot, ``(n, 3)``.

@@ -61,10 +61,7 @@ class Evolved(Policy):
 class Trained(Evolved):
     """A policy whose genome is a change of all weights of its network.
 
-    A weight is that of the network plus ``span`` times the value of the genome.
-
-    Attributes:
-        span: Largest change of a weight.
+    A weight is that of the network plus ``span``, its largest change, times the genome's value.
     """
 
     name: ClassVar[str] = "trained"

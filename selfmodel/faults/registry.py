@@ -121,12 +121,10 @@ def cases_of(anatomy: Anatomy, is_leg: Callable[[Sequence[Joint]], bool]) -> Map
     first, then the order is the model's. Cases that a robot cannot have are omitted: 3 and 4
     without touch sensors; 4, 7 and 8 with one limb; 8 with two limbs.
 
-    Source: the paper, Table I; for the paper's two robots the cases equal the paper's.
+    ``is_leg``, such as ``reaches_ground``, is given the joints of a limb, the one nearest to the
+    root body first.
 
-    Args:
-        anatomy: The robot's parts.
-        is_leg: Whether a limb is a leg, such as ``reaches_ground``, given its joints, the one
-            nearest to the root body first.
+    Source: the paper, Table I; for the paper's two robots the cases equal the paper's.
     """
     every = limbs(anatomy)
     every = [limb for limb in every if is_leg(limb)] or every

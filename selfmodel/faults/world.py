@@ -199,10 +199,8 @@ def estimated_heights(points: FloatArray) -> FloatArray:
 
     The heights are scaled to the standard deviation of a terrain of roughness 1: the severity of
     the fault sets the scale, not the points. Cells without contacts have the height of the nearest
-    cell with contacts. All heights are 0 with too few contacts beyond the flat ground.
-
-    Args:
-        points: Contact points of the feet, in the frame of the ground, ``(n, 3)``, m.
+    cell with contacts. All heights are 0 with too few contacts beyond the flat ground. The points
+    are contacts of the feet, in the frame of the ground, ``(n, 3)``, m.
     """
     from scipy.ndimage import distance_transform_edt  # noqa: PLC0415  # slow to import
 

@@ -27,10 +27,6 @@ class PhysicalRobot(Protocol):
 
         The robot stops when the caller stops iterating.
 
-        Args:
-            controller: Source of the commands.
-            steps: Control steps to run.
-
         Yields:
             State, readings and commands of each control step, ``steps`` samples. Sample times are
             nominal, exact multiples of the control time step; the measured time of a step of a

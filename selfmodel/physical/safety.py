@@ -206,10 +206,8 @@ def cleanup(action: Callable[[], object]) -> Iterator[None]:
 
     An exception of the block, such as Ctrl-C, is raised in any case: a failure of the action is
     added to it as a note, where ``contextlib.ExitStack`` would raise the failure instead. After
-    a block without an exception, or in a closed generator, a failure of the action is raised.
-
-    Args:
-        action: The action; it may raise ``OSError`` or ``WorkError``.
+    a block without an exception, or in a closed generator, a failure of the action is raised. The
+    action may raise ``OSError`` or ``WorkError``.
     """
     try:
         yield
@@ -238,11 +236,7 @@ class Watchdog:
     After a call that did not return, because of the time limit or of a signal, the end of the block
     makes the thread send the safe command once more as soon as the call returns: the driver may
     have sent targets after the first safe command. The end of the block waits for that for at most
-    ``seconds``; the thread waits longer, until the process ends.
-
-    Args:
-        seconds: Time limit of a call, s.
-        send_safe: Sends the safe command.
+    ``seconds``, the time limit of a call; the thread waits longer, until the process ends.
     """
 
     def __init__(self, seconds: float, send_safe: Callable[[], object]) -> None:

@@ -24,11 +24,8 @@ class Stepped:
 
     Its signals are those in an observation by name, and of MuJoCo's state of ``env.physics``, or of
     ``env.unwrapped.model`` and ``data``, the others. The readings of the sensors are those of the
-    robot's model in that state, if the environment has the same body.
-
-    Attributes:
-        rewards: Rewards of the episode so far.
-        is_over: Whether the environment has ended the episode.
+    robot's model in that state, if the environment has the same body. The rewards are those of the
+    episode so far, which ``is_over`` once the environment has ended it.
     """
 
     def __init__(self, env: Any, robot: Robot) -> None:  # noqa: ANN401  # of either interface

@@ -91,16 +91,12 @@ def viable(
     fitness: RobustFitness,
     evaluations: int,
 ) -> tuple[CandidateController, ...]:
-    """Returns the candidates whose rollouts remained finite under most conditions.
+    """Returns the candidates whose rollouts remained finite under most conditions, best first.
 
-    Args:
-        controllers: Controllers, best first.
-        scores: Their scores, ``(controllers, conditions)``.
-        fitness: What scored them.
-        evaluations: Number of controllers evaluated by the search, for the error.
+    The scores are ``(controllers, conditions)``, and the fitness is what scored them.
 
     Raises:
-        WorkError: None did.
+        WorkError: None did; the message has the evaluations of the search.
     """
     finite = np.isfinite(scores)
     rows = np.flatnonzero(finite.mean(axis=1) >= VIABLE).tolist()
@@ -125,11 +121,8 @@ Candidates = tuple[CandidateController, ...]
 def unflattered(repair: Evolves, search: Callable[[], tuple[Candidates, Candidates]]) -> Candidates:
     """Returns the candidates of a search that keep their scores at a quarter of the time step.
 
-    If none does, the repair has that time step from now on, and the search is repeated.
-
-    Args:
-        repair: The repair, whose simulator the search uses.
-        search: Returns all candidates of a search, and those of them that keep their scores.
+    If none does, the repair has that time step from now on, and the search is repeated. The search
+    returns all candidates, and those of them that keep their scores.
     """
     found, kept = search()
     if not kept and repair.parts == 1:
@@ -143,13 +136,9 @@ def converged(
 ) -> Candidates:
     """Returns the candidates that keep their scores at a quarter of the physics time step.
 
-    What a stiff servo or a massless rotor does at a coarse time step is no motion of a robot.
-
-    Args:
-        candidates: Candidates, best first.
-        fitness: What scored them.
-        steps: Control steps of a rollout.
-        rng: Random number generator in the state in which their conditions were drawn.
+    What a stiff servo or a massless rotor does at a coarse time step is no motion of a robot. The
+    fitness is what scored the candidates, best first, and the generator in the state in which their
+    conditions were drawn.
     """
     finer = replace(fitness, simulator=fitness.simulator.finer(FINER))
     conditions = max(1, len(candidates[0].scores) // FINER)

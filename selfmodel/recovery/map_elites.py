@@ -79,18 +79,9 @@ def make_repertoire(
     """Returns a repertoire of gaits: the best genome of each cell of a grid of duty factors.
 
     All genomes are in hundredths, as random genomes are. The batches are random until a genome has
-    entered the archive. Children are drawn by Iso+LineDD from pairs of elites.
-
-    Args:
-        robot: The healthy robot.
-        design: Design of the controllers.
-        evaluate: Evaluation of gaits; see ``simulated_evaluation``.
-        steps: Control steps of a rollout of ``evaluate``, for the origin of the repertoire.
-        seed: Seed of all random numbers.
-        evaluations: Number of gaits to evaluate.
-        levels: Cells along each axis of the grid; None for ``LEVELS`` of the robot's feet.
-        batch: Gaits in a batch.
-        on_filling: Called after each batch.
+    entered the archive. Children are drawn by Iso+LineDD from pairs of elites. The gaits are those
+    of the healthy robot, evaluated as by ``simulated_evaluation`` in rollouts of some steps. The
+    levels are cells along each axis of the grid; None for ``LEVELS`` of the robot's feet.
 
     Raises:
         InputError: The robot has no touch sensors or too many, pyribs is not installed, or an
@@ -212,11 +203,7 @@ def reevaluate(repertoire: Repertoire, evaluate: Evaluate) -> tuple[Controller, 
     """Returns the gaits with a finite score in another evaluation, best first.
 
     No physical trial is needed for the gaits of a damaged robot: they are evaluated in simulation
-    under the diagnosed hypothesis.
-
-    Args:
-        repertoire: The repertoire.
-        evaluate: The evaluation, such as ``simulated_evaluation(simulator, diagnosed, steps)``.
+    under the diagnosed hypothesis, by ``simulated_evaluation(simulator, diagnosed, steps)``.
     """
     gaits = [repertoire.controller(k) for k in range(len(repertoire))]
     scores, _ = evaluate(gaits)

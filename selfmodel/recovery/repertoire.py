@@ -19,16 +19,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Origin:
-    """What determines a repertoire.
+    """What determines a repertoire: the arguments of ``make_repertoire``, and selfmodel's version.
 
-    Attributes:
-        robot: Name of the robot.
-        model: Digest of the robot's model; see ``model_digest``.
-        steps: Control steps of a rollout.
-        evaluations: Number of gaits that were evaluated.
-        levels: Number of cells along each axis of the grid.
-        seed: Seed of all random numbers.
-        version: Version of selfmodel.
+    Robot and model are its name and the digest of its model; see ``model_digest``.
     """
 
     robot: str

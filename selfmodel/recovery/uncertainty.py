@@ -127,11 +127,7 @@ def estimated_uncertainty(
     The noise is that of the trials in excess of the same estimate in noise-free simulations of
     them: a contact changes a reading within a step, too. A model that predicts the trials
     exactly is exact. Without a calibration, the parameters are as uncertain as before the trials.
-
-    Args:
-        simulator: The self-model, calibrated if there is a calibration.
-        trials: Trials of the healthy robot, at least one.
-        calibration: Fit of the self-model to the trials.
+    The simulator is of the self-model, calibrated if there is a calibration.
     """
     robot, assumed = simulator.robot, assumed_uncertainty(simulator.robot)
     touch = _touch(robot.anatomy)
@@ -239,10 +235,8 @@ class Posterior:
     def after(self, trials: Sequence[Trial], hypothesis: Hypothesis) -> DomainDistribution:
         """Returns an uncertainty whose models are weighted by their predictions of trials.
 
-        Args:
-            trials: Trials of controllers; those of the stage ``before`` are of the healthy robot.
-                Trials whose base was not observed are left out.
-            hypothesis: Faults of the robot in all other trials.
+        Trials of the stage ``before`` are of the healthy robot, and all others of one with the
+        faults of the hypothesis. Trials whose base was not observed are left out.
         """
         sample = [condition.model for condition in self._conditions[: self._models]]
         if not any(model.differs for model in sample):

@@ -136,12 +136,10 @@ def sensor_errors(
     """Returns the errors of a hypothesis on a trial by sensor and window.
 
     The predictions are those of the comparator: short ones from logged states, or one simulation of
-    the whole trial. The result is None if the simulation diverges, or for an ensemble.
-
-    Returns:
-        Names of the sensors; beginning and end of each window, s since the start of the trial,
-        ``(2, windows)``; root mean square errors in units of ``PREDICTION_ERROR_SCALES``,
-        ``(sensors, windows)``, NaN where nothing was observed.
+    the whole trial. The result is None if the simulation diverges, or for an ensemble; or else the
+    names of the sensors; beginning and end of each window, s since the start of the trial,
+    ``(2, windows)``; root mean square errors in units of ``PREDICTION_ERROR_SCALES``,
+    ``(sensors, windows)``, NaN where nothing was observed.
     """
     robot, trajectory = subject.simulator.robot, trial.trajectory
     request = prepared_trial(subject.comparator, robot, trial).request

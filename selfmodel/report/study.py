@@ -106,9 +106,8 @@ def _means(table: tuple[str, ...], means: pd.DataFrame, study: LoadedStudy) -> I
 def shares(rows: Sequence[Mapping[str, Cell]], *, by_method: bool) -> Section | None:
     """Returns the right diagnoses of each method, never pooled: by case, and by gap.
 
-    Args:
-        rows: Rows with a judged diagnosis.
-        by_method: Whether they are charted by method alone too, where no comparison is.
+    The rows have a judged diagnosis. They may be charted by method alone too, where no comparison
+    is.
     """
     named = [{**row, "method": name} for row, name in zip(rows, methods_in(rows), strict=True)]
     names = ("robot", "trials", "method")

@@ -229,15 +229,11 @@ def subject_of_logs(
     comparator: str = AUTO,
     kinds: Sequence[FaultKind] = (),
 ) -> Subject:
-    """Returns the subject of a report on logs that were diagnosed before.
+    """Returns the subject of a report on logs, in any order, that were diagnosed before.
 
-    Args:
-        paths: The logs of the diagnosis, in any order.
-        diagnosis: Output of ``selfmodel diagnose --json``, or the ``result.json`` of a recovery.
-        robot: Self-model instead of that in the logs, as in ``--robot`` of the diagnosis.
-        threads: Threads of the physics; 0 for all processors.
-        comparator: As of ``subject_of_run``.
-        kinds: As of ``subject_of_run``.
+    The diagnosis is the output of ``selfmodel diagnose --json``, or the ``result.json`` of a
+    recovery. A robot is the self-model instead of that in the logs, as in ``--robot`` of the
+    diagnosis. The other arguments are as of ``subject_of_run``.
     """
     file = DiagnosisFile(diagnosis, DiagnosisResult)
     explained, intact = file.matched(paths)

@@ -70,11 +70,8 @@ def reaches_ground(robot: Robot, limb: Sequence[Joint]) -> bool:
 
     The ground is at the height of the robot's lowest point in the initial pose. The limb is lowered
     by its own joints, one hinge after the other over its range; the rest of the robot keeps the
-    initial pose. Only geoms that can touch the ground count.
-
-    Args:
-        robot: The robot.
-        limb: Joints of the limb, the one nearest to the root body first.
+    initial pose. Only geoms that can touch the ground count. The joint of the limb that is nearest
+    to the root body is the first.
     """
     model = robot.model
     geoms = np.array(ground_contact_geoms(model), dtype=np.intp)
@@ -128,12 +125,8 @@ def penetration_depths(
     rigidly connected, that are neighbours in the kinematic tree, or that penetrate each other in
     the initial pose, as parts of an assembly do. These are the pairs "adjacent" and "default" that
     MoveIt's Setup Assistant leaves out. The shape of a body is made of its geoms that can touch
-    anything, or of all its geoms if there are none.
-
-    Args:
-        robot: The robot.
-        positions: Angles of its hinges, rad, ``(poses, hinges)``.
-        lost: Ids of bodies that are not compared.
+    anything, or of all its geoms if there are none. The positions are angles of the hinges, rad,
+    ``(poses, hinges)``; ``lost`` has the ids of bodies that are not compared.
     """
     model = _collision_model(robot)
     if lost:

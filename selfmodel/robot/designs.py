@@ -17,12 +17,7 @@ from selfmodel.rotation import directions
 
 @typed
 def network_for(robot: Robot, hidden: int | None = None, *, heading: bool = False) -> Network:
-    """Returns the network that controls a robot.
-
-    Args:
-        robot: The robot.
-        hidden: Number of hidden neurons; the paper's by default.
-        heading: Whether the network holds its heading.
+    """Returns the network that controls a robot, with the paper's number of neurons by default.
 
     Raises:
         InputError: The number of hidden neurons is out of range, a motor has no command range, or
@@ -38,12 +33,7 @@ def network_for(robot: Robot, hidden: int | None = None, *, heading: bool = Fals
 
 @typed
 def cpg_for(robot: Robot, hidden: int | None = None, *, heading: bool = False) -> Cpg:
-    """Returns the CPG that controls a robot.
-
-    Args:
-        robot: The robot.
-        hidden: None; a CPG has no hidden neurons.
-        heading: Whether the CPG holds its heading.
+    """Returns the CPG that controls a robot; it has no hidden neurons.
 
     Raises:
         InputError: A number of hidden neurons is given, a motor has no command range, or the robot

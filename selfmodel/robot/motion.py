@@ -65,12 +65,8 @@ class Poses:
 def poses_of(robot: Robot, model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
     """Returns the poses of a trajectory; the base of a robot that is fixed is known.
 
-    A missing value is the last observation before it, or the first one.
-
-    Args:
-        robot: Robot of the trajectory.
-        model: Model with the robot's layout; positions in no signal are as in its reference pose.
-        trajectory: One run with the signals of ``POSE``.
+    A missing value is the last observation before it, or the first one. The trajectory is one run
+    with the signals of ``POSE``; positions in no signal are as in the model's reference pose.
     """
     trajectory = with_known_base(robot, trajectory)
     held_steps = np.zeros(trajectory.steps, dtype=bool)

@@ -20,9 +20,7 @@ UP, FORWARD = [8], [0, 2]
 class Fields:
     """Fields of MuJoCo's states, ``(n, ...)`` each, by the names of a robot's parts.
 
-    Args:
-        model: The healthy robot's model; the states may have further parts behind its own.
-        bind: Returns the fields.
+    The model is the healthy robot's; the states may have further parts behind its own.
     """
 
     def __init__(self, model: mujoco.MjModel, bind: Bind) -> None:

@@ -175,10 +175,7 @@ _ITERATIONS = (
 
 
 def check_model(model: mujoco.MjModel) -> int:
-    """Checks that a robot of this model can be logged, damaged and predicted from its logs.
-
-    Returns:
-        The number of its root body.
+    """Checks that a robot can be logged, damaged and predicted; returns the id of its root body.
 
     Raises:
         ValueError: The model has an unsupported part, or a number that is not finite or absurdly

@@ -88,10 +88,8 @@ class FreeBase:
 class FixedBase:
     """A base without degrees of freedom: its pose is a constant of the model.
 
-    Args:
-        models: One model for all rows of a state, or one per row; they share one layout. The pose
-            differs between them, as on slopes.
-        body: Id of the root body.
+    There is one model for all rows of a state, or one per row; they share one layout. The pose
+    differs between them, as on slopes.
     """
 
     def __init__(self, models: Sequence[mujoco.MjModel], body: int) -> None:
@@ -115,10 +113,7 @@ def _constant(rows: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray
 class SlidingBase:
     """A floating base with slide joints, then at most one hinge, between the world and the body.
 
-    Args:
-        models: One model for all rows of a state, or one per row; they share one layout. The frame
-            of the body differs between them, as on slopes.
-        body: Id of the root body.
+    There is one model for all rows of a state, or one per row, as for a fixed base.
     """
 
     def __init__(self, models: Sequence[mujoco.MjModel], body: int) -> None:
@@ -219,12 +214,7 @@ Base = FreeBase | SlidingBase | FixedBase
 
 
 def read_base(models: Sequence[mujoco.MjModel], root: str) -> Base:
-    """Returns the base of a robot.
-
-    Args:
-        models: One model for all rows of a state, or one model per row; they share one layout.
-        root: Name of the root body; see ``find_root_body``.
-    """
+    """Returns the base of a robot, with one model for all rows of a state, or one per row."""
     model = models[0]
     body = int(model.body(root).id)
     joints = joints_of_body(model, body)
@@ -240,10 +230,8 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
 
     Commands are ``ctrl``. Sensor readings are not included: ``SensorReader`` computes them.
 
-    Args:
-        robot: The robot, whose parts name the columns of the signals.
-        models: Models of the states: no model for the robot's own, one for all states, or one per
-            state, of one layout. A model has all parts of the robot, and may have more.
+    The robot's parts name the columns of the signals. The models are one for all states, or one per
+    state, of one layout, by default the robot's own. They may have more parts than the robot.
     """
     models = models or (robot.model,)
     motors = columns([int(models[0].actuator(name).id) for name in robot.anatomy.motors])
@@ -260,9 +248,7 @@ def signal_fields(robot: Robot, *models: mujoco.MjModel) -> dict[Signal, SignalS
 def observed_fields(robot: Robot, variants: Sequence[ModelVariant]) -> dict[Signal, SignalSource]:
     """Returns ``signal_fields`` as robots log them: joint positions with the encoders' offsets.
 
-    Args:
-        robot: The healthy robot.
-        variants: A variant for all states, or one per state.
+    There is one variant of the healthy robot for all states, or one per state.
     """
     fields = signal_fields(robot, *(variant.model for variant in variants))
     offsets = np.array([variant.encoder_offset for variant in variants])
@@ -273,12 +259,9 @@ def observed_fields(robot: Robot, variants: Sequence[ModelVariant]) -> dict[Sign
 
 
 def state_writer(robot: Robot, bind: Bind, *models: mujoco.MjModel) -> StateWriter:
-    """Returns a function that writes the joint and base signals into a state.
+    """Returns a function that writes the joint and base signals into the fields of a state.
 
-    Args:
-        robot: The robot, whose parts name the columns of the signals.
-        bind: Returns the fields of the state, which are written.
-        models: Models of the states, as for ``signal_fields``.
+    Robot and models are as for ``signal_fields``.
     """
     models = models or (robot.model,)
     qpos, qvel = bind("qpos"), bind("qvel")
@@ -356,13 +339,8 @@ class SensorReader:
     """Computes the readings of many robots: touch 0 or 1, angles from -1 to 1.
 
     Angles are read from the joint positions: after a step, MuJoCo's sensors are one physics step
-    old, and updating them takes a fifth of the time of the physics.
-
-    Args:
-        model: Model of any of the robots; they share one layout.
-        anatomy: Parts of the robots.
-        variants: ModelVariants with the faults of their sensors.
-        copies: Number of robots per variant, in adjacent rows.
+    old, and updating them takes a fifth of the time of the physics. The robots share the layout of
+    one model. Their sensors have the faults of variants, each with some copies in adjacent rows.
     """
 
     def __init__(
@@ -415,11 +393,7 @@ class SensorNoise:
 
     The noise sequence of a sensor depends on the seed of the variant and the column of the
     sensor only. It is the same in any batch and for all hypotheses of one seed, so that hypotheses
-    do not differ by their noise.
-
-    Args:
-        variants: ModelVariants with the standard deviations of their sensors.
-        copies: Number of robots per variant, in adjacent rows; each copy has its own sequence.
+    do not differ by their noise. Each copy of a variant, in adjacent rows, has its own sequence.
     """
 
     def __init__(self, variants: Sequence[ModelVariant], copies: int = 1) -> None:

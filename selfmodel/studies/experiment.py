@@ -362,7 +362,6 @@ def read_reference(path: Path, robot: Robot) -> Reference:
         path: A trial's log, or a table with a column ``time``, s, and columns with the names of
             hinges, rad. Other columns are ignored.
         robot: The robot that is to follow the trajectory.
-
     """
     if path.suffix.lower() == ".mcap":
         (log,) = read_logs([path])

@@ -246,13 +246,9 @@ def page(results: PaperResults) -> str:
 
 
 def best_so_far(trials: Sequence[Row]) -> list[float]:
-    """Returns the share of the displacement before the failure that trials restored.
+    """Returns the share of the displacement before the failure that a recovery's trials restored.
 
-    Args:
-        trials: All trials of one recovery, in order.
-
-    Returns:
-        First that of the failing trial, then that of the best recovery trial so far.
+    The first is that of the failing trial, and then each is that of the best recovery trial so far.
     """
     before, after, *recovery = (trial["displacement"] for trial in trials)
     return [_share(before, one) for one in (after, *np.maximum.accumulate(recovery).tolist())]

@@ -171,10 +171,7 @@ def settings_of(parameters: Parameters) -> tuple[Settings, RepairSettings | None
 def gait_cell(robot: Parameters, shared: Parameters, seed: int) -> Cell:
     """Returns the cell of the first gait of a recovery with the same seed.
 
-    Args:
-        robot: The robot, as ``planned``.
-        shared: Parameters of the recoveries, of which some determine the gait.
-        seed: Seed of all random numbers.
+    The robot is as ``planned``. Some of the parameters of the recoveries determine the gait.
     """
     own, of_repair = settings_of({"shared": shared})
     settings = dataclasses.asdict(own.of_repair(of_repair)).items()

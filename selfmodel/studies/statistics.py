@@ -125,12 +125,7 @@ def matched_proportions(only_first: int, only_second: int, runs: int) -> Interva
 
     Source: D. G. Bonett and R. M. Price, *Adjusted Wald confidence interval for a difference of
     binomial proportions based on paired data*, Journal of Educational and Behavioral Statistics 37
-    (2012).
-
-    Args:
-        only_first: Number of runs in which only the first method is right.
-        only_second: Number of runs in which only the second method is right.
-        runs: Number of runs.
+    (2012). Given are the numbers of runs in which only one of the methods is right, and of all.
     """
     first, second = (only_first + 1) / (runs + 2), (only_second + 1) / (runs + 2)
     middle = first - second

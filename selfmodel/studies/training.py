@@ -6,7 +6,6 @@ arXiv:1803.07055). The state of a training is one file, written after each gener
 the same training goes on to the bit.
 """
 
-import io
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +27,7 @@ from selfmodel.evolution import Generation
 from selfmodel.faults.build import build
 from selfmodel.faults.notation import parse
 from selfmodel.files import path_of, read_file
-from selfmodel.logs.controllers import NPZ_FAILURES, read_arrays
+from selfmodel.logs.controllers import NPZ_FAILURES, npz_bytes, read_arrays
 from selfmodel.logs.files import make_folder, refuse_existing, replace_file
 from selfmodel.logs.policies import Commanded, Observed, PolicyFile, policy_of
 from selfmodel.progress import ignore
@@ -99,12 +98,7 @@ class Moments:
 
 
 class Training:
-    """An evolution of a policy for a task, generation by generation.
-
-    Args:
-        robot: Name of a body of the suite, such as ``suite-walker-walk``.
-        settings: What determines the training.
-        threads: Threads of the physics.
+    """An evolution of a policy for a task, such as ``suite-walker-walk``, by generations.
 
     Raises:
         InputError: The task has no observation or reward that a policy is evolved for, or the body
@@ -199,11 +193,9 @@ class Training:
     ) -> FloatArray:
         """Returns the return of an episode of each controller, ``(n,)``; -infinity if it diverged.
 
-        Args:
-            controllers: Policies of the task, of one design.
-            seeds: Seed of each initial state, ``(n,)``, as ``random`` of the suite's environment.
-            steps: Control steps of the episode; None for those of the task's.
-            learn: Whether the observations count in the normalisation.
+        The controllers are policies of one design, and the seeds those of each initial state, as
+        ``random`` of the suite's environment. An episode has the steps of the task's if none are
+        given. With ``learn``, the observations count in the normalisation.
         """
         robot, count = self._robot, len(controllers)
         start, speeds = self._starts.draw(seeds)
@@ -250,10 +242,10 @@ class Training:
         }
         table = "".join(f"{','.join(map(str, row))}\n" for row in (COLUMNS, *self.rows))
         for name, content in (
-            (NETWORK, _npz(tensors)),
+            (NETWORK, npz_bytes(tensors)),
             (POLICY, _policy_text(self.file).encode()),
             (PROGRESS, table.encode()),
-            (STATE, _npz(state)),
+            (STATE, npz_bytes(state)),
         ):
             replace_file(folder / name, content)
 
@@ -315,12 +307,6 @@ def _body(name: str) -> tuple[Robot, tuple[str, str]]:
     known = {body: parts for body, parts in known.items() if observation_of(body)}
     check_name("task that policies are evolved for", name, known)
     return suite_bodies.robot(*known[name]), known[name]
-
-
-def _npz(arrays: Mapping[str, Any]) -> bytes:
-    file = io.BytesIO()
-    np.savez(file, allow_pickle=False, **arrays)
-    return file.getvalue()
 
 
 def _policy_text(file: PolicyFile) -> str:

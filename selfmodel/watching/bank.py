@@ -32,14 +32,7 @@ class Bank:
     locked. Two hypotheses are compared by the loss of the comparator plus that of the hinges that
     show the change, as far as both predict them: a fault of a joint changes the motion of that
     joint most. Those that are clearly worse than the best one are left out, and not simulated
-    again.
-
-    Args:
-        simulator: The self-model.
-        comparator: Comparator of the last segment of a trial.
-        space: Hypotheses about the robot.
-        since: The steps since the change, as a trial.
-        hinges: Columns of the hinges that show the change.
+    again. The trial ``since`` has the steps since the change, and the hinges, by column, show it.
     """
 
     def __init__(

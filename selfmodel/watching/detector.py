@@ -39,8 +39,7 @@ class Onset(NamedTuple):
 class Detector:
     """Mean over channels of e-detectors by Shiryaev and Roberts; see the module.
 
-    Args:
-        run_length: Healthy segments before a false alarm that are aimed at, on average.
+    The run length is that of healthy segments before a false alarm, aimed at on average.
     """
 
     def __init__(self, run_length: float) -> None:

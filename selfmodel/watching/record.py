@@ -46,10 +46,6 @@ class WatchRecord:
     ``findings.mcap`` is ``findings.mcap.part`` until the end; a kill leaves that.
     ``black-box.mcap`` is written at the end, if the robot has changed.
 
-    Args:
-        folder: The folder, which has no other record.
-        robot: The nominal robot.
-
     Attributes:
         note: What the black box has, once it is written; "" without one.
 
@@ -76,12 +72,9 @@ class WatchRecord:
         return self
 
     def add(self, step: Sample | None, findings: Sequence[Finding], start: int = 0) -> None:
-        """Adds a step, if one came, and the findings since the one before.
+        """Adds a step, if one came, and the findings since the one before, in order.
 
-        Args:
-            step: The newest step; None without a new one.
-            findings: What is new, in order.
-            start: Time stamp of the first step, ns.
+        The start is the time stamp of the first step, ns.
         """
         with safety.hold_stop_signals():
             if step is not None:

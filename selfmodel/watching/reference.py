@@ -118,13 +118,7 @@ def reference_of(
     comparator: SegmentPrediction,
     fitted: Callable[[Sequence[Trial]], Robot],
 ) -> Reference:
-    """Returns what healthy trials show of a robot.
-
-    Args:
-        robot: The nominal robot.
-        trials: Trials of the healthy robot.
-        comparator: Comparator of the last segment of a trial.
-        fitted: Fits the self-model to some trials.
+    """Returns what healthy trials show of a robot, compared with self-models ``fitted`` to others.
 
     Raises:
         InputError: The trials are too short.

@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip("pybullet", reason="PyBullet is in the dependency group other-engine")
 
-from benchmarks.hexapod.environment import HexapodEnvironment
 from benchmarks.hexapod.robots import CASES, LEGS, MODELS, STEPS, VELOCITY, retracted, self_model
 from benchmarks.hexapod.tables import table
+from benchmarks.hexapod.trials import HexapodEnvironment
 from benchmarks.other_engine.environment import physical_robot
 from selfmodel.controllers.playback import Playback
 from selfmodel.robot.robot import Robot

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.foreign.cases import Fault
-from benchmarks.foreign.scoring import read_rows
+from benchmarks.rows import read_rows
 from benchmarks.watching.monitors import METHODS, Scores
 from benchmarks.watching.rivals import HOLD, alarms, parts_of
 from benchmarks.watching.streams import FAULTS, Machine, drawn

@@ -87,11 +87,7 @@ def adapt_text(
 ) -> Robot:
     """Returns the robot of a trusted MJCF in memory, which this process compiles.
 
-    Args:
-        name: Name of the robot.
-        mjcf: The MJCF as text.
-        files: Contents of the files that the text includes and names, by the paths in the text.
-        settings: Properties that the text does not contain.
+    The files are the contents of those that the text includes and names, by the paths in it.
 
     Raises:
         InputError: The text cannot be a robot; the message has the reason and the remedy.

@@ -178,12 +178,7 @@ class Folder:
         return self._find(name) is not None
 
     def read(self, name: str, what: str, limit: int) -> bytes:
-        """Returns the content of a file.
-
-        Args:
-            name: Path of the file relative to the MJCF.
-            what: Description of the file in an error message.
-            limit: Largest size, bytes.
+        """Returns the content of a file, of at most ``limit`` bytes, by its path from the MJCF.
 
         Raises:
             InputError: The file is missing, a loop of links, outside the folders, or too large.

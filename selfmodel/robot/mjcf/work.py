@@ -161,11 +161,7 @@ def read_mjcf(
 ) -> Work:
     """Returns the work on an MJCF, with includes inserted and all named files read.
 
-    Args:
-        root: The root element of the MJCF; changed in place.
-        files: Source of the files that the MJCF includes and names.
-        settings: Settings of the user; the defaults if absent.
-        name: Name of the MJCF among the files, which it cannot include.
+    The root is changed in place. The MJCF is one of the files, by name, and cannot include itself.
 
     Raises:
         InputError: A file is missing, too large, outside the folder, or no MJCF.
