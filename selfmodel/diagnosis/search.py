@@ -154,7 +154,10 @@ class LocalSearch:
             self.pruned(fitted(optimum, losses=self.coarse))
             for optimum in step([*local_optima], before=2)
         }
-        best = self.pruned(fitted(chosen_of(refits, self.losses), losses=self.losses))
+        best = chosen_of(refits, self.losses)
+        if not self.problem.is_long:  # the mean is of a grid around the fit by the surrogate
+            best = fitted(best, losses=self.losses)
+        best = self.pruned(best)
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
 
