@@ -306,10 +306,9 @@ def _without_some(
             )
         )
 
-    # A refit of a long trial costs most of its diagnosis, and makes all the faults no worse.
-    if (problem.is_long and is_needed(problem)) or is_needed(problem.refitted(best)):
-        return None
-    return rest, by_some
+    # A refit is most of the cost of a long trial, and predicts it no worse with all the faults.
+    is_clear = problem.is_long and is_needed(problem)
+    return None if is_clear or is_needed(problem.refitted(best)) else (rest, by_some)
 
 
 def _with_healthy(hypothesis: Hypothesis, problem: Problem) -> FloatArray:

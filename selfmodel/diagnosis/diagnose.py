@@ -256,8 +256,8 @@ class DiagnosticSearch:
 
         None if no change predicts the trials significantly better than the best hypothesis, if too
         little time follows it, or if the losses of the comparator have no times. If the best
-        hypothesis is not refined yet, the robot has to be as the healthy one before the change, and
-        the change has to be better than the refined hypothesis after it is for the whole time.
+        hypothesis is not refined yet, the change has to be better than all its faults are for the
+        whole time.
         """
         timeline = self.losses.timeline(trials)
         if timeline is None:
