@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class Playback:
     def __hash__(self) -> int:
         return hash(self._key)
 
-    @property
+    @cached_property  # every look-up of a trial needs it
     def _key(self) -> tuple[tuple[str, ...], bytes, str]:
         return self.motors, self.commands.tobytes(), self.function
 

@@ -291,21 +291,32 @@ def _without_some(
     is_small = without - loss <= MAX_SHARE * (intact - loss)
     if not is_small and is_too_high(fit_of(rest, problem)):
         return None
-    by_some, by_all = problem.refitted(rest), problem.refitted(best)
-    if by_some is None or by_all is None:
-        return None
-    with_some, with_all = (
-        np.concatenate([*by.losses([one]), *by.table.losses([INTACT], by.healthy_trials)])
-        for by, one in ((by_some, rest), (by_all, best))
-    )
     joints = joints_of(others, problem) if problem.has_joints else []
-    is_needed = significance.is_better(with_all, with_some) or any(
-        significance.joint_is_better(
-            by_all.of_joint(joint, [best])[0], by_some.of_joint(joint, [rest])[0]
+    if (by_some := problem.refitted(rest)) is None:
+        return None
+    with_some = _with_healthy(rest, by_some)
+
+    def is_needed(by_all: Problem | None) -> bool:
+        return (
+            by_all is None
+            or significance.is_better(_with_healthy(best, by_all), with_some)
+            or any(
+                significance.joint_is_better(
+                    by_all.of_joint(joint, [best])[0], by_some.of_joint(joint, [rest])[0]
+                )
+                for joint in joints
+            )
         )
-        for joint in joints
-    )
-    return None if is_needed else (rest, by_some)
+
+    # A refit is most of the cost of a long trial, and predicts it no worse with all the faults.
+    is_clear = problem.is_long and is_needed(problem)
+    return None if is_clear or is_needed(problem.refitted(best)) else (rest, by_some)
+
+
+def _with_healthy(hypothesis: Hypothesis, problem: Problem) -> FloatArray:
+    """Returns the losses of a hypothesis on the trials, then those of the healthy trials."""
+    healthy = problem.table.losses([INTACT], problem.healthy_trials)
+    return np.concatenate([*problem.losses([hypothesis]), *healthy])
 
 
 def fit_of(best: Hypothesis, problem: Problem) -> Fit:

@@ -150,8 +150,11 @@ class DiagnosticSearch:
         known = [one for one in dict.fromkeys([*seeds, *shown]) if problem.space.has(one)]
         ranked = [one for one in known if len(one) <= self._settings.genes]
         # With many losses, the refinement from the last hypotheses, or from those that standing
-        # encoders show, needs no start of the EA.
-        if how == EA or (how != STEPWISE and not (ranked and self.losses.is_piecewise(trials))):
+        # encoders show, needs no start of the EA; nor does that of a long trial.
+        needs_no_start = self.losses.has_sections(trials) or (
+            ranked and self.losses.is_piecewise(trials)
+        )
+        if how == EA or (how != STEPWISE and not needs_no_start):
             table, of_trials = (self.losses, trials) if how == EA else surrogate
             distances = partial(table.distances, trials=of_trials)
             ranked, evaluations = evolved(
@@ -253,8 +256,8 @@ class DiagnosticSearch:
 
         None if no change predicts the trials significantly better than the best hypothesis, if too
         little time follows it, or if the losses of the comparator have no times. If the best
-        hypothesis is not refined yet, the robot has to be as the healthy one before the change, and
-        the change has to be better than the refined hypothesis after it is for the whole time.
+        hypothesis is not refined yet, the change has to be better than all its faults are for the
+        whole time.
         """
         timeline = self.losses.timeline(trials)
         if timeline is None:
@@ -273,7 +276,7 @@ class DiagnosticSearch:
         change = self._with_refined_before(change, starts, problem)
         is_as_healthy = change.before == INTACT
         later = problem.within(change.since, change.until(trials) if is_as_healthy else ())
-        if later is None or not (is_refined or is_as_healthy):
+        if later is None:
             return None
         refined, compared = self._refined([change.after, *starts], later)
         split = best_split([change.before], [refined], problem.losses, problem.losses)
@@ -366,10 +369,11 @@ def is_change(split: Split, single: Hypothesis, losses: LossFunction) -> bool:
 
 
 def is_better_than_always(split: Split | None, problem: Problem) -> bool:
-    """Returns whether a change predicts the trials better than what follows it for all the time."""
+    """Returns whether a change predicts the trials better than all its faults for all the time."""
     if split is None:
         return False
-    always = with_fitted_severities(split.after, problem.coarse, problem.space, zooms=0)
+    every = problem.space.canonical([*split.after.faults, *split.before.faults])
+    always = with_fitted_severities(every, problem.coarse, problem.space, zooms=0)
     return is_change(split, always, problem.losses)
 
 

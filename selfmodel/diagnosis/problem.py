@@ -93,6 +93,11 @@ class Problem:
         """Healthy trials, and healthy parts of the trials to explain."""
         return [*self.healthy_trials, *self.healthy_parts]
 
+    @property
+    def is_long(self) -> bool:
+        """Whether a trial is so long that parts of it are simulated alone."""
+        return self.table.has_sections([part.trial for part in self.trials])
+
     def _told_apart(self, space: HypothesisSpace) -> HypothesisSpace:
         """Returns the hypotheses without gains of servos of which no prediction reaches a limit."""
         is_asked = SERVO_GAIN in space.kinds or SERVO_GAIN.suits(space.anatomy)

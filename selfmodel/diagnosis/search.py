@@ -24,7 +24,7 @@ of distances is 10 % larger. The local search:
 5. **Fit** of each local optimum's severities between the levels, and pruning again.
 6. **Choice**: from the empty hypothesis on, in order of the number of faults and then of the total
    loss, a hypothesis replaces the current best only if it is significantly better. Its severities
-   are fitted by the comparator itself, and it is pruned again.
+   are fitted by the comparator itself (but for a long trial), and it is pruned again.
 7. **Mean severities** (``with_mean_severities``), unless they make a fault prunable.
 
 The surrogate comparator simulates a third of the segments of a short trial, and as much of a longer
@@ -155,10 +155,12 @@ class LocalSearch:
             for optimum in step([*local_optima], before=2)
         }
         contrasting = filter(self._contrasts, refits)
-        chosen = chosen_of(refits, self.losses) or min(
+        best = chosen_of(refits, self.losses) or min(
             contrasting, key=self.total_loss, default=INTACT
         )
-        best = self.pruned(fitted(chosen, losses=self.losses))
+        if not self.problem.is_long:  # the mean is of a grid around the fit by the surrogate
+            best = fitted(best, losses=self.losses)
+        best = self.pruned(best)
         mean = with_mean_severities(best, self.losses, self._space)
         return mean if self.pruned(mean) == mean else best
 
