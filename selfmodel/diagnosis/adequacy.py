@@ -413,11 +413,16 @@ def refit_reason(accused: Hypothesis, problem: Problem) -> str:
     It leaves one if it predicts neither the trials significantly worse than the fault does, nor the
     healthy trials significantly worse than the self-model that is fitted to them alone. A fault of
     readings alone, which no fit changes, is compared by the same refit: errors of motion cancel.
+    Any other one has to predict the healthy trials, or its joint in them, significantly worse than
+    none: if not, it may be a parameter that they leave open, and that a prior kept the refit from.
     """
+    is_of_motion = len(accused.dynamics_part) > 0
+    if is_of_motion and not _exclude(accused, problem):
+        return f"the healthy trials do not exclude {accused}, and the self-model may lack it"
     if (refit := problem.refitted(INTACT)) is None:
         return f"the trials are too short for a fit that could explain them without {accused}"
     known, fitted = problem.table.losses, refit.table.losses
-    with_fault = known if len(accused.dynamics_part) else fitted  # no parameter changes a reading
+    with_fault = known if is_of_motion else fitted
     is_needed = any(
         significance.is_better(by([fault], trials)[0], fitted([INTACT], trials)[0])
         for by, fault, trials in (
@@ -427,6 +432,15 @@ def refit_reason(accused: Hypothesis, problem: Problem) -> str:
     )
     without = f"a self-model that is fitted to all trials predicts them as well without {accused}"
     return "" if is_needed else without
+
+
+def _exclude(accused: Hypothesis, problem: Problem) -> bool:
+    """Returns whether the healthy trials, or a joint in them, are predicted worse with faults."""
+    pair = [INTACT, accused]
+    return significance.is_better(*problem.table.losses(pair, problem.healthy_trials)) or any(
+        significance.joint_is_better(*problem.of_joint(joint, pair, healthy=True))
+        for joint in joints_of(accused.faults, problem)
+    )
 
 
 def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tuple[float, float]]:
