@@ -15,8 +15,8 @@ trials, the following is asked before a robot is called damaged:
    of the commands: no fault changes them in a gait that is played back. Of a fault that leaves
    almost nothing (``COMPLETE``), only the next question is asked.
 3. **Recalibration.** Does the fault explain more than a self-model that is fitted to the healthy
-   trials and to those to explain together, without a fault? What the healthy trials left open is
-   free in it.
+   trials and to those to explain together, without a fault? And do the healthy trials exclude it?
+   What they left open is free in the fit, but for its prior.
 
 Of a fault beside others, only the third is asked, of a fit with the others (``supported``).
 

@@ -18,13 +18,14 @@ from selfmodel.diagnosis.adequacy import (
     fast_parts,
     faster_joints,
     fit_of,
+    refit_reason,
     sufficient_trials,
     supported,
 )
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable
 from selfmodel.diagnosis.problem import Problem
-from selfmodel.diagnosis.significance import LOSS_RATIO
+from selfmodel.diagnosis.significance import LOSS_RATIO, is_better
 from selfmodel.errors import InputError
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.faults.notation import parse
@@ -345,6 +346,26 @@ def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
     written = dataclasses.replace(trial, plan=dataclasses.replace(run.plan, name="after"))
     for other in (moved(real, "first", pace=3), written):  # fast throughout; and not imported
         assert not fast_parts([KNEE], problem_of(table, other, healthy))
+
+
+def test_what_the_healthy_trials_do_not_exclude_was_there_before(table: LossTable, weaker: Robot):
+    healthy = [moved(weaker, "first"), moved(weaker, "second")]
+    doubt = doubted(problem_of(table, moved(weaker, "third"), healthy), WEAK)
+
+    assert doubt is not None
+    assert WEAK in doubt.reason
+
+
+def test_the_motion_of_its_joint_excludes_a_fault_too(table: LossTable, quadruped: Robot):
+    heavier = dataclasses.replace(nominal(quadruped), root_mass=1.3)
+    robot = with_model(quadruped, model_with_parameters(quadruped, heavier), 0.0)
+    weak = f"motor:{KNEE}=0.7"
+    healthy = [moved(robot, "first"), moved(robot, "second")]
+    problem = problem_of(table, moved(robot, "third", truth=weak), healthy, unlike(quadruped, 0.1))
+    accused = parse(weak, problem.space.anatomy)
+
+    assert not is_better(*table.losses([INTACT, accused], problem.healthy_trials))
+    assert not refit_reason(accused, problem)
 
 
 def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(
