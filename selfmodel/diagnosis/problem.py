@@ -88,7 +88,7 @@ class Problem:
         """Healthy trials, and healthy parts of the trials to explain."""
         return [*self.healthy_trials, *self.healthy_parts]
 
-    @property
+    @cached_property
     def is_long(self) -> bool:
         """Whether a trial is so long that parts of it are simulated alone."""
         return self.table.has_sections([part.trial for part in self.trials])

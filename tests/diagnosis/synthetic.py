@@ -71,7 +71,7 @@ class Synthetic(Problem):
         self.coarse = coarse or losses
         self._before, self._hinges, self._hinges_before = before, hinges, hinges_before
         self.table = SimpleNamespace(by_hinge=self._by_hinge)
-        self.has_joints, self._is_comparable = hinges is not None, True
+        self.has_joints, self._is_comparable, self.is_long = hinges is not None, True, False
 
     def healthy(self, hypotheses: Sequence[Hypothesis]) -> np.ndarray | None:
         """Returns the given losses."""
