@@ -280,23 +280,25 @@ def test_a_jam_of_a_robot_that_has_lost_a_limb_before_is_found_with_both_hypothe
 
 
 @pytest.mark.search
-def test_a_clear_change_of_a_long_trial_is_found_without_a_refinement_of_the_whole(
+def test_a_clear_change_of_a_long_trial_is_found_without_an_ea_or_a_refinement_of_the_whole(
     quadruped: Robot, gait: Controller, monkeypatch: pytest.MonkeyPatch
 ):
     for module in (requests, segment_prediction):
         monkeypatch.setattr(module, "MAX_CHAIN", 1.5)
     healthy = trial(quadruped, "intact", gait)
     damaged = glued(healthy, trial(quadruped, STUCK, gait), 200)
-    found, simulators = [], [Simulator(quadruped, 1) for _ in range(2)]
+    found, evaluations, simulators = [], [], [Simulator(quadruped, 1) for _ in range(2)]
     for simulator in simulators:
         search = DiagnosticSearch(
             *(simulator, SEGMENT_PREDICTION_ONBOARD, SMALL, PAPER_KINDS), healthy_trials=[healthy]
         )
         found.append(search([damaged], [], np.random.default_rng(0), lambda _: None))
+        evaluations.append(search.evaluations)
         monkeypatch.setattr(LossTable, "has_sections", lambda *_: False)
     quick, thorough = found
 
     assert str(quick.best) == STUCK
+    assert evaluations[0] == 0
     assert (quick.best, quick.verdict, quick.change) == (
         *(thorough.best, thorough.verdict, thorough.change),
     )
