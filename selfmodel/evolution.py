@@ -199,8 +199,12 @@ def evolve(
 ) -> None:
     """Runs a search until no generation is left, at least one.
 
-    The fitness is from genomes, ``(n, length)``, to ``(n,)``; a noisy one is comparable within a
-    generation only.
+    Args:
+        search: The search.
+        fitness: Fitness function, from genomes ``(n, length)`` to ``(n,)``.
+        on_generation: Called after each generation.
+        generations_left: Returns the number of generations that remain.
+        noisy: Whether fitness is comparable within a generation only.
     """
     start, number, best, left = perf_counter(), 0, -np.inf, 1
     while left:
