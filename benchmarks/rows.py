@@ -21,8 +21,8 @@ from selfmodel.studies.tables import Table, markdown_of
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Returns the rows of a file; none if it does not exist."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    """Returns the rows of a file."""
+    lines = path.read_text(encoding="utf-8").splitlines()
     return [json.loads(line) for line in lines if line.strip()]
 
 
@@ -34,7 +34,7 @@ def add_rows(
     A row is its key, the values and, if these have none, the seconds of processor time. The values
     are of a key and an empty folder, which is removed.
     """
-    done = read_rows(path)
+    done = read_rows(path) if path.exists() else []
     new = (key for key in keys if not any(key.items() <= row.items() for row in done))
     for key in islice(new, limit):
         start = time.process_time()

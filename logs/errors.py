@@ -22,7 +22,14 @@ def salvage_it(path: str | PathLike[str]) -> str:
 
 
 class LogError(WorkError):
-    """A log cannot be used: what is damaged, what is intact, and a remedy."""
+    """A log cannot be used.
+
+    Attributes:
+        path: The file.
+        what: Description of the damage.
+        good: Description of the intact part, or "".
+        advice: Remedy.
+    """
 
     def __init__(
         self, path: str | PathLike[str], what: str, *, good: str = "", advice: str = AGAIN
@@ -60,7 +67,11 @@ class SchemaMismatchError(LogError):
 class LogWriteError(OSError):
     """Writing a log failed; the file keeps all earlier data.
 
-    Its text ends with a remedy, ``again``, and the data that are ``kept``.
+    Args:
+        path: The file.
+        cause: Error of the operating system.
+        again: Remedy after some space is free.
+        kept: Description of the data that are kept.
     """
 
     def __init__(

@@ -76,7 +76,8 @@ def score(
     def digest(path: Path) -> str:
         return hashlib.sha256(path.parent.name.encode()).hexdigest()
 
-    done = {key(row["name"], row["asked"]) for row in read_rows(rows)}
+    known = read_rows(rows) if rows.exists() else []
+    done = {key(row["name"], row["asked"]) for row in known}
     left = []
     for path in sorted(out.glob("*/truth.json"), key=digest):
         question = question_of(json.loads(path.read_text())["group"])

@@ -21,12 +21,11 @@ def table(rows: Sequence[Row]) -> str:
     parts = []
     for command in dict.fromkeys(row["command"] for row in rows):
         own = [row for row in rows if row["command"] == command]
-        every = sorted(own, key=lambda row: str(row["group"])) + [
-            {**row, "group": "all"} for row in own
-        ]
+        named = sorted(({**row, "of": row["group"]} for row in own), key=lambda row: str(row["of"]))
+        every = [*named, *({**row, "of": "all"} for row in own)]
         answers = sorted({row["answer"] for row in own})
         columns = _scores if command == "recover" else partial(_rates, answers=answers)
-        parts.append(markdown(lines_of(every, {"group": "group"}, columns), texts=1))
+        parts.append(markdown(lines_of(every, {"of": "group"}, columns), texts=1))
     return "\n".join(parts)
 
 

@@ -308,7 +308,7 @@ def _without_some(
             )
         )
 
-    # A refit is most of the cost of a long trial, and predicts it no worse with all the faults.
+    # A refit is most of the cost of a long trial, and one with all faults hardly predicts it worse.
     is_clear = problem.is_long and is_needed(problem)
     return None if is_clear or is_needed(problem.refitted(best)) else (rest, by_some)
 

@@ -373,7 +373,7 @@ def is_better_than_always(split: Split | None, problem: Problem) -> bool:
     if split is None:
         return False
     every = problem.space.canonical([*split.after.faults, *split.before.faults])
-    always = with_fitted_severities(every, problem.coarse, problem.space, zooms=0)
+    always = with_fitted_severities(every, problem.coarse, problem.space)
     return is_change(split, always, problem.losses)
 
 

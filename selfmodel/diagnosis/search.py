@@ -156,7 +156,7 @@ class LocalSearch:
         }
         contrasting = filter(self._contrasts, refits)
         best = chosen_of(refits, self.losses) or min(
-            contrasting, key=self.total_loss, default=INTACT
+            contrasting, key=lambda one: (self.total_loss(one), one), default=INTACT
         )
         if not self.problem.is_long:  # the mean is of a grid around the fit by the surrogate
             best = fitted(best, losses=self.losses)

@@ -137,7 +137,8 @@ def _unexplained(diagnosis: Diagnosis) -> tuple[list[str], str]:
     kinds = f"all kinds of faults (--kinds all). If this was done, {UNKNOWN}"
     first = f"check whether {best.words}. If not, " if best and has_guess else ""
     if unsearched is not None:
-        kinds = f"this kind of fault too (--kinds default,{unsearched.kind})"
+        kind = unsearched.kind
+        kinds = f"this kind of fault too (add {kind} to --kinds; default,{kind} if none were given)"
         better = "a kind of fault that was not asked for fits these logs best. Check whether"
         first = f"{better} {unsearched.hypothesis.words}. Then "
     elif fit and fit.joints:

@@ -240,8 +240,8 @@ FRICTION = Friction(
     bounds=(0.01, 3.0),
     levels=(0.1, 0.13, 0.16, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.2, 1.5),
     unit="(coefficient)",
-    words="the friction of the ground is not that of the simulation model: its coefficient is "
-    "{severity:.2g} (rubber on dry concrete: about 0.8)",
+    words="the ground has a friction coefficient of {severity:.2g} (rubber on dry concrete: about "
+    "0.8), unlike in the simulation model",
 )
 SLOPE = Slope(
     name="slope",

@@ -151,6 +151,7 @@ def test_what_a_refit_explains_without_a_fault_is_no_fault(
     assert doubted(problem_of(table, weak, healthy), WEAK) is None
 
 
+@pytest.mark.parametrize("is_long", [False, True])
 @pytest.mark.parametrize(
     ("model", "robot", "truth", "best", "refit", "left"),
     [
@@ -171,6 +172,8 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
     best: str,
     refit: str,
     left: str,
+    *,
+    is_long: bool,
 ):
     known, physical, fitted = map(request.getfixturevalue, (model, robot, refit))
     before = [moved(physical, gait) for gait in ("first", "second")]
@@ -179,10 +182,14 @@ def test_a_fault_beside_others_is_left_out_if_a_refit_explains_it(  # noqa: PLR0
 
     hypothesis = parse(best, known.anatomy)
 
-    problem = problem_of(table, trials, before, fitted)
+    problem, fits = problem_of(table, trials, before, fitted), []
+    problem.is_long = is_long
+    calibrate = problem.calibrate
+    problem.calibrate = lambda *each, **known: fits.append(1) or calibrate(*each, **known)
     found, by_refit = supported(hypothesis, problem)
 
     assert str(found) == left
+    assert len(fits) <= (1 if is_long and left == best else 2)  # a refit of a long trial is dear
     (losses,) = by_refit.losses([found])
     refitted = table_of(fitted).losses([found], trials)
     assert (losses == (refitted if left != best else table.losses([found], trials))).all()

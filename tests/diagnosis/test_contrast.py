@@ -40,11 +40,13 @@ def servo() -> Robot:
     return robot_of(SERVO.format(friction=0.02, gain=3.0), control_timestep=0.01)
 
 
-def moved(servo: Robot, gain: float, *, amplitude: float = 1.0, seed: int = 0) -> Trial:
+def moved(
+    servo: Robot, gain: float, *, amplitude: float = 1.0, pace: int = 1, seed: int = 0
+) -> Trial:
     """A noisy trial of 6 s of a servo with more friction than the self-model."""
     model = mujoco.MjModel.from_xml_string(SERVO.format(friction=0.1, gain=gain))
     data, states = mujoco.MjData(model), []
-    turn = 2 * np.pi * np.arange(600) * servo.control_timestep
+    turn = 2 * np.pi * pace * np.arange(600) * servo.control_timestep
     commands = amplitude * (np.sin(turn) + 0.5 * np.sin(0.37 * turn))[:, np.newaxis]
     for row in commands:
         states.append(np.concatenate([data.qpos, data.qvel]))
@@ -52,13 +54,17 @@ def moved(servo: Robot, gain: float, *, amplitude: float = 1.0, seed: int = 0) -
         mujoco.mj_step(model, data, servo.substeps)
     noise = np.random.default_rng(seed).normal(0, (0.002, 0.04), (len(states), 2))
     positions, velocities = np.hsplit(np.array(states) + noise, 2)
-    name = f"{gain}-{amplitude}-{seed}"
+    name = f"{gain}-{amplitude}-{pace}-{seed}"
     return Trial.from_arrays(servo, positions, commands, joint_velocities=velocities, name=name)
 
 
 def contrast_of(servo: Robot, trial: Trial, faults: str, *healthy: Trial) -> float:
+    return contrast_of_all(servo, [trial], faults, *healthy)
+
+
+def contrast_of_all(servo: Robot, trials: Sequence[Trial], faults: str, *healthy: Trial) -> float:
     table = LossTable(Simulator(servo, 1), SEGMENT_PREDICTION)
-    problem = problem_of(table, servo, [trial], healthy, (WEAK_MOTOR, JAMMED))
+    problem = problem_of(table, servo, trials, healthy, (WEAK_MOTOR, JAMMED))
     return problem.contrast(parse(faults, servo.anatomy))
 
 
@@ -70,7 +76,9 @@ def test_only_another_robot_gains_beyond_a_healthy_trial_of_the_same_movement(se
     assert contrast_of(*given, healthy) > MIN_Z
     assert contrast_of(servo, again, "motor:servo=0.9", healthy) < 1.0
     assert contrast_of(*given, smaller) == 0.0
+    assert contrast_of(*given, moved(servo, 3.0, pace=2)) == 0.0
     assert contrast_of(*given, smaller, healthy) == contrast_of(*given, healthy)
+    assert contrast_of_all(servo, [weak, moved(servo, 1.8, pace=2)], given[2], healthy) == 0.0
     assert contrast_of(servo, weak, "motor:servo=0.6+sensor:servo_angle", healthy) == 0.0
 
 

@@ -11,6 +11,7 @@ from scipy import stats
 from selfmodel.diagnosis.significance import (
     LOSS_FLOOR,
     LOSS_RATIO,
+    MIN_HEALTHY_SHARE,
     MIN_PIECES,
     MIN_Z,
     MIN_Z_ACROSS_TRIALS,
@@ -159,12 +160,20 @@ def test_what_was_better_before_has_to_be_better_by_more_since():
     assert gain_exceeds_healthy_gain(one, one + gain + 0.002, BEFORE, BEFORE + earlier)
 
 
-def test_what_was_significantly_better_before_is_no_gain_since_however_large():
-    one, earlier = np.full(40, 10.0), of_mean_and_error(MIN_Z * 0.1, 0.1)
+@pytest.mark.parametrize(
+    ("errors", "share", "told"),
+    [(1.01, 1.01, False), (0.99, 1.01, True), (1.01, 0.99, True)],
+)
+def test_what_gained_before_significantly_and_by_a_tenth_is_no_gain_since(
+    errors: float,
+    share: float,
+    told: bool,  # noqa: FBT001  # what is expected
+):
+    one, gain = np.full(40, 10.0), 0.5 + 0.001 * np.resize([1.0, -1.0], 40)
+    size = share * MIN_HEALTHY_SHARE * gain.mean()
+    before = np.full(100, 10.0), 10.0 + of_mean_and_error(size, size / (errors * MIN_Z))
 
-    for margin, told in ((-0.01, True), (0.01, False)):
-        before = np.full(100, 10.0), 10.0 + earlier + margin
-        assert gain_exceeds_healthy_gain(one, one + 5.0 + 0.01 * np.arange(40), *before) == told
+    assert gain_exceeds_healthy_gain(one, one + gain, *before) == told
 
 
 @pytest.mark.parametrize("has_helped", [False, True])

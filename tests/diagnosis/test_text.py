@@ -305,7 +305,8 @@ def test_a_fault_before_a_change_is_not_forgotten():
             (
                 "a kind of fault that was not asked for fits these logs best. Check whether the "
                 "foot below the joint front_left_knee has 20 % of its grip left. Then repeat "
-                "the diagnosis with this kind of fault too (--kinds default,grip)."
+                "the diagnosis with this kind of fault too (add grip to --kinds; default,grip if "
+                "none were given)."
             ),
         ),
         (
