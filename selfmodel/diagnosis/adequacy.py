@@ -24,13 +24,14 @@ A comparator of whole trials, or with one distance per trial, judges only trials
 reproduces (``unreproduced``). Trials that contradict each other are not judged (``contradiction``).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis import search, significance
+from selfmodel.diagnosis.coverage import fast_parts, faster_joints
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.direct_evidence import explains_standing
 from selfmodel.diagnosis.joints import excesses, joints_of
@@ -38,11 +39,7 @@ from selfmodel.diagnosis.losses import by_total_loss
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.settings import EA
-from selfmodel.trials.trajectory import Trajectory
 from selfmodel.trials.trial import TrialPart, have_one_gait, whole
-
-COVERAGE = 1.25
-"""Largest speed of a joint's commands, relative to that in the healthy trials, that they cover."""
 
 MAX_LEFT = 0.5
 """Share of the loss beyond that of healthy trials with other gaits that a fault may leave. One that
@@ -71,16 +68,8 @@ LONGER = (
 LEFT_OUT = ". Or import again without the fast part (with {}), and repeat the diagnosis"
 """What decides too, if the healthy trials cover all but a few parts of the imported ones."""
 
-MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0
-"""Largest share of a trial, and largest number of its parts, that it is advised to leave out; and
-shortest time without fast commands between two parts, s."""
-
 MAX_SHARE = 0.1
 """Share of the loss that a fault explains beside others, up to which it has to beat a refit."""
-
-FASTEST = 0.95
-"""Quantile of the speeds of commands that is compared: single jumps are no regime."""
-
 
 WHOLE_TRIALS = (
     "no hypothesis reproduces the trials, and over a whole trial an error of the self-model grows "
@@ -441,71 +430,3 @@ def _exclude(accused: Hypothesis, problem: Problem) -> bool:
         significance.joint_is_better(*problem.of_joint(joint, pair, healthy=True))
         for joint in joints_of(accused.faults, problem)
     )
-
-
-def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tuple[float, float]]:
-    """Returns the joints that trials move faster than the healthy ones of a problem cover.
-
-    The fastest relative to them is first. By the joint's name, the speed of its commands in the
-    trials and in the healthy trials, rad/s.
-    """
-    anatomy = problem.space.anatomy
-    speeds, covered = (_fastest(each) for each in (trials, problem.healthy_motions))
-    joints = {}
-    for joint in anatomy.joints:
-        motors = [anatomy.motors.index(motor) for motor in joint.servos]
-        beyond = [motor for motor in motors if speeds[motor] > COVERAGE * covered[motor]]
-        if beyond:
-            joints[joint.name] = float(speeds[beyond[0]]), float(covered[beyond[0]])
-    return dict(sorted(joints.items(), key=lambda one: one[1][1] / one[1][0]))
-
-
-def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
-    """Returns what leaves out the parts of imported trials that healthy trials do not cover.
-
-    In these, joints are faster. The result has an entry of the mapping for each trial with such
-    parts, and is empty if they are many, or most of a trial.
-    """
-    anatomy, entries = problem.space.anatomy, []
-    servos = [motor for joint in anatomy.joints if joint.name in joints for motor in joint.servos]
-    motors = [anatomy.motors.index(motor) for motor in servos]
-    covered = _fastest(problem.healthy_motions)[motors]
-    for part in problem.trials:
-        trajectory = part.rows.trajectory
-        times, trial = trajectory.time, part.trial
-        ends = 1 + np.flatnonzero(
-            (command_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1)
-        )
-        groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
-        spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
-        most = MAX_LEFT_OUT * np.ptp(times) if trial.plan.name == "imported" else 0.0
-        if len(spans) > MAX_PARTS or sum(end - begin for begin, end in spans) > most:
-            return []
-        listed = ", ".join(
-            f"[{np.floor(10 * begin) / 10:.1f}, {np.ceil(10 * end) / 10:.1f}]"
-            for begin, end in spans
-        )
-        log = problem.names[trial.path]
-        entries += [f"leave_out = [{listed}] in the mapping file of '{log}'"] if spans else []
-    return entries
-
-
-def _fastest(parts: Sequence[TrialPart]) -> FloatArray:
-    """Returns the speed of each motor's commands where any joint was measured, ``(motors,)``."""
-    quantiles = []
-    for speeds in (command_speeds(part.rows.trajectory) for part in parts):
-        known = speeds[np.isfinite(speeds).all(axis=1)]
-        nothing = np.zeros(speeds.shape[1])
-        quantiles.append(np.quantile(known, FASTEST, axis=0) if len(known) else nothing)
-    return np.asarray(np.max(quantiles, axis=0))
-
-
-def command_speeds(trajectory: Trajectory) -> FloatArray:
-    """Returns the speeds of the motors' commands, rad/s, ``(steps - 1, motors)``.
-
-    They are NaN at steps without a measured joint, which say nothing about the robot.
-    """
-    changes = np.abs(np.diff(trajectory["commands"], axis=0))
-    speeds = changes / np.diff(trajectory.time)[:, np.newaxis]
-    unseen = np.isnan(trajectory["joint_positions"][1:]).all(axis=1, keepdims=True)
-    return np.asarray(np.where(unseen, np.nan, speeds))

@@ -29,8 +29,8 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPrediction
-from selfmodel.diagnosis.adequacy import COVERAGE, command_speeds
 from selfmodel.diagnosis.comparator import TrialRefusedError
+from selfmodel.diagnosis.coverage import COVERAGE, command_speeds
 from selfmodel.diagnosis.significance import LOSS_FLOOR
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot

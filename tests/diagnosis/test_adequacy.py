@@ -3,48 +3,29 @@
 import dataclasses
 import re
 from collections.abc import Callable, Sequence
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from selfmodel import load_policy, load_robot
-from selfmodel.comparators import SEGMENT_PREDICTION
-from selfmodel.controllers.playback import played_back
+from selfmodel import load_policy
 from selfmodel.diagnosis.adequacy import (
-    COVERAGE,
-    doubt_of,
-    fast_parts,
-    faster_joints,
     fit_of,
     refit_reason,
     sufficient_trials,
     supported,
 )
-from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.losses import LossTable
-from selfmodel.diagnosis.problem import Problem
 from selfmodel.diagnosis.significance import LOSS_RATIO, is_better
 from selfmodel.errors import InputError
-from selfmodel.faults.hypothesis import INTACT, Hypothesis
+from selfmodel.faults.hypothesis import INTACT
 from selfmodel.faults.notation import parse
-from selfmodel.faults.registry import DEFAULT_KINDS
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.calibration import Calibration
 from selfmodel.simulation.model_factors import model_with_parameters, nominal, with_model
-from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trial import Trial, TrialPart
-from tests.diagnosis import synthetic
-from tests.helpers.drivers import random_motion
-from tests.helpers.memory import trial_of
+from tests.diagnosis.doubts import KNEE, WEAK, doubted, moved, problem_of, table_of, unlike
 
-STEPS = 400
-GAITS = {"first": (1.0, 0.3), "second": (0.3, 1.0), "third": (0.8, 0.8)}
-"""Amplitudes of neighbouring motors, relative to each other, of three gaits."""
-
-KNEE = "front_left_knee"
-WEAK = f"motor:{KNEE}=0.5"
 JAM, TOO = "jam:back_right_knee", "motor:back_left_shoulder=0.6"
 DEAD = "sensor:front_right_touch"
 BROKEN = f"break:{KNEE}"
@@ -56,30 +37,10 @@ def real(quadruped: Robot) -> Robot:
     return unlike(quadruped)
 
 
-def unlike(robot: Robot, knee: float = 1.0) -> Robot:
-    """A robot with other masses and damping, and a factor of the torque of the front left knee."""
-    gains = np.ones(robot.model.nu)
-    gains[robot.anatomy.motors.index(KNEE)] = knee
-    own = dataclasses.replace(
-        nominal(robot), root_mass=1.2, limb_mass=0.8, damping=2.5, motor_gains=tuple(gains)
-    )
-    return with_model(robot, model_with_parameters(robot, own), robot.control_delay)
-
-
 @pytest.fixture(scope="module")
 def weaker(quadruped: Robot) -> Robot:
     """The robot itself, with a weak motor."""
     return unlike(quadruped, 0.5)
-
-
-@cache
-def moved(robot: Robot, gait: str, *, pace: int = 1, truth: str = "intact") -> Trial:
-    """A trial of a robot under sinusoids of a gait, ``pace`` times as fast."""
-    sizes = np.resize(GAITS[gait], robot.model.nu)
-    commands = sizes * random_motion(robot, pace * STEPS, seed=2)[::pace]
-    driver = played_back(robot.anatomy.motors, commands)
-    run = trial_of(robot, truth, driver, steps=STEPS, name="imported")
-    return dataclasses.replace(run, path=f"{truth}-{gait}-{pace}.mcap")
 
 
 @pytest.fixture(scope="module")
@@ -100,41 +61,9 @@ def weak(real: Robot) -> Trial:
     return moved(real, "third", truth=WEAK)
 
 
-@cache
-def table_of(robot: Robot) -> LossTable:
-    """Losses of a self-model, which are kept from test to test."""
-    return LossTable(Simulator(robot, 1), SEGMENT_PREDICTION)
-
-
 @pytest.fixture(scope="module")
 def table(quadruped: Robot) -> LossTable:
     return table_of(quadruped)
-
-
-def problem_of(
-    table: LossTable,
-    trial: Trial | list[Trial],
-    healthy: Sequence[Trial],
-    refit: Robot | None = None,
-) -> Problem:
-    """The problem of a trial; a refit of the self-model to all trials gives ``refit``."""
-    robot = load_robot("quadruped")
-    trials = trial if isinstance(trial, list) else [trial]
-
-    def calibrated(_: Sequence[Trial], hypotheses: Sequence[Hypothesis]) -> SimpleNamespace:
-        assert [*hypotheses[: len(healthy)]] == [INTACT] * len(healthy)
-        return SimpleNamespace(robot=refit or robot)
-
-    return synthetic.problem_of(table, robot, trials, healthy, DEFAULT_KINDS, calibrate=calibrated)
-
-
-def doubted(problem: Problem, accused: str, ratio: float = 2.0) -> Doubt | None:
-    """The doubt about an accusation by a loss of ``ratio`` times that of the healthy trials."""
-    hypothesis = parse(accused, problem.space.anatomy)
-    worst = max(problem.table.losses([INTACT], [one]).mean() for one in problem.healthy_trials)
-    loss = ratio * float(worst)
-    healthy = float(problem.healthy([INTACT]).mean())
-    return doubt_of(hypothesis, Fit(loss, loss, healthy, None, 6.0, bool(hypothesis)), problem)
 
 
 def refused(_: Sequence[Trial], **__: object) -> Calibration:
@@ -323,38 +252,6 @@ def test_a_loss_beyond_any_error_of_a_fitted_model_is_not_doubted(
     assert large is None
 
 
-def test_a_part_of_an_imported_trial_that_is_faster_may_be_left_out(
-    table: LossTable, real: Robot, healthy: list[Trial]
-):
-    slow, fast = (
-        np.array(one.trajectory["commands"])
-        for one in (moved(real, "first"), moved(real, "first", pace=3))
-    )
-    slow[250:300] = fast[250:300]
-    driver = played_back(real.anatomy.motors, slow)
-    run = trial_of(real, WEAK, driver, steps=STEPS, name="imported")
-    trial = dataclasses.replace(run, path="logs/part.mcap")
-    problem, times = problem_of(table, trial, healthy), trial.trajectory.time
-    doubt = doubted(problem, WEAK)
-
-    assert doubt is not None
-    part = re.search(r"leave_out = \[\[(.*), (.*)\]\] in the mapping file of 'part'", doubt.remedy)
-    assert part is not None
-    begin, end = map(float, part.groups())
-    assert (begin, end) == pytest.approx((times[250], times[300]), abs=0.11)
-
-    signals = {name: np.array(values) for name, values in trial.trajectory.signals.items()}
-    for name in signals.keys() - {"commands"}:
-        signals[name][(times >= begin) & (times <= end)] = np.nan
-    without = dataclasses.replace(trial, trajectory=trial.trajectory.with_signals(signals))
-    rest = problem_of(table, without, healthy)
-    assert not faster_joints(rest.trials, rest)
-
-    written = dataclasses.replace(trial, plan=dataclasses.replace(run.plan, name="after"))
-    for other in (moved(real, "first", pace=3), written):  # fast throughout; and not imported
-        assert not fast_parts([KNEE], problem_of(table, other, healthy))
-
-
 def test_what_the_healthy_trials_do_not_exclude_was_there_before(table: LossTable, weaker: Robot):
     healthy = [moved(weaker, "first"), moved(weaker, "second")]
     doubt = doubted(problem_of(table, moved(weaker, "third"), healthy), WEAK)
@@ -382,19 +279,6 @@ def test_a_self_model_that_is_given_as_it_is_makes_no_doubts(
     problem.calibrate = None
 
     assert doubted(problem, WEAK) is None
-
-
-def test_speeds_are_those_of_commands_by_joint(table: LossTable, quadruped: Robot):
-    slow, fast = (moved(quadruped, "third", pace=pace) for pace in (1, 2))
-    problem, other = problem_of(table, fast, [slow]), problem_of(table, slow, [fast])
-
-    faster = faster_joints(problem.trials, problem)
-
-    assert set(faster) == {joint.name for joint in quadruped.anatomy.joints}
-    for speed, covered in faster.values():
-        assert COVERAGE * covered < speed < 2.1 * covered
-        assert covered <= 0.6 * 2 * np.pi  # 0.6 rad at 1 Hz
-    assert faster_joints(other.trials, other) == {}
 
 
 def test_no_refit_explains_a_dead_sensor(table: LossTable, real: Robot, healthy: list[Trial]):
