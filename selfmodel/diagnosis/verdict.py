@@ -52,8 +52,8 @@ from selfmodel.faults.hypothesis import INTACT, Hypothesis
 
 UNKNOWN = 0.03
 """Least probability that a clear diagnosis is wrong. Of 1,134 that were ``explained``, with gaps of
-0.05 to 0.2, 30 were wrong (1.9 to 3.8 %): 23 of 541 of one trial, 7 of 593 of three. Of 150 clear
-diagnoses of one trial of another generator, 2 were."""
+0.05 to 0.2, 30 were wrong (1.9 to 3.8 %): 23 of 541 of one trial, 7 of 593 of three. Of 173 clear
+diagnoses of one trial of another generator, 3 were."""
 
 STEEPNESS = 4.0
 """Power of ``unlikeness`` in the odds of a fault that was not searched, which are even at the limit
