@@ -23,8 +23,7 @@ def diagram(files: Sequence[Path]) -> Figure:
     if not stated:
         raise SystemExit(f"no probabilities are stated in {', '.join(map(str, files))}")
     said = np.array([float(line["probability"]) for line in stated])
-    # What `unexplained` says is that no named hypothesis is right.
-    so = np.array([(one["right"] == "True") != (one["verdict"] == "unexplained") for one in stated])
+    so = np.array([one["so"] == "True" for one in stated])
     place = row_of(said)
     lowest = min(0.4, said.min() - 0.05)
     figure = Figure(figsize=(4.4, 4.2), layout="constrained")

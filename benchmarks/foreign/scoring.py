@@ -419,6 +419,7 @@ def _line(row: Row) -> Row:
         "loss": loss("loss"),
         "healthy_loss": loss("healthy_loss"),
         "probability": None if found.probability is None else round(found.probability, 3),
+        "so": found.is_so,
         "right": found.right,
         "verdict_right": found.verdict_right,
         "seconds": round(row.get("seconds", 0.0), 1),
