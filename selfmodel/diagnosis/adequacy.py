@@ -24,14 +24,13 @@ A comparator of whole trials, or with one distance per trial, judges only trials
 reproduces (``unreproduced``). Trials that contradict each other are not judged (``contradiction``).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.controllers.controller import Controller
 from selfmodel.diagnosis import search, significance
-from selfmodel.diagnosis.coverage import fast_parts, faster_joints
 from selfmodel.diagnosis.diagnosis import Doubt, Fit
 from selfmodel.diagnosis.direct_evidence import explains_standing
 from selfmodel.diagnosis.joints import excesses, joints_of
@@ -39,7 +38,14 @@ from selfmodel.diagnosis.losses import by_total_loss
 from selfmodel.diagnosis.problem import Problem
 from selfmodel.faults.hypothesis import INTACT, Hypothesis
 from selfmodel.settings import EA
-from selfmodel.trials.trial import TrialPart, have_one_gait, whole
+from selfmodel.trials.trial import TrialPart, command_speeds, fastest_commands, have_one_gait, whole
+
+COVERAGE = 1.25
+"""Largest speed of a joint's commands, relative to that in the healthy trials, that they cover."""
+
+MAX_LEFT_OUT, MAX_PARTS, MIN_PAUSE = 0.5, 3, 1.0
+"""Largest share of a trial, and largest number of its parts, that it is advised to leave out; and
+shortest time without fast commands between two parts, s."""
 
 MAX_LEFT = 0.5
 """Share of the loss beyond that of healthy trials with other gaits that a fault may leave. One that
@@ -430,3 +436,50 @@ def _exclude(accused: Hypothesis, problem: Problem) -> bool:
         significance.joint_is_better(*problem.of_joint(joint, pair, healthy=True))
         for joint in joints_of(accused.faults, problem)
     )
+
+
+def faster_joints(trials: Sequence[TrialPart], problem: Problem) -> dict[str, tuple[float, float]]:
+    """Returns the joints that trials move faster than the healthy ones of a problem cover.
+
+    The fastest relative to them is first. By the joint's name, the speed of its commands in the
+    trials and in the healthy trials, rad/s.
+    """
+    anatomy = problem.space.anatomy
+    speeds, covered = (fastest_commands(each) for each in (trials, problem.healthy_motions))
+    joints = {}
+    for joint in anatomy.joints:
+        motors = [anatomy.motors.index(motor) for motor in joint.servos]
+        beyond = [motor for motor in motors if speeds[motor] > COVERAGE * covered[motor]]
+        if beyond:
+            joints[joint.name] = float(speeds[beyond[0]]), float(covered[beyond[0]])
+    return dict(sorted(joints.items(), key=lambda one: one[1][1] / one[1][0]))
+
+
+def fast_parts(joints: Collection[str], problem: Problem) -> list[str]:
+    """Returns what leaves out the parts of imported trials that healthy trials do not cover.
+
+    In these, joints are faster. The result has an entry of the mapping for each trial with such
+    parts, and is empty if they are many, or most of a trial.
+    """
+    anatomy, entries = problem.space.anatomy, []
+    servos = [motor for joint in anatomy.joints if joint.name in joints for motor in joint.servos]
+    motors = [anatomy.motors.index(motor) for motor in servos]
+    covered = fastest_commands(problem.healthy_motions)[motors]
+    for part in problem.trials:
+        trajectory = part.rows.trajectory
+        times, trial = trajectory.time, part.trial
+        ends = 1 + np.flatnonzero(
+            (command_speeds(trajectory)[:, motors] > COVERAGE * covered).any(axis=1)
+        )
+        groups = np.split(ends, 1 + np.flatnonzero(np.diff(times[ends]) > MIN_PAUSE))
+        spans = [(times[group[0] - 1], times[group[-1]]) for group in groups if len(group)]
+        most = MAX_LEFT_OUT * np.ptp(times) if trial.plan.name == "imported" else 0.0
+        if len(spans) > MAX_PARTS or sum(end - begin for begin, end in spans) > most:
+            return []
+        listed = ", ".join(
+            f"[{np.floor(10 * begin) / 10:.1f}, {np.ceil(10 * end) / 10:.1f}]"
+            for begin, end in spans
+        )
+        log = problem.names[trial.path]
+        entries += [f"leave_out = [{listed}] in the mapping file of '{log}'"] if spans else []
+    return entries

@@ -298,6 +298,9 @@ def check_magnitudes(trial: Trial, signals: Iterable[Signal]) -> None:
             )
 
 
+FASTEST = 0.95
+"""Quantile of the speeds of commands that is compared: single jumps are no regime."""
+
 MAX_DIFFERENCE = 0.4
 """Largest difference of the commands of one gait. Recordings of another generator: at most 0.26 for
 the same gait, also of a network on a damaged robot, and at least 0.7 for different gaits."""
@@ -326,3 +329,24 @@ def command_difference(one: Trial, other: Trial) -> float:
     deviations = np.abs(first.std(axis=0) - second.std(axis=0))
     difference = float(np.mean(means + deviations))
     return difference / scale if scale > 0 else (math.inf if difference > 0 else 0.0)
+
+
+def fastest_commands(parts: Sequence[TrialPart]) -> FloatArray:
+    """Returns the speed of each motor's commands where any joint was measured, ``(motors,)``."""
+    quantiles = []
+    for speeds in (command_speeds(part.rows.trajectory) for part in parts):
+        known = speeds[np.isfinite(speeds).all(axis=1)]
+        nothing = np.zeros(speeds.shape[1])
+        quantiles.append(np.quantile(known, FASTEST, axis=0) if len(known) else nothing)
+    return np.asarray(np.max(quantiles, axis=0))
+
+
+def command_speeds(trajectory: Trajectory) -> FloatArray:
+    """Returns the speeds of the motors' commands, rad/s, ``(steps - 1, motors)``.
+
+    They are NaN at steps without a measured joint, which say nothing about the robot.
+    """
+    changes = np.abs(np.diff(trajectory["commands"], axis=0))
+    speeds = changes / np.diff(trajectory.time)[:, np.newaxis]
+    unseen = np.isnan(trajectory["joint_positions"][1:]).all(axis=1, keepdims=True)
+    return np.asarray(np.where(unseen, np.nan, speeds))

@@ -29,14 +29,14 @@ import numpy as np
 
 from selfmodel.arrays import FloatArray
 from selfmodel.comparators.segment_prediction import MIN_SEGMENTS, SegmentPrediction
+from selfmodel.diagnosis.adequacy import COVERAGE
 from selfmodel.diagnosis.comparator import TrialRefusedError
-from selfmodel.diagnosis.coverage import COVERAGE, command_speeds
 from selfmodel.diagnosis.significance import LOSS_FLOOR
 from selfmodel.errors import InputError
 from selfmodel.robot.robot import Robot
 from selfmodel.simulation.simulator import Simulator
 from selfmodel.trials.trajectory import Trajectory, samples_of
-from selfmodel.trials.trial import Trial
+from selfmodel.trials.trial import Trial, command_speeds
 from selfmodel.watching.segments import Window, scores_of
 
 MIN_HELD_OUT = 50

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from selfmodel.controllers.playback import played_back
-from selfmodel.diagnosis.coverage import COVERAGE, fast_parts, faster_joints
+from selfmodel.diagnosis.adequacy import COVERAGE, fast_parts, faster_joints
 from selfmodel.robot.robot import Robot
 from tests.diagnosis.doubts import KNEE, STEPS, WEAK, doubted, moved, problem_of, table_of, unlike
 from tests.helpers.memory import trial_of
